@@ -14,7 +14,7 @@ pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
         let Some((what, facts)) = logged(event) else { return };
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
         match event {
-            // Also frames of clients with read-only access.
+            // This includes frames of clients with read-only access.
             LineEvent::Denied { client, .. } => {
                 log.write_repeated(what, &format!("client {}", client.0), facts)
             }

@@ -12,11 +12,11 @@ use tokio::sync::watch;
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
 use crate::upload::Upload;
 
-/// Longest wait for the controller before the requests of clients are checked; a Stop waits no longer than this for its
-/// turn.
+/// Longest wait for bytes of the controller before the owner checks the requests of clients. A Stop waits no longer
+/// than this.
 const TURN: Duration = Duration::from_millis(2);
 
-/// Longest wait at the end for data in flight.
+/// Longest time that the owner waits for data in flight before it ends.
 const LAST_TURNS: Duration = Duration::from_secs(1);
 
 /// Callback for each event, on the owner's thread; it must return soon.
@@ -30,7 +30,7 @@ struct State {
 
 struct Shared {
     state: Mutex<State>,
-    /// Signals deliveries to blocking callers, as the channel does to asynchronous ones.
+    /// Signals deliveries to blocking callers. Asynchronous callers use the channel.
     delivered: Condvar,
     changed: watch::Sender<()>,
     /// Trajectory that was sent to the controller.
@@ -45,7 +45,7 @@ struct Shared {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // If another thread panicked, an incomplete state matters less than a Stop.
+        // The lock is used even after a panic of another thread: a Stop is more important than a complete state.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -69,7 +69,7 @@ impl Drop for Gone<'_> {
     }
 }
 
-/// Access of clients and the API to the line, which a thread owns.
+/// Handle through which clients and the API use the line. A thread owns the line.
 #[derive(Clone)]
 pub struct Line(Arc<Shared>);
 
@@ -101,7 +101,7 @@ impl Line {
 
     /// Waits for a delivery, at most for `timeout`.
     pub fn wait(&self, timeout: Duration) {
-        // The caller checks the reason of the wake-up itself.
+        // The caller itself checks why it was woken.
         drop(self.0.delivered.wait_timeout(self.0.lock(), timeout));
     }
 
@@ -115,7 +115,7 @@ impl Line {
         self.0.lock().lost.clone()
     }
 
-    /// Returns the values of a status. Includes the commanded values, which no status contains, if the executed
+    /// Returns the values of a status. Adds the commanded values, which a status does not contain, if the executed
     /// trajectory was seen on the line. `delay_ticks` is the age of the measurements in ticks (J-62).
     pub fn sample(&self, status: &Status, delay_ticks: u8) -> Sample {
         let given = self.0.upload.lock().unwrap_or_else(PoisonError::into_inner).trajectory(false);

@@ -17,7 +17,7 @@ struct Assembly {
     segments: u16,
     /// Number of received segments.
     taken: u16,
-    /// Number of points before the last segment, in case it is sent again.
+    /// Number of points before the last segment. Used if the segment is sent again.
     before_last: usize,
     points: Vec<Point>,
 }
@@ -26,7 +26,7 @@ struct Assembly {
 #[derive(Default)]
 pub struct Upload {
     current: Option<Assembly>,
-    /// New upload whose first segment may still be refused; then the one before it stays.
+    /// New upload. If its first segment is refused, the previous upload stays valid.
     next: Option<Assembly>,
     whole: Option<Arc<Trajectory>>,
 }
@@ -81,7 +81,7 @@ impl Upload {
             return;
         }
         if segment.segment.checked_add(1) == Some(assembly.taken) {
-            // Its record was lost, so the segment was sent again.
+            // The record of the segment was lost, so the segment was sent again.
             assembly.points.truncate(assembly.before_last);
         } else if segment.segment == assembly.taken && assembly.taken < assembly.segments {
             assembly.taken += 1;
@@ -111,8 +111,8 @@ impl Upload {
         *self = Self::default();
     }
 
-    /// Returns the controller's trajectory, if all its segments were seen. `executes`: the controller runs it, which is
-    /// possible only if it is complete.
+    /// Returns the controller's trajectory, if all its segments were seen. `executes`: the controller runs the
+    /// trajectory, so it must be complete.
     pub fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
         if executes {
             // The record of the first segment was lost.

@@ -1,4 +1,5 @@
-//! docs/openapi.json is what an agent serves. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite description::` writes it.
+//! docs/openapi.json is equal to the description that an agent serves. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite
+//! description::` writes it.
 use std::path::Path;
 
 use host_kit::{Action, FrontEnd};
@@ -18,7 +19,7 @@ fn the_description_in_the_docs_is_that_of_the_code() {
     );
 }
 
-/// A next step names a request, or a command if the API has no such request.
+/// Each next step in an error refers to a request, or to a command if the API has no such request.
 #[test]
 fn each_request_of_a_next_step_exists() {
     let description: Value = serde_json::from_str(&jtc_agent::api::description()).expect("JSON");

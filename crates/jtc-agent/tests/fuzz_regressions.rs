@@ -1,4 +1,4 @@
-//! Body of the fuzz target, run with the kept inputs and with random ones.
+//! Runs the body of the fuzz target with the kept inputs and with random inputs.
 use jtc_agent::modbus::fuzzing::modbus_stream;
 use proptest::prelude::*;
 

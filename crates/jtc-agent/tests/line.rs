@@ -1,4 +1,4 @@
-//! Many clients on one line: which client receives a record, which client may command, and how soon a Stop is on the line.
+//! Many clients on one line: which client receives a record, which client may command, and how soon a Stop is sent.
 use crate::board;
 
 use std::time::Duration;
@@ -82,8 +82,8 @@ proptest! {
         board.run_ms(after_us / 1000);
         board.send(bob, &STOP);
         board.run_ms(100);
-        // A frame that a delay of the system has interrupted leaves more than one bad record. A Stop that may belong to such a record is
-        // sent again. Each Stop arrives as a complete frame.
+        // If a delay of the operating system interrupts a frame, the board sends more than one error record. A Stop is sent again if
+        // such a record may belong to it. Each Stop arrives as a complete frame.
         let stops = board.written.iter().filter(|(_, bytes)| bytes.ends_with(&STOP)).count();
         prop_assert!(stops >= 1);
         prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), stops);
@@ -112,7 +112,7 @@ proptest! {
             board.send(clients[client], &frame);
             board.run_ms(seed_ms);
         }
-        // A request that returns a frame waits for the frame of the last request, which this board never sends.
+        // A request for a frame waits until the frame of the previous request has arrived. This board never sends it.
         board.run_ms(60 * 520 + 2000);
         for (client, sent) in clients.iter().zip(&sent) {
             let (records, denied) = board.take(*client);
@@ -171,7 +171,7 @@ fn one_client_commands_and_all_see_who() {
         assert!(denied.len() == 1 && denied[0].contains(why), "{denied:?}");
     }
     assert_eq!(board.arrived(FrameType::GripperControl), 0);
-    // The holder releases the lease, and the waiting client gets it.
+    // When the holder releases the lease, the waiting client gets it.
     let now = board.now();
     board.line.want_lease(b, now).expect("somebody has it");
     assert!(board.take(a).1.contains(&"bob wants it".to_owned()));
@@ -255,7 +255,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1, "nobody has asked for it since");
     assert_eq!(board.arrived(FrameType::Trajectory), 0);
-    // A request for a motion must name the number of the last Stop.
+    // A request for a motion must contain the number of the last Stop.
     let (now, last) = (board.now(), board.line.last_halt());
     assert!(board.line.ask_to_move(a, last - 1, now).is_err());
     board.send(a, &EXECUTE);
@@ -306,7 +306,8 @@ fn a_client_that_sends_without_end_is_put_out() {
     assert_eq!(board.line.take_deliveries(a), None);
 }
 
-/// Teaching begins only in position hold, and the controller refuses a Stop until then: the arm would be compliant after the Stop.
+/// The controller begins Teaching only in position hold, and refuses a Stop before. Without the end of Teaching, the arm would
+/// become compliant after the Stop.
 #[test]
 fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     for damaged in [0, 10] {
@@ -369,7 +370,8 @@ fn a_policy_where_nothing_moves_stops_nobody_else() {
     }
 }
 
-/// An upload with the policy Continue takes the lease again after it has lapsed. With Pause the upload ends.
+/// After its lease has lapsed, a client with the policy Continue takes the lease again for its upload. With the policy
+/// Pause the upload ends.
 #[test]
 fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
     for (policy, arrived) in [(Policy::Continue, 4), (Policy::Pause, 0)] {
@@ -384,7 +386,7 @@ fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
         board.run_ms(9_000);
         assert_eq!(board.arrived(FrameType::Trajectory), arrived, "{policy:?}");
         assert!(board.line.lease().is_none());
-        // With Pause, later commands of this client do not take the lease again either.
+        // With the policy Pause, later commands of this client do not take the lease again either.
         board.send(a, &fixed::gripper_control(true));
         assert_eq!(board.line.lease().is_some(), policy == Policy::Continue);
         let now = board.now();
@@ -553,7 +555,7 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     board.line.halt_for(Some(anna), "anna", ExecCommand::Pause, now);
     board.run_ms(100);
     assert!(ask(&mut board, anna).is_err(), "bob's counts");
-    // A client that connects again has the same hold-off of three seconds.
+    // The hold-off of three seconds also applies to a client that connects again.
     board.line.leave(anna, now);
     let again = operator(&mut board, "anna");
     assert!(ask(&mut board, again).is_err(), "bob's counts");
@@ -636,7 +638,7 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     board.line.want_lease(anna, now).expect("nobody waits");
 }
 
-/// The controller detects a silent lease holder although another client sends requests all the time, even with queued requests.
+/// The controller detects a silent lease holder even if another client sends requests all the time and requests are queued.
 #[test]
 fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
     for (timeout_ms, every_ms) in [(600, 10), (2000, 50), (2000, 250), (5000, 100)] {
@@ -661,7 +663,7 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
         }
         let asked = board.frames.iter().filter(|(_, kind, _)| *kind == Some(FrameType::GetInfo));
         let shown = asked.map(|(at, ..)| at.saturating_sub(silent_from)).max().unwrap_or_default();
-        // A frame that is being written when half of the timeout has passed still arrives.
+        // A frame that is being written when half of the timeout passes is still sent completely.
         let limit = Duration::from_millis(timeout_ms / 2 + 20);
         assert!(shown <= limit, "{timeout_ms} ms, every {every_ms} ms: a frame came after {shown:?}");
     }
@@ -673,7 +675,7 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
     use ControllerState::{HoldPos, Operate, Teaching};
     use TrajectoryState::{Execute, Finish, Pause, Stop};
     // Timeout, ms; state of the controller; `true` if the holder's lease lapses; period of the holder's frames, ms, 0: none; `true` if the
-    // viewer's requests pass.
+    // viewer's requests are sent.
     let cases = [
         (0, (Operate, Execute), true, 0, true),
         (1500, (Operate, Execute), true, 0, false),
@@ -715,7 +717,7 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
                 board.send(anna, &fixed::get_settings(0));
                 own += 1;
             }
-            // Shortly after a frame of the holder, requests may pass.
+            // Shortly after a frame of the holder, requests of other clients may be sent.
             if ms < 3000 && (every_ms != 2000 || ms % 2000 >= 400) {
                 board.send(bob, &fixed::GET_INFO);
                 asked += 1;

@@ -18,7 +18,7 @@ use jtc_wire::{ControllerState, Joint, Status};
 use proptest::prelude::*;
 use test_kit::patience::{LONGEST, until};
 
-/// Sequence number before that of the first command.
+/// Sequence number before the first command.
 const FIRST: u16 = 700;
 const HERE: [u8; 4] = [127, 0, 0, 1];
 const THERE: [u8; 4] = [127, 0, 0, 2];
@@ -162,8 +162,8 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     let mut client = cell.connect();
     cell.recover(&mut client);
     drop(client);
-    // Passes the requests to the PLC directly. The command then begins only after all requests have arrived, which is the latest possible
-    // time.
+    // Passes the requests to the PLC object directly. So the command begins only after all requests have arrived, which is the latest
+    // possible time.
     let connection = plc::Connection { number: 1000, peer: (IpAddr::from(HERE), 5).into() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime");
     let acknowledged = || {
@@ -226,7 +226,7 @@ fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_default
     let cell = Cell::start(&["127.0.0.0/8"]);
     let mut client = cell.connect();
     until("a report", || client.input(4) < 500);
-    // Passes the requests to the PLC directly, because a test cannot choose the address of a connection.
+    // Passes the requests to the PLC object directly, because a test cannot choose the address of a connection.
     let there = plc::Connection { number: 1000, peer: (IpAddr::from(THERE), 5).into() };
     let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
     let _entered = runtime.enter();
@@ -262,7 +262,7 @@ fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing(
     for other in &mut others[1..] {
         other.input(0);
     }
-    // The commanding connection was silent for as long as the closed one.
+    // The commanding connection is still open, although it was silent for as long as the closed one.
     assert_eq!(cell.connect().input(0), 1);
     assert!(others[0].response().is_none());
     assert_eq!(first.input(0), 1);
@@ -335,7 +335,7 @@ fn requests() -> impl Strategy<Value = Vec<u8>> {
     });
     let bytes = (0..24_u8, prop::collection::vec(any::<u8>(), 0..30))
         .prop_map(|(function, rest)| [vec![function], rest].concat());
-    // No coils, because the Stop of a coil would be counted below.
+    // The requests write no coils, because the test would count the Stop of a coil as a sent command.
     prop_oneof![4 => written, 4 => single, 2 => bytes]
         .prop_filter("no coil", |pdu| pdu[0] != 5 && pdu[0] != 15)
 }
@@ -357,10 +357,11 @@ fn is_next(pdu: &[u8]) -> bool {
     u16::from_be_bytes(value) == FIRST + 1
 }
 
-/// No status contains the cause, so the agent requests it. After the errors were cleared, an arm whose encoder has jumped executes nothing.
+/// A status does not contain the cause of a held stop, so the agent asks the controller for it. After an encoder jump the arm executes no
+/// motion, even when the errors were cleared.
 #[test]
 fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
-    // Long after the drives were enabled.
+    // The jump occurs long after the drives were enabled.
     let jump = Fault {
         kind: FaultKind::EncoderJump { joint: Joint::ALL[2], rad: 0.02 },
         trigger: Trigger::InState(ControllerState::HoldPos, 10_000),

@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, which links as fast as a single one: each file here is a module of it.
+//! All tests of the crate in one program, with each file as a module. The program links as fast as a single test would.
 mod board;
 mod description;
 mod fuzz_regressions;

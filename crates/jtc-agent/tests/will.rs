@@ -44,7 +44,7 @@ fn a_will_is_there_from_the_upload_to_rest_and_is_that_of_who_commands() {
     board.line.set_policy(anna, Policy::Continue);
     board.run_ms(20);
     assert_eq!(wills(&mut board), [will("anna", Policy::Continue, Moves::Motion)]);
-    // No status is received: the arm may still move, and the will stays.
+    // While no status is received, the arm may still be moving, so the will stays.
     board.deaf_until = board.now() + Duration::from_secs(3);
     board.run_ms(3_500);
     assert_eq!(wills(&mut board), []);
@@ -139,7 +139,8 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
     }
 }
 
-/// Without a status the agent cannot know that the arm stands: the applied will stays in force for the next agent.
+/// Without a status the agent cannot know that the arm is at rest. So the applied will stays in the file for the next
+/// agent.
 #[test]
 fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     for policy in [Policy::Continue, Policy::Pause, Policy::Stop] {
@@ -151,7 +152,7 @@ fn what_was_left_stays_in_force_while_the_controller_is_silent() {
         board.run_ms(3_000);
         assert_eq!(board.line.will().cloned(), will("anna", policy, Moves::Motion), "{policy:?}");
         assert_eq!(wills(&mut board), [], "{policy:?}: it is as it was");
-        // The controller reports again, and the arm stands.
+        // The controller reports again that the arm is at rest.
         board.status.trajectory = TrajectoryState::Finish.into();
         board.status.state = ControllerState::HoldPos.into();
         board.run_ms(3_000);
@@ -159,7 +160,7 @@ fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     }
 }
 
-/// Teaching that the controller refuses leaves no will.
+/// If the controller refuses Teaching, no will is left.
 #[test]
 fn teaching_that_is_refused_leaves_no_will() {
     let mut board = Board::new(115_200);

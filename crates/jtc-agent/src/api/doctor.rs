@@ -98,8 +98,8 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     Ok(Json(DoctorObject { healthy, listened_s: time_s, statuses, findings }))
 }
 
-/// Returns the joints that are set absent. The status has no bit for an absent joint whose drive answers (J-53), so the
-/// controller is asked.
+/// Returns the joints that the user has declared absent. Asks the controller for them, because the status has no bit
+/// for an absent joint whose drive answers (J-53).
 async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
         return Ok(words::absent(status));

@@ -1,4 +1,4 @@
-//! Error answers of the API: one type of object for all errors.
+//! Error answers of the API. All errors use one type of object.
 use std::collections::BTreeMap;
 
 use agent_kit::api::Problem;
@@ -52,7 +52,7 @@ impl From<Unable> for Problem {
     }
 }
 
-/// Refusals that a command can receive in addition to those of every request.
+/// Refusals of commands, in addition to the refusals that every request can receive.
 pub(super) struct Denials;
 
 impl IntoResponses for Denials {

@@ -1,4 +1,4 @@
-//! Identity of the controller and its arm, read from time to time and shared by all readers.
+//! Identity of the controller and its arm. The agent reads it when needed, and all clients share the answer.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use tokio::time::{Instant, timeout};
 
 use super::Agent;
 
-/// Time for which the last answer is used.
+/// Time for which an answer is used before the controller is asked again.
 const FRESH: Duration = Duration::from_secs(10);
 /// Longest wait for the controller.
 const ASK_TIME: Duration = Duration::from_secs(3);
@@ -21,16 +21,16 @@ pub(super) struct Identity {
     asked: Option<Instant>,
     /// Identity as the controller reports it; `None` without extensions, or before its first answer.
     pub info: Option<Info>,
-    /// Arm of the controller; the agent's arm if the controller cannot be asked.
+    /// Arm of the controller, or the agent's arm if the controller cannot return its own.
     pub arm: Arc<Arm>,
     /// Hash of the controller's arm.
     hash: Option<u64>,
-    /// Number of frames that may have changed the arm, sent before the controller was asked.
+    /// Number of frames that may have changed the arm and were sent before the controller was asked.
     changes: u64,
 }
 
 impl Identity {
-    /// Returns the identity before the controller was asked.
+    /// Returns the identity that is used before the first answer of the controller.
     pub fn of(arm: &Arm) -> Self {
         let hash = arm.hash().ok().flatten();
         Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash, changes: 0 }

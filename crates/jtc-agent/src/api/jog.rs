@@ -1,4 +1,4 @@
-//! Jogging by the lease holder: the arm moves while a key is held down and the user sees current statuses.
+//! Jogging by the lease holder: the arm moves while the user holds a key down and sees current statuses.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Body, Problem, Refusals};
@@ -14,9 +14,9 @@ use utoipa::{IntoParams, ToSchema};
 use super::Agent;
 use super::error::Denials;
 
-/// Largest age of the status that the user saw when the jog request arrives.
+/// Largest age, when a jog request arrives, of the status that the user saw.
 const SEEN_WITHIN: Duration = Duration::from_millis(500);
-/// Tolerance for a status time that is ahead of the agent's: the time was rounded and sent earlier.
+/// Tolerance for a status time that is ahead of the agent's clock, because the time was rounded before it was sent.
 const AHEAD: Duration = Duration::from_millis(100);
 
 /// Joint rates of a jog.
@@ -43,8 +43,8 @@ pub(super) struct KnownToJog {
     as_of_ms: Option<u64>,
 }
 
-/// Knowledge of the client. A missing number of the last Stop or Pause is filled in before the body, which may arrive
-/// slowly.
+/// Knowledge of the client. If the client does not send the number of the last Stop or Pause, it is filled in before
+/// the body is read, because the body may arrive slowly.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JogAsked {
     after: AskedAfter,
@@ -67,7 +67,7 @@ const fn ms(duration: Duration) -> u64 {
     duration.as_millis() as u64
 }
 
-/// Returns the refusal of a request that is based on a status of `as_of_ms` and arrived too late, at `arrived_ms`.
+/// Returns the refusal of a request that was based on the status of `as_of_ms` and arrived too late, at `arrived_ms`.
 fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<Problem> {
     let (late, ahead) = (arrived_ms.saturating_sub(as_of_ms), as_of_ms.saturating_sub(arrived_ms));
     if ahead > ms(AHEAD) {
@@ -105,10 +105,10 @@ pub(super) async fn jog(
     let commander = agent.commander(&asker)?;
     let turn = commander.turn()?;
     let moves = rates_rad_s.iter().any(|rate| *rate != 0.0);
-    // The request is complete now: the body may have arrived later than the head.
+    // The arrival time is taken now, because the body may have arrived later than the head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
-        // After a Stop the key must be released even if its requests come late: each of them extends the hold-off, too.
+        // After a Stop the user must release the key. So late requests of the key also extend the hold-off.
         agent.line.with(|line, now| line.could_jog(commander.client, now))?;
         return Err(late);
     }

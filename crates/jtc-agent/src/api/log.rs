@@ -70,7 +70,7 @@ impl LogValues {
     /// Returns the samples since the last start of the controller that are at most `last_s` older than the last one.
     fn of(samples: &[Sample], last_s: f64) -> Self {
         let end = samples.last().map_or(0.0, |sample| sample.time_s);
-        // Half a tick more, because the difference of two times in seconds is not exact.
+        // A margin of half a tick is added, because the difference of two times in seconds is not exact.
         let from = end - last_s - 0.5e-3;
         let rows: Vec<&Sample> =
             samples.iter().filter(|sample| (from..=end).contains(&sample.time_s)).collect();
@@ -178,7 +178,7 @@ pub(super) async fn values(
     from_log(&agent, &caller, last).await.map(Json)
 }
 
-/// Reads the log and converts it; for operators, one request at a time.
+/// Reads the log and converts it. Only operators may do this, one request at a time.
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
@@ -191,7 +191,7 @@ async fn from_log<T: Send + 'static>(
         let next = "ask again in some seconds: a log is read by one at a time";
         Problem::new("busy", "somebody reads the log of the flight recorder", next)
     })?;
-    // A client of its own, so that other questions do not wait for it.
+    // Uses a separate client, so that other questions do not wait for the log.
     let name = format!("{}: log", caller.peer);
     let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
     let reader = Commander::new(&agent.line, introduction);

@@ -10,7 +10,7 @@ use prometheus::{CounterVec, GaugeVec, Opts, Registry, TextEncoder};
 use super::Agent;
 use agent_kit::api::{Problem, Refusals};
 
-/// Content type of the Prometheus text format; programs that prefer another format accept it, too.
+/// Content type of the Prometheus text format. Programs that prefer another format accept this one as well.
 const FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 /// Value with the values of its labels.
@@ -103,7 +103,7 @@ impl Page {
         self.joints(status, arm)
     }
 
-    /// Adds the measured joints; the others are left out.
+    /// Adds the joints that have measured values.
     fn joints(&self, status: &Status, arm: &Arm) -> prometheus::Result<()> {
         let each = |value: &dyn Fn(usize) -> f64| -> Vec<Labelled> {
             let measured = Joint::ALL.into_iter().filter(|joint| is_measured(status, joint.index()));

@@ -1,4 +1,4 @@
-//! API of the agent: HTTP requests, and a socket with a connection to the line.
+//! API of the agent: HTTP requests, and a socket that connects a client to the line.
 mod absent;
 mod arm;
 mod body;
@@ -88,7 +88,7 @@ pub struct Agent {
     line: Line,
     jobs: Arc<Jobs>,
     gate: Gate,
-    /// Number that identifies this run of the agent for clients.
+    /// Number by which clients recognise this run of the agent.
     id: Arc<str>,
     port: Arc<str>,
     simulated: bool,
@@ -170,8 +170,8 @@ impl Agent {
         self.gate.lost_lines()
     }
 
-    /// Sends a Stop or a Pause of an HTTP client. For the line the sender always differs from the lease holder, because
-    /// requests of the holder may have been sent before.
+    /// Sends a Stop or a Pause of an HTTP client. The line always treats the sender as another client than the lease
+    /// holder, because requests of the lease holder may have been sent before the Stop.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
         // The identity of the client matters only for its later requests.
@@ -183,7 +183,7 @@ impl Agent {
         });
         match client {
             Some(_) => self.note("halt", facts),
-            // A client without a lease can send such requests without limit.
+            // A client without a lease can send any number of such requests, so repeated ones are logged together.
             None => self.gate.note_repeated("halt", caller.peer, facts),
         }
         if let Some(lost) = lost {

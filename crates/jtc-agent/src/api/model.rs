@@ -1,4 +1,4 @@
-//! Arm model for display: frames, limits and masses, without a question on the line for each reader.
+//! Arm model for display: frames, limits and masses. All readers share the answers of the controller.
 use agent_kit::api::Refusals;
 use axum::Json;
 use axum::extract::State;
@@ -94,7 +94,7 @@ pub struct ModelLink {
 impl From<&Identity> for ModelObject {
     fn from(identity: &Identity) -> Self {
         let arm: &Arm = &identity.arm;
-        // The controller may have another name for the same arm.
+        // The controller may use another name for the same arm.
         let (source, name) = match identity.of_controller() {
             Some(info) => (ModelSource::Controller, info.arm.to_string()),
             None => (ModelSource::Agent, arm.name.clone()),

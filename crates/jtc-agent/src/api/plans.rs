@@ -23,7 +23,7 @@ use super::{Agent, Caller};
 use crate::jobs::{NUMBER_MAX, StoreError};
 use crate::owner::ClientPort;
 
-/// Largest number of waypoints; a plan through more takes longer than a request may.
+/// Largest number of waypoints. A plan with more waypoints takes longer than the time limit of a request.
 const WAYPOINTS_MAX: usize = 500;
 /// Possible bearing temperatures, °C.
 const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=120.0;
@@ -228,7 +228,7 @@ pub(super) async fn plan(
     caller.operator()?;
     let (request, file) = read(&agent, request, understood).await?;
     if let Some(KeepRequest { number, new: true, .. }) = request.keep {
-        // Checked before the plan, which takes time.
+        // The number is checked before the plan is made, because planning takes time.
         agent.jobs.store.is_free(number).map_err(|e| Problem::of(&e))?;
     }
     let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
@@ -239,12 +239,12 @@ pub(super) async fn plan(
     let asked = move |session: &mut Session<ClientPort>| {
         let device = session.device_config()?;
         let mut arm = if session.has_extensions() { session.device_arm()? } else { own };
-        // Controllers have no named poses.
+        // The named poses are added here, because a controller does not store poses.
         arm.poses = poses;
         Ok((arm, device))
     };
     let (arm, device) = agent.ask(asked).await?;
-    // Dropped when the client that waits for the plan disconnects.
+    // This is dropped when the client that waits for the plan disconnects.
     let waits = Arc::new(());
     let waited_for = Arc::downgrade(&waits);
     let plan = blocking(move || {
@@ -269,8 +269,8 @@ pub(super) async fn plan(
     Ok(Json(plan))
 }
 
-/// Returns the error for a plan whose client no longer waits: that client may have stored another trajectory under the
-/// number since.
+/// Returns the error for a plan whose client no longer waits. Meanwhile the client may have stored another trajectory
+/// under the number.
 fn abandoned() -> Problem {
     Problem::new("abandoned", "whoever asked for this plan has gone", "ask for it again")
 }
@@ -319,7 +319,7 @@ fn planned(
     let way = Way::of(file, arm, options).map_err(|error| {
         let object = Problem::of(&error);
         match &error {
-            // A blend of the API is in rad or m, also if the positions are degrees.
+            // A blend in the API is in rad or m, even if the positions are in degrees.
             WaypointError::Route(e @ PlanError::Blend { .. }) => object
                 .message(file.located(e))
                 .next("5° is 0.0873 rad in blend_rad, 20 mm is 0.02 m in blend_m"),
@@ -360,7 +360,7 @@ fn planned(
     Ok(planned)
 }
 
-/// Returns the answer; keeps the trajectory if that was requested.
+/// Returns the answer. If the client requested it, keeps the trajectory.
 fn kept(
     agent: &Agent,
     request: &PlanRequest,

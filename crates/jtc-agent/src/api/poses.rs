@@ -1,4 +1,4 @@
-//! Named poses: those of the agent's arm file, and those that were saved through the agent.
+//! Named poses from the agent's arm file, and poses that clients have saved through the agent.
 use agent_kit::api::{Number, Problem, Refusals};
 use agent_kit::gate::plain;
 use axum::extract::State;
@@ -58,7 +58,7 @@ impl Agent {
         poses
     }
 
-    /// Returns a pose for display, with the conflicts with the limits of the arm in use.
+    /// Returns a pose for display, with its violations of the limits of the arm in use.
     fn shown(&self, arm: &Arm, name: String, positions_rad: [f64; 6]) -> PoseObject {
         let from =
             if self.jobs.arm().poses.contains_key(&name) { PoseFrom::ArmFile } else { PoseFrom::Agent };
@@ -119,7 +119,7 @@ pub(super) async fn put(
     Number(name): Number<String>,
     Perhaps(request): Perhaps<PoseRequest>,
 ) -> Result<Json<PoseObject>, Problem> {
-    // Only operators may change targets of other clients.
+    // Only operators may change poses that other clients use as targets.
     caller.operator()?;
     let saved = save(&agent, &name, request.unwrap_or_default()).await;
     let why = saved.as_ref().err().map(|error| error.message.clone());

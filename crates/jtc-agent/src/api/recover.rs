@@ -39,7 +39,7 @@ pub struct RecoverRequest {
 }
 
 impl RecoverRequest {
-    /// Returns the source of the parameters for a controller that misses some.
+    /// Returns the source of the parameters for a controller that lacks some of them.
     fn parameters(self) -> Result<RecoverParameters, Problem> {
         let Self { defaults, arm, accept_device_limits } = self;
         match arm {
@@ -74,7 +74,7 @@ pub(super) async fn begin(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // The body is read only for the holder of the lease.
+    // The body of the request is read only if the client holds the lease.
     agent.commander(&asker)?;
     let parameters = read(&agent, request, RecoverRequest::parameters).await?;
     let (commander, turn) = agent.mover(&asker, after)?;

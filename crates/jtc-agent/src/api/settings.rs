@@ -1,4 +1,5 @@
-//! Settings of the controller: reading them, and changing all or none of a list.
+//! Settings of the controller: reading them, and changing a list of them. Either all settings of a list are changed, or
+//! none.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;

@@ -22,7 +22,7 @@ use crate::owner::Line;
 const MESSAGE_MAX: usize = 64 << 10;
 /// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
-/// Interval at which a client shows that it is alive.
+/// Interval of the pings that check whether a client is alive.
 const PING_TIME: Duration = Duration::from_secs(1);
 /// Number of unanswered pings in a row after which the client loses the lease.
 const SILENT_MAX: u32 = 4;
@@ -101,7 +101,7 @@ impl Notice {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Wish {
     Lease(LeaseWish),
-    /// Number of the last Stop or Pause that the client knew when it decided about its next frames.
+    /// Number of the last Stop or Pause that the client had seen when it decided to send its next frames.
     AskedAfter(u64),
 }
 
@@ -179,7 +179,8 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
 async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);
-    // A delay of this computer must not count as silence of the client.
+    // After a delay of this computer the missed pings are not made up for, so that the delay is not taken for silence
+    // of the client.
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut silent = 0;
     // The client knows all Stops and Pauses from before it connected.
@@ -256,7 +257,7 @@ fn wish(line: &Line, client: ClientId, text: &str) {
     line.wake();
 }
 
-/// Sends a message. Returns `false` if the client does not take it.
+/// Sends a message. Returns `false` if the client does not receive it.
 async fn send(to: &mut SplitSink<WebSocket, Message>, message: Message) -> bool {
     matches!(tokio::time::timeout(SEND_TIME, to.send(message)).await, Ok(Ok(())))
 }

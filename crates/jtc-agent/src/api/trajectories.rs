@@ -243,7 +243,7 @@ pub(super) async fn put(
     Ok(Json(kept.await?))
 }
 
-/// Keeps the trajectory of a text under a number; with `new` only if the number is free.
+/// Keeps the trajectory in `text` under a number. If `new` is `true`, only if the number is free.
 pub(super) fn keep(
     agent: &Agent,
     (number, new): (u16, bool),

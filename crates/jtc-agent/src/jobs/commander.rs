@@ -16,7 +16,7 @@ use crate::owner::{ClientPort, Line};
 /// Interval at which an idle client reads the statuses of the controller.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Error code of a request for a motion that had ended before.
+/// Error code of a request for a motion that has already ended.
 const MOTION_ENDED: &str = "motion-ended";
 
 /// Function that runs on the session of a client.
@@ -40,7 +40,7 @@ pub struct Commander {
     moves: AtomicBool,
 }
 
-/// Request while a motion runs, and the receiver of its result.
+/// Request that a client makes while a motion runs, and the channel for its result.
 pub struct Wish {
     /// Requested change.
     pub flow: Flow,
@@ -48,13 +48,13 @@ pub struct Wish {
     pub done: oneshot::Sender<Result<(), Problem>>,
 }
 
-/// Turn to use the session of a client; it ends on drop.
+/// Permit to use the session of a client. The turn ends on drop.
 pub struct Turn(#[expect(dead_code, reason = "held until it is over")] OwnedSemaphorePermit);
 
 /// Reason why the session of a client cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unable {
-    /// The session is in use, by this job if there is one.
+    /// The session is in use. The number is that of the job that uses it, if there is one.
     Busy(Option<u64>),
     /// The line was lost, or the client was disconnected.
     Gone,
@@ -89,8 +89,8 @@ impl Commander {
         self.moves.store(true, Ordering::Release);
     }
 
-    /// Marks the end of a motion. Requests that came too late are dropped with their senders, which tells their
-    /// clients.
+    /// Marks the end of a motion. Drops the requests that came too late, together with their result channels; so their
+    /// clients learn that the motion has ended.
     pub fn motion_ended(&self, wishes: &Receiver<Wish>) {
         let _job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
         self.moves.store(false, Ordering::Release);
@@ -163,8 +163,8 @@ impl Commander {
         drop(self.work.try_send(work));
     }
 
-    /// Begins a job, which receives the requests while it runs; `then` is called when the session accepts the next
-    /// request.
+    /// Begins a job, which receives the client's requests while it runs. After the job, when the session is free again,
+    /// `then` is called with the job's result.
     ///
     /// # Errors
     ///
@@ -206,7 +206,7 @@ impl Commander {
     fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), Problem>>> {
         let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
-        // Under the same lock as the end of a motion, so that the request never reaches the next motion.
+        // `motion_ended` takes the same lock, so the request never reaches the next motion.
         let (_, wishes) = job.as_ref().filter(|_| self.is_moving())?;
         wishes.try_send(Wish { flow, done }).ok().map(|()| result)
     }
@@ -216,8 +216,8 @@ impl Commander {
     }
 }
 
-/// Runs the queued functions until no caller is left. Reads deliveries meanwhile, because a client that does not read
-/// is disconnected.
+/// Runs the queued functions until no caller is left. Meanwhile it reads the deliveries, because the line disconnects a
+/// client that does not read.
 fn serve(port: ClientPort, work: &Receiver<Work>) {
     let mut session = Session::new(port);
     loop {

@@ -14,7 +14,7 @@ pub struct Given {
     pub settings: usize,
     /// `true` if the controller has the name of the arm.
     pub named: bool,
-    /// Friction, gains and model, as far as the controller confirmed them.
+    /// Those of friction, gains and model that the controller has confirmed.
     pub parts: Vec<PushReport>,
     /// Hash of the arm, if all parameters were read back without a difference.
     pub hash: Option<u64>,
@@ -23,7 +23,7 @@ pub struct Given {
 }
 
 impl Given {
-    /// Returns, in words, the parts that are in use of an incompletely sent arm.
+    /// Returns, in words, which parts of an incompletely sent arm the controller already uses.
     fn in_use(&self) -> Option<String> {
         let mut parts = Vec::new();
         match self.settings {
@@ -39,8 +39,9 @@ impl Given {
     }
 }
 
-/// Sends the complete arm to the controller, reads it back and compares; `store`: also stores it in non-volatile
-/// memory. Ends if the arm is stopped or paused, because a controller with a complete arm applies torque.
+/// Sends the complete arm to the controller, reads it back and compares. If `store` is `true`, also stores it in
+/// non-volatile memory. Ends if a client stops or pauses the arm, because a controller with a complete arm applies
+/// torque.
 pub fn give(
     task: &Task<'_>,
     session: &mut Session<ClientPort>,
@@ -77,7 +78,8 @@ pub fn give(
     (Done { finished: error.is_none(), given: Some(given), ..Done::default() }, error)
 }
 
-/// Returns the reason why the controller does not have the complete arm, and the parts that are in use.
+/// Returns the reason why the controller does not have the complete arm, and the parts that the controller already
+/// uses.
 fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> Problem {
     let halted = match error {
         Error::Cancelled => true,

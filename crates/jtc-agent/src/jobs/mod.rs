@@ -37,12 +37,12 @@ pub use task::{STOPPED, Task, stopped};
 const KEPT: usize = 256;
 /// Largest number of clients without a connection to the line.
 const COMMANDERS_MAX: usize = 32;
-/// Time after the end of its lease until a silent client is forgotten.
+/// Time from the end of a silent client's lease until the client is removed.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 /// Shortest interval between events for Stops and Pauses; the last one is always written. Repeated Stops must not push
 /// other events out.
 const HALTS_APART: Duration = Duration::from_millis(200);
-/// Interval at which changes are checked that are not announced.
+/// Interval at which the watcher checks for changes that the line does not announce.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Stage of a job.
@@ -110,7 +110,7 @@ pub struct Jobs {
 }
 
 impl Jobs {
-    /// Returns the jobs of a line. `arm` is used for controllers that cannot be asked for theirs.
+    /// Returns the jobs of a line. `arm` is used if the controller cannot return its own arm.
     pub fn new(line: Line, store: Store, arm: Arm) -> Arc<Self> {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
@@ -134,19 +134,19 @@ impl Jobs {
         &self.asker
     }
 
-    /// Returns the arm for controllers that cannot be asked for theirs.
+    /// Returns the arm that is used if the controller cannot return its own arm.
     pub fn arm(&self) -> &Arm {
         &self.arm
     }
 
-    /// Registers a client that will send requests with `key`, at intervals of at most `lasts`. Returns `None` if too
-    /// many clients are registered.
+    /// Registers a client that sends its requests with `key`. Its lease lapses if it sends none for `lasts`. Returns
+    /// `None` if too many clients are registered.
     pub fn admit(&self, key: &str, introduction: Introduction, lasts: Duration) -> Option<Arc<Commander>> {
         let commander = Commander::new(&self.line, introduction);
         let mut kept = self.lock();
         if kept.commanders.len() >= COMMANDERS_MAX {
-            // A client without lease and work is removed, so that a program that restarts again and again blocks no
-            // other client.
+            // Removes a client without lease and job. Otherwise a program that restarts repeatedly would use up all
+            // places.
             let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
             let idle = kept
                 .commanders
@@ -159,7 +159,7 @@ impl Jobs {
         Some(commander)
     }
 
-    /// Returns the client with this key, and the duration of its lease without a request.
+    /// Returns the client with this key, and the time without a request after which its lease lapses.
     pub fn commander(&self, key: &str) -> Option<(Arc<Commander>, Duration)> {
         let found = self.lock().commanders.get(key).cloned()?;
         found.0.see();
@@ -263,7 +263,7 @@ impl Jobs {
     }
 }
 
-/// Job that has not ended; if this is dropped because of a fault of the agent, the job ends as failed.
+/// Guard of a job that has not ended. If the agent panics and drops the guard, the job ends as failed.
 struct Unfinished {
     jobs: Arc<Jobs>,
     number: u64,

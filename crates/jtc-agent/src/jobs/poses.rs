@@ -1,5 +1,5 @@
-//! Named poses that were saved through the agent. With a directory for trajectories they are stored in a file there, so that they
-//! survive a restart of the agent.
+//! Named poses that were saved through the agent. If the agent has a directory for trajectories, the poses are stored in a file
+//! there and survive a restart of the agent.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -12,7 +12,7 @@ pub const POSES_MAX: usize = 200;
 const FILE: &str = "poses.json";
 /// Version of the file format.
 const FORMAT: u8 = 1;
-/// Positions are rounded to a micrometre at the end of an arm of one metre, as in arm files.
+/// Positions are rounded to 1 µrad, as in arm files. At the end of an arm of one metre this is a micrometre.
 const DECIMALS: f64 = 1e6;
 
 /// Reason why a pose is not stored.
@@ -97,11 +97,12 @@ impl PoseStore {
         self.lock().clone()
     }
 
-    /// Stores a pose with a valid name, rad, and replaces the one of the same name; returns it as stored.
+    /// Stores a pose (joint positions in rad) under a valid name. A pose of the same name is replaced. Returns the
+    /// rounded positions.
     ///
     /// # Errors
     ///
-    /// [`PoseStoreError`]; the pose of this name is unchanged then.
+    /// [`PoseStoreError`]: the existing pose of this name is unchanged.
     pub fn put(&self, name: &str, position: &[f64; 6]) -> Result<[f64; 6], PoseStoreError> {
         let rounded = position.map(|v| (v * DECIMALS).round() / DECIMALS + 0.0);
         self.change(|poses| {
@@ -114,7 +115,7 @@ impl PoseStore {
     ///
     /// # Errors
     ///
-    /// The file cannot be written; the pose is kept then.
+    /// The file cannot be written. In this case the pose is kept.
     pub fn delete(&self, name: &str) -> Result<bool, PoseStoreError> {
         self.change(|poses| Ok(poses.remove(name).is_some()))
     }

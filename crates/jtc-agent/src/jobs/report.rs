@@ -1,4 +1,4 @@
-//! Reports of the last motions: their data is kept, and a page is made from it on request.
+//! Reports of the last motions: the agent keeps their data, and makes a page from it on request.
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -34,7 +34,7 @@ pub(super) struct Made<'a> {
     pub outcome: &'a Result<Outcome, Error>,
     /// Upload of the motion.
     pub upload: &'a UploadReport,
-    /// Statistics of the link since the end of the motion before, or since the start of the run.
+    /// Statistics of the link since the end of the previous motion, or since the start of the run.
     pub link: LinkStatistics,
     /// Start of the motion, since 1970.
     pub began: Duration,
@@ -96,7 +96,7 @@ impl MotionReport {
     }
 }
 
-/// Drops the reports of older jobs that exceed the limits together with later ones.
+/// Drops the oldest reports until the others are within the limits.
 pub(super) fn make_room(jobs: &mut VecDeque<Job>) {
     let (mut reports, mut bytes) = (0, 0);
     for report in jobs.iter_mut().rev().map(|job| &mut job.done.report) {

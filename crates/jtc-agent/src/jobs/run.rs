@@ -1,4 +1,4 @@
-//! A run of a job: its steps go into the journal, and a Stop of another client ends it.
+//! The job that runs a motion. It writes each step into the journal, and ends after a Stop of another client.
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -28,14 +28,15 @@ const MOVING: Duration = Duration::from_secs(1);
 pub struct Order {
     /// Path of the motion.
     pub course: Course,
-    /// `true`: first move the arm to the first point, if it stands elsewhere.
+    /// `true`: if the arm is not at the first point, move it there first.
     pub approach: bool,
     /// Speed, % of the trajectory's own speed, or of the limits. `None`: the trajectory's own speed, and the default
     /// speed of a move or an approach.
     pub speed_percent: Option<f64>,
     /// Number of runs.
     pub repeat: u32,
-    /// `true`: the controller has no extensions and uses other limits than the agent's arm, and these are safe for it.
+    /// `true`: the user confirms that the limits of a controller without extensions are safe for the arm, although they
+    /// differ from the limits of the agent's arm.
     pub accept_device_limits: bool,
 }
 
@@ -48,7 +49,7 @@ pub struct Done {
     pub runs: u32,
     /// Results of the last motion.
     pub summary: Option<Summary>,
-    /// Report of the last motion, if it is within the limits.
+    /// Report of the last motion, if its size is within the limits.
     pub report: report::Kept,
     /// Arm parameters that were sent to the controller.
     pub given: Option<Given>,
@@ -112,7 +113,7 @@ fn go(
     }
 }
 
-/// Returns the arm of the controller if it can be asked, else the agent's arm.
+/// Returns the arm of the controller if the controller can return it, else the agent's arm.
 fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Result<Site, Error> {
     let device = session.device_config()?;
     let arm = if session.has_extensions() { session.device_arm()? } else { task.arm.clone() };
@@ -145,9 +146,9 @@ struct RunJob<'a> {
     site: &'a Site,
     move_speed: MoveSpeed,
     done: &'a mut Done,
-    /// Statistics of the link at the end of the motion before.
+    /// Statistics of the link at the end of the previous motion.
     link: LinkStatistics,
-    /// Tenths of the upload that were reported.
+    /// Number of tenths of the upload that were reported.
     upload_shown: usize,
     /// Start of the motion, since 1970.
     began: Duration,
@@ -168,7 +169,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         before_motion(self.task, &error)
     }
 
-    /// A person who stopped an arm at rest wants it to stay there.
+    /// A Stop before the motion begins cancels the run, too: the person wants the arm to stay at rest.
     fn is_cancelled(&mut self) -> bool {
         self.task.is_halted()
     }
@@ -193,7 +194,7 @@ impl Observer<ClientPort> for RunJob<'_> {
     fn uploading(&mut self, phase: Phase, progress: &Progress) {
         let Task { job, journal, .. } = *self.task;
         let (segments_done, segments) = (progress.segments_done, progress.segments);
-        // A tenth of it at a time.
+        // Reports the progress of the upload in steps of a tenth.
         if segments_done * 10 >= (self.upload_shown + 1) * segments.max(1) {
             self.upload_shown = segments_done * 10 / segments.max(1);
             let phase = phase.name().to_owned();
@@ -244,7 +245,7 @@ impl Observer<ClientPort> for RunJob<'_> {
 
     fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), Problem> {
         let (task, done) = (self.task, &mut *self.done);
-        // A request that arrives with the last status is not applied: its client learns that the motion has ended.
+        // A request that arrives with the last status has no effect. Its client is told that the motion has ended.
         self.wish = None;
         task.commander.motion_ended(task.wishes);
         let digest = self.digest.take();

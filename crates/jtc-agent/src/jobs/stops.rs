@@ -1,5 +1,5 @@
-//! Current held stop of the arm (J-69). The status does not contain its cause, so the controller is asked once when the
-//! stop begins.
+//! Current held stop of the arm (J-69). The status does not contain the cause of the stop, so the agent asks the
+//! controller for it once, when the stop begins.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -13,15 +13,15 @@ const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Default)]
 struct State {
-    /// Number of ended held stops; an answer about an earlier one is invalid.
+    /// Number of held stops that have ended. An answer about an ended stop is dropped.
     ended: u64,
     held: bool,
     asked: Option<Instant>,
-    /// Time of the controller's answer on the line; the answer is `None` if the controller does not report its
+    /// Time of the controller's answer, and the answer. `None` in the pair: the controller does not report its
     /// reactions.
     told: Option<(Duration, Option<Reactions>)>,
-    /// Joints whose encoder had jumped, one bit each. Valid until the arm is without torque, because the drives are
-    /// configured again then.
+    /// Joints with an encoder jump, one bit each. Valid until the torque is off, because the drives are then configured
+    /// again.
     jumped: u8,
 }
 
@@ -30,8 +30,8 @@ struct State {
 pub struct Stops(Arc<Mutex<State>>);
 
 impl Stops {
-    /// Returns the cause of the current held stop, and its age in ms at this time of the line; `None` without a held
-    /// stop, or if its cause is not known.
+    /// Returns the cause of the current held stop, and its age in ms at the time `now` of the line. `None`: no held
+    /// stop is active, or its cause is not known.
     pub fn cause(&self, status: &Status, now: Duration) -> Option<(StopCause, u32)> {
         let state = self.lock();
         let (at, reactions) = state.told.as_ref().filter(|_| status.is_held_stop())?;
@@ -40,15 +40,15 @@ impl Stops {
         Some((cause, ago_ms.saturating_add(since)))
     }
 
-    /// Returns the joints whose encoder has jumped, one bit each.
+    /// Returns the joints with an encoder jump, one bit each.
     pub fn jumped(&self, status: &Status) -> u8 {
         if words::has_torque(status) { self.lock().jumped } else { 0 }
     }
 
-    /// Takes a status; asks the controller for the cause when a held stop has begun.
+    /// Takes a status. If it shows a new held stop, asks the controller for the cause.
     pub(super) fn see(&self, status: &Status, asker: &Commander) {
         let Some(stop) = self.begins(status) else { return };
-        // Another question is in progress: this one is asked at the next check.
+        // Another question is in progress. The cause is requested at the next check.
         let Ok(turn) = asker.turn() else { return };
         self.lock().asked = Some(Instant::now());
         let own = self.clone();
@@ -59,7 +59,7 @@ impl Stops {
         });
     }
 
-    /// Returns the number of the held stop whose cause must be requested, if any.
+    /// Returns the number of the held stop whose cause must be requested. `None`: no request is needed.
     fn begins(&self, status: &Status) -> Option<u64> {
         let mut state = self.lock();
         if !words::has_torque(status) {
@@ -113,7 +113,7 @@ mod tests {
         stops.told(next, second(3), Some(reactions));
         assert_eq!(stops.begins(&held), None, "its cause is known");
         assert_eq!(stops.cause(&held, second(4)), Some((cause, 1500)));
-        // A status that is newer than the last check.
+        // This status is newer than the last check.
         assert_eq!(stops.cause(&free, second(4)), None);
         assert_eq!(stops.begins(&free), None);
         assert_eq!(stops.jumped(&free), 0b100, "it lasts beyond the held stop");

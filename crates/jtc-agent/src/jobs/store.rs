@@ -26,7 +26,7 @@ pub struct Stored {
     pub trajectory: Trajectory,
     /// Notes about values that were derived or left out when it was read.
     pub notes: Vec<String>,
-    /// Digest of points and step: it differs for any other points or step, and does not depend on the name.
+    /// Digest of points and step: it changes with every point and with the step, and does not depend on the name.
     pub digest: String,
 }
 
@@ -36,12 +36,12 @@ pub enum StoreError {
     /// The number is out of range.
     #[error("{0} is no number of a trajectory: 1 to {NUMBER_MAX} are")]
     Number(u16),
-    /// The number is taken, and the trajectory must not be replaced.
+    /// The number is in use, and the caller does not allow the trajectory to be replaced.
     #[error("trajectory {number} is there already, {name}: nothing was replaced")]
     Taken {
         /// Number of the trajectory.
         number: u16,
-        /// Name of the present trajectory.
+        /// Name of the trajectory that has this number.
         name: String,
     },
     /// Two files have the same number.
@@ -96,7 +96,7 @@ impl host_kit::Diagnose for StoreError {
     }
 }
 
-/// Trajectories by number, in a directory if there is one, so that they survive a restart of the agent.
+/// Trajectories by number. If the store has a directory, they survive a restart of the agent.
 pub struct Store {
     directory: Option<PathBuf>,
     kept: Mutex<BTreeMap<u16, Arc<Stored>>>,
@@ -150,12 +150,12 @@ impl Store {
         self.lock().values().cloned().collect()
     }
 
-    /// Stores the trajectory of `text`, a file in any format that [`Loaded::parse`] accepts, and replaces the one of
-    /// the same number. A run that has begun continues with its own trajectory.
+    /// Stores the trajectory of `text`, a file in any format that [`Loaded::parse`] accepts, and replaces the
+    /// trajectory of the same number. A run that has begun continues with the old trajectory.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]; the trajectory of this number is unchanged then.
+    /// [`StoreError`]: the existing trajectory of this number is unchanged.
     pub fn put(&self, number: u16, name: &str, text: &str, degrees: bool) -> Result<Arc<Stored>, StoreError> {
         self.keep((number, name), (text, degrees), false)
     }
@@ -221,7 +221,7 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// The file cannot be removed; the trajectory is kept then.
+    /// The file cannot be removed. In this case the trajectory is kept.
     pub fn delete(&self, number: u16) -> Result<bool, StoreError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(directory) = &self.directory {
@@ -279,13 +279,13 @@ fn file_name(name: &str) -> String {
     if short.is_empty() { "trajectory".to_owned() } else { short }
 }
 
-/// Writes the file completely or not at all. The old file is removed first: a loss of power in between leaves no
-/// trajectory, never two.
+/// Writes the file completely or not at all. The old file is removed before the new one gets its name. So a loss of
+/// power can leave no trajectory of this number, but never two.
 fn write(directory: &Path, path: &Path, trajectory: &Trajectory, number: u16) -> io::Result<()> {
     let part = path.with_extension("part");
     let written = fs::write(&part, trajectory.to_exact_csv());
     let written = written.and_then(|()| fs::File::open(&part)?.sync_all());
-    // The incomplete file on a full disk must not occupy space.
+    // On a full disk, the incomplete file is removed, so that it does not occupy space.
     written.inspect_err(|_| drop(fs::remove_file(&part)))?;
     remove(directory, number, Some(path))?;
     fs::rename(&part, path)?;
@@ -345,7 +345,7 @@ mod tests {
         };
         let first = digest("a", TEXT, false);
         assert!(first.len() == 16 && first.chars().all(|c| c.is_ascii_hexdigit()), "{first}");
-        // Name and number format do not change the motion, so they do not change the digest.
+        // The name and the number format do not change the motion, and therefore not the digest.
         assert_eq!(digest("b", TEXT, true), first);
         assert_eq!(digest("b", &TEXT.replace("0,0\n", "0.0,-0\n"), false), first);
         // Points, their order and their step change the motion.
@@ -371,8 +371,8 @@ mod tests {
         assert!(store.delete(7).is_ok() && store.put_new(7, "pick", TEXT, false).is_ok());
     }
 
-    /// With a full disk the present trajectory is kept, also for the next agent; with free space the next one is
-    /// stored.
+    /// While the disk is full, the existing trajectory is kept, also after a restart of the agent. When space is free
+    /// again, the next trajectory is stored.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_full_disk_leaves_what_had_the_number() {

@@ -21,11 +21,11 @@ pub struct Task<'a> {
     pub wishes: &'a Receiver<Wish>,
     /// Journal for each step.
     pub journal: &'a Journal,
-    /// Line, which shows a Stop of another client.
+    /// Line, from which the job learns of a Stop of another client.
     pub line: &'a Line,
     /// Session of the job's client.
     pub commander: &'a Commander,
-    /// Arm for controllers that cannot be asked for theirs.
+    /// Arm that is used if the controller cannot return its own arm.
     pub arm: &'a Arm,
 }
 

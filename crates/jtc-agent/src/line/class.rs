@@ -4,11 +4,11 @@ use jtc_wire::{Command, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLO
 /// Effect of a host frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Reads and changes nothing. Every client may send it.
+    /// Only reads. Every client may send the frame.
     Ask,
-    /// Stop or Pause. Every client may send it, and it overtakes all other frames.
+    /// Stop or Pause. Every client may send the frame, which overtakes all other frames.
     Halt(ExecCommand),
-    /// May begin a motion. Refused if the client requested it before a Stop.
+    /// May begin a motion. Refused if the client requested the motion before a Stop.
     Motion,
     /// Changes something else. Only the holder of the lease may send it.
     Command,
@@ -60,12 +60,12 @@ impl HostFrame {
         matches!(command, Some(Ok(Command::GetLog { block, .. })) if block != LOG_NO_BLOCK)
     }
 
-    /// Type of the frame that the controller returns in addition to the record.
+    /// Returns the type of the frame that the controller sends in addition to the record.
     pub fn returns(&self) -> Option<FrameType> {
         returned_by(self.frame_type)
     }
 
-    /// Record for a frame that is refused before it reaches the controller.
+    /// Returns the record of a frame that the agent refuses before the controller receives it.
     pub fn refusal(&self) -> Response {
         Response::good(self.frame_type, DataStatus::NotAllowed, self.bytes.len() as u16)
     }
@@ -90,7 +90,7 @@ pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
     )
 }
 
-/// Type of the frame that the controller returns to this request in addition to the record.
+/// Returns the type of the frame that the controller sends in answer to this request, in addition to the record.
 pub(super) fn returned_by(request: FrameType) -> Option<FrameType> {
     match request {
         FrameType::GetInfo => Some(FrameType::Info),

@@ -9,9 +9,9 @@ use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 use super::Denied;
 use super::class::HostFrame;
 
-/// Largest number of waiting bytes of a client's frames: a trajectory in flight and some commands.
+/// Largest number of waiting bytes of a client's frames: the frames in flight of an upload, and some commands.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
-/// Largest number of waiting frames of a client; equal to the number that it may send at once.
+/// Largest number of waiting frames of a client. Equals the number of frames that a client may send in one burst.
 const FRAMES_WAITING: usize = 500;
 /// Largest number of unread bytes of a client: two minutes of statuses.
 const UNREAD_MAX: usize = 1 << 20;
@@ -22,7 +22,7 @@ const FRAMES_AT_ONCE: f64 = 500.0;
 /// Largest number of waiting records for refused frames; one is sent with each status.
 const REFUSALS_MAX: usize = 600;
 
-/// Number of a client; numbers are not used again.
+/// Number of a client. Numbers are not reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct ClientId(pub u64);
 
@@ -77,11 +77,12 @@ pub struct Introduction {
 pub enum Delivery {
     /// Bytes of the controller: statuses and answers to the client's own requests.
     Bytes(Vec<u8>),
-    /// Frame of the client that was not passed on; its record, which only says "not allowed", follows in a status.
+    /// Reason why a frame of the client was not passed on. Its record, which only says "not allowed", follows in a
+    /// status.
     Denied(Denied),
-    /// Request about the lease that was refused.
+    /// Reason why a request about the lease was refused.
     LeaseDenied(Denied),
-    /// Request of another client for the lease.
+    /// Name of another client that requests the lease.
     LeaseWanted(String),
 }
 
@@ -127,21 +128,22 @@ pub(super) struct Client {
     refusals: VecDeque<Response>,
     deliveries: VecDeque<Delivery>,
     unread: usize,
-    /// End of the hold-off after a Stop or a Pause of another client; no motion of this client begins before.
+    /// End of the hold-off after a Stop or a Pause of another client. Before that time, no motion of this client
+    /// begins.
     pub calm_until: Duration,
     /// Number of the last Stop or Pause that the client knew when it made its present requests.
     pub asked_after: u64,
     /// Stops and Pauses of other clients since this client connected.
     pub halts: Halts,
-    /// Duration of its lease without a sign of life; `None`: while it is connected.
+    /// Time without a sign of life after which its lease lapses. `None`: the lease lasts while the client is connected.
     pub lasts: Option<Duration>,
     /// Time of its last sign of life.
     pub shown_at: Duration,
     /// Arrival time of its last frame.
     pub heard_at: Duration,
-    /// `true` if its lease has lapsed and it has not requested another since.
+    /// `true` if its lease has lapsed and the client has not requested a new one since.
     pub lapsed: bool,
-    /// Number of frames that it may send at once, and the time of that number.
+    /// Number of frames that the client may still send at once, and the time of this value.
     allowance: f64,
     allowed_at: Duration,
 }
@@ -232,8 +234,8 @@ impl Client {
         Some(frame)
     }
 
-    /// Removes the queued frames that need the lease; the others keep their order. Fast without such frames, because a
-    /// Stop does this for every client.
+    /// Removes the queued frames that need the lease; the others keep their order. Returns at once if no such frame is
+    /// queued, because every Stop calls this for all clients.
     pub fn take_commands(&mut self) -> Vec<HostFrame> {
         if self.commands == 0 {
             return Vec::new();
@@ -244,7 +246,7 @@ impl Client {
         VecDeque::into(taken)
     }
 
-    /// Queues a delivery if the client reads.
+    /// Queues a delivery, if the client has not left too many bytes unread.
     pub fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
         self.unread += delivery.len();
         self.deliveries.push_back(delivery);

@@ -1,4 +1,4 @@
-//! Controller's side of the line: the next bytes to write, and the clients that receive records.
+//! Controller's side of the line: selects the next bytes to write, and the clients that receive each record.
 use std::time::Duration;
 
 use jtc_wire::{DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
@@ -60,7 +60,7 @@ impl SharedLine {
         }
     }
 
-    /// Notes that the operating system accepted the bytes, which may have taken until now.
+    /// Notes that the operating system has accepted the bytes at time `now`.
     pub fn handed_over(&mut self, now: Duration) {
         self.outbox.handed_over(now);
     }
@@ -87,7 +87,8 @@ impl SharedLine {
             }
             let Some(client) = self.clients.get_mut(&id) else { continue };
             let Some(frame) = client.waiting.front() else { continue };
-            // Returned frames have no number, so one request of this kind is sent at a time (J-50).
+            // Frames that the controller returns have no number. So the next request for such a frame waits until the
+            // last one is answered (J-50).
             let returns = frame.returns();
             if returns.is_some() && self.returns.is_some() {
                 continue;
@@ -103,8 +104,8 @@ impl SharedLine {
         None
     }
 
-    /// Refuses queued frames of clients that have lost the lease. A client whose motion continues without it takes the
-    /// lease again if it is free.
+    /// Refuses queued frames of clients that have lost the lease. A client that still wants to command takes the lease
+    /// again, if the lease is free.
     fn refuse_without_lease(&mut self, now: Duration) {
         let holder = self.lease.as_ref().map(|lease| lease.holder);
         let waits = |client: &Client| client.waiting.front().is_some_and(|frame| frame.class.needs_lease());
@@ -180,7 +181,7 @@ impl SharedLine {
                 && response.data != DataStatus::NoError
                 && response.frame_type == FrameType::TeachingModeEnable as u8
             {
-                // The controller refused it.
+                // The controller has refused Teaching.
                 self.moving.taught();
             }
             if *client == OWNER && taken && response.frame_type == FrameType::TeachingModeDisable as u8 {
@@ -201,10 +202,10 @@ impl SharedLine {
         }
     }
 
-    /// Returns the clients that receive a record; for a Stop all clients that requested it.
+    /// Returns the clients that receive a record. The record of a Stop goes to all clients that requested the Stop.
     fn whose(&mut self, response: Response, now: Duration) -> Vec<(ClientId, Response)> {
         let arrived = response.status == FrameStatus::NoError;
-        // Records come in the order of the frames; frames before it have lost their record, or have a bad one.
+        // Records come in the order of the frames. So the record of every earlier frame was lost or damaged.
         let at = self.sent.iter().position(|sent| {
             if arrived { !sent.abandoned && sent.kind == response.frame_type } else { sent.abandoned }
         });
@@ -216,7 +217,7 @@ impl SharedLine {
         if let Some(returns) =
             self.returns.as_mut().filter(|r| r.client == sent.client && Some(r.kind) == returned)
         {
-            // The returned frame follows; a refused request returns none.
+            // The returned frame follows, unless the controller refused the request.
             returns.until = if response.accepted() { now + RETURN_TIME } else { now };
         }
         if sent.client == HALTS {

@@ -3,7 +3,7 @@ use jtc_wire::{FrameType, Response};
 
 use super::{Class, ClientId, Denied, Lease, Policy, PutOut, Will};
 
-/// Numbers of events on a line since its owner began.
+/// Numbers of events on a line since its owner was started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Number of written frames that change a state.
@@ -68,7 +68,7 @@ pub enum LineEvent {
     },
     /// Change of the lease holder.
     Lease(Option<Lease>),
-    /// Policy that was applied to the motion of a client that has disconnected, or whose lease has lapsed.
+    /// Policy that was applied to the motion of a client after the client disconnected or its lease lapsed.
     PolicyApplied {
         /// Client whose policy was applied.
         client: ClientId,
@@ -77,7 +77,7 @@ pub enum LineEvent {
     },
     /// Stop or Pause that was sent many times without a confirmation of the controller.
     NotTaken,
-    /// Change of the motion, or of the client whose policy applies to it; `None`: no motion any more.
+    /// Change of the motion, or of the client whose policy applies to the motion. `None`: the motion has ended.
     Will(Option<Will>),
     /// Disconnection of a client by the agent.
     PutOut {

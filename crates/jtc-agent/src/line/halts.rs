@@ -8,11 +8,11 @@ use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
 use super::ClientId;
 use super::class::HostFrame;
 
-/// Time, in addition to that of three statuses on the line, after which a frame without a record is sent again.
+/// Time after which a frame without a record is sent again. The time of three statuses on the line is added.
 const AWAITED: Duration = Duration::from_millis(150);
-/// Number of times that a frame is sent at this interval.
+/// Number of times that a frame is sent at the interval of [`AWAITED`].
 const TRIES: u32 = 20;
-/// Interval after that, until the controller answers.
+/// Interval of the later repetitions, until the controller answers.
 const LATER: Duration = Duration::from_secs(1);
 
 /// A Stop or a Pause, and the clients that have requested it.
@@ -21,7 +21,7 @@ struct Halt {
     command: ExecCommand,
     askers: Vec<ClientId>,
     tries: u32,
-    /// Time at which it is sent again.
+    /// Time at which the frame is sent again.
     again_at: Duration,
 }
 
@@ -33,18 +33,19 @@ impl Halt {
     }
 }
 
-/// Stops and Pauses without a record. Requests share one frame, and each client receives its record.
+/// Stops and Pauses without a record. The requests of several clients share one frame, and each of the clients receives
+/// its record.
 #[derive(Debug, Default)]
 pub(super) struct Halts {
     waiting: Option<Halt>,
     /// Written frames, oldest first.
     written: VecDeque<Halt>,
-    /// Set if a frame that may begin a motion was written after the last of them.
+    /// Set if a frame that may begin a motion was written after the last Stop or Pause.
     motion_since: bool,
 }
 
 impl Halts {
-    /// Adds the request of a client. A Stop replaces a Pause, never the reverse.
+    /// Adds the request of a client. A Stop replaces a queued Pause, but a Pause never replaces a Stop.
     pub fn ask(&mut self, client: ClientId, command: ExecCommand) {
         let covers = |halt: &Halt| halt.command == ExecCommand::Stop || halt.command == command;
         if let Some(waiting) = &mut self.waiting {
@@ -63,12 +64,12 @@ impl Halts {
         }
     }
 
-    /// Frame that must be written before all others.
+    /// Returns the frame that must be written before all others.
     pub fn frame(&self) -> Option<HostFrame> {
         self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
     }
 
-    /// The frame was written; its last byte leaves the line at `at`.
+    /// Notes that the frame was written. The line finishes its last byte at `at`.
     pub fn written(&mut self, at: Duration, baud: Option<u32>) {
         if let Some(mut halt) = self.waiting.take() {
             halt.tries += 1;
@@ -79,13 +80,13 @@ impl Halts {
         }
     }
 
-    /// A frame that may begin a motion was written.
+    /// Notes that a frame that may begin a motion was written.
     pub fn motion_written(&mut self) {
         self.motion_since = true;
     }
 
-    /// A record arrived for the oldest written frame. Returns the clients that receive it. If the frame did not arrive
-    /// undamaged, it is sent again.
+    /// Takes the record of the oldest written frame. Returns the clients that receive the record. If the controller
+    /// received the frame damaged, it is sent again.
     pub fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
         let Some(halt) = self.written.pop_front() else { return Vec::new() };
         if !arrived {
@@ -95,7 +96,7 @@ impl Halts {
         halt.askers.into_iter().map(|asker| (asker, *response)).collect()
     }
 
-    /// Repeats the frames whose record is overdue. Returns true if one of them was sent [`TRIES`] times by now.
+    /// Repeats the frames whose record is overdue. Returns true if one of the frames has now been sent [`TRIES`] times.
     pub fn look(&mut self, now: Duration) -> bool {
         let mut many = false;
         while let Some(halt) = self.written.pop_front_if(|halt| now >= halt.again_at) {
@@ -106,7 +107,7 @@ impl Halts {
     }
 
     fn again(&mut self, halt: Halt) {
-        // A Pause after a Stop would replace it.
+        // A Pause after a Stop would replace the Stop.
         if let Some(stop) = self.written.iter_mut().find(|halt| halt.command == ExecCommand::Stop) {
             return halt.askers.into_iter().for_each(|asker| stop.ask(asker));
         }
@@ -121,12 +122,13 @@ impl Halts {
         }
     }
 
-    /// Time at which a frame is written or repeated next.
+    /// Returns the time at which the next frame is written or repeated.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         if self.waiting.is_some() { Some(now) } else { self.written.front().map(|halt| halt.again_at) }
     }
 
-    /// Command that was sent more than once because the controller does not confirm it; a Stop rather than a Pause.
+    /// Returns the command that was sent more than once because the controller does not confirm it. If both a Stop and
+    /// a Pause were, returns the Stop.
     pub fn untaken(&self) -> Option<ExecCommand> {
         let again = self.waiting.iter().chain(&self.written).filter(|halt| halt.tries > 1);
         again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)

@@ -1,11 +1,11 @@
-//! The lease: at most one client at a time may send commands. All clients see which one.
+//! The lease: at most one client at a time may send commands. All clients can see the holder's name.
 use std::time::Duration;
 
 use super::{ClientId, Delivery, Introduction, LineEvent, Policy, PutOut, Role, SharedLine};
 
-/// Name that is reported for a Stop by the policy of a client that has disconnected.
+/// Name that is reported as the source of a Stop that a disconnected client's policy requested.
 pub(super) const POLICY: &str = "the policy of a client that has gone";
-/// Not a number of a Stop: the policy of the client has ended its requests.
+/// Special value instead of the number of a Stop: the policy of the client has cancelled the client's requests.
 pub(super) const NOT_ASKED: u64 = u64::MAX;
 
 /// Lease, and its holder.
@@ -15,7 +15,8 @@ pub struct Lease {
     pub holder: ClientId,
     /// Time when the holder took the lease.
     pub since: Duration,
-    /// Time when the lease lapses without renewal; it exists only for clients without a connection of their own.
+    /// Time when the lease lapses without renewal. `None`: the client has its own connection, and the lease does not
+    /// lapse.
     pub until: Option<Duration>,
     /// Client that waits for the lease.
     pub wanted_by: Option<ClientId>,
@@ -41,10 +42,10 @@ pub enum Denied {
         /// Name of the waiting client.
         by: String,
     },
-    /// The client has only read-only access and Stop.
+    /// The client may only read and stop.
     #[error("this client was let in to look and to stop, not to command")]
     Viewer,
-    /// The arm was stopped or paused after the request, or by another client just before it (hold-off).
+    /// The arm was stopped or paused after the request, or by another client shortly before it (hold-off).
     #[error(
         "{by} has stopped the arm: what was asked for before is not done, and nothing that moves it for three seconds"
     )]
@@ -55,8 +56,8 @@ pub enum Denied {
     /// The client was disconnected.
     #[error("this client is on the line no more: it was put out, or has gone")]
     Gone,
-    /// The controller supervises its host and the lease holder is silent: questions of other clients would hide that
-    /// (J-59).
+    /// The controller supervises its host, and the lease holder is silent. Questions of other clients would hide the
+    /// silence from the controller (J-59).
     #[error(
         "nothing is received from {who}, and the controller pauses the motion when its host is silent: questions of others wait until the arm stands"
     )]
@@ -75,13 +76,14 @@ impl SharedLine {
         self.lease.as_ref()
     }
 
-    /// Takes or renews the lease. `lasts`: duration without renewal, also for a lease that the client gets later by a
-    /// command or from another client; `None`: while the client is connected.
+    /// Takes or renews the lease. `lasts` is the time without renewal after which the lease lapses. It also applies to
+    /// a lease that the client gets later, by a command or from another client. `None`: the lease lasts while the
+    /// client is connected.
     ///
     /// # Errors
     ///
-    /// [`Denied`] if another client holds the lease, which is then asked to release it, or if this client may not hold
-    /// it.
+    /// [`Denied`] if another client holds the lease, or if this client may not hold it. In the first case the holder is
+    /// asked to release the lease.
     pub fn take_lease(
         &mut self,
         client: ClientId,
@@ -105,7 +107,7 @@ impl SharedLine {
     /// [`Denied::NotHolder`].
     pub fn release_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let lease = self.lease.take_if(|lease| lease.holder == client).ok_or(Denied::NotHolder)?;
-        // A client that releases the lease in motion lets the motion go on.
+        // If a client releases the lease during a motion, the motion continues.
         self.bequeath(self.name(client), Policy::Continue);
         let next = lease.wanted_by.filter(|next| self.clients.contains_key(next));
         self.set_lease(next.map(|holder| self.lease_of(holder, now)));
@@ -113,7 +115,7 @@ impl SharedLine {
     }
 
     /// Requests the lease from its holder. The first client that requests it keeps its place until it gets the lease,
-    /// disconnects, or has sent nothing for as long as its own lease would last.
+    /// disconnects, or is silent for the duration of its own lease.
     ///
     /// # Errors
     ///
@@ -135,7 +137,7 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Returns true if a client that has requested the lease still waits.
+    /// Returns true if a client that has requested the lease still waits for it.
     fn waits(&self, id: ClientId, now: Duration) -> bool {
         self.clients.get(&id).is_some_and(|client| {
             client.lasts.is_none_or(|lasts| now.saturating_sub(client.shown_at) < lasts)
@@ -149,8 +151,8 @@ impl SharedLine {
         }
     }
 
-    /// Disconnects a holder of the lease that has fallen silent, and applies its policy to its motion. If the client
-    /// wakes it must connect again, and see what other clients have done meanwhile.
+    /// Disconnects a holder of the lease that has fallen silent, and applies its policy to its motion. A client that
+    /// wakes up later must connect again, so it sees the changes that other clients made meanwhile.
     pub fn lapse(&mut self, client: ClientId, now: Duration) {
         if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
             self.put_out(client, PutOut::Silent, now);
@@ -178,7 +180,7 @@ impl SharedLine {
                 let age_ms = now.saturating_sub(lease.since).as_millis() as u64;
                 Err(Denied::Held { holder: self.name(lease.holder), age_ms })
             }
-            // Its policy alone decides about what it began.
+            // Only the client's policy decides about the motion that the client began.
             None if self.is_over(id) => Err(Denied::NotHolder),
             None => Ok(()),
         }
@@ -200,7 +202,7 @@ impl SharedLine {
         client.is_some_and(|client| client.lapsed && client.introduction.policy != Policy::Continue)
     }
 
-    /// Lease of this client from now on.
+    /// Returns a new lease of this client that begins now.
     fn lease_of(&self, holder: ClientId, now: Duration) -> Lease {
         let lasts = self.clients.get(&holder).and_then(|client| client.lasts);
         Lease { holder, since: now, until: lasts.map(|lasts| now + lasts), wanted_by: None }
@@ -228,7 +230,7 @@ impl SharedLine {
         if self.hold(POLICY, command, now) {
             self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
         } else if let Some(client) = self.clients.get_mut(&holder) {
-            // Other clients are not affected. The motion that this client was about to begin does not begin.
+            // Prevents the motion that this client was about to begin. Other clients are not affected.
             client.asked_after = NOT_ASKED;
         }
     }

@@ -1,4 +1,5 @@
-//! Shares the line of one controller between many clients. Without I/O: bytes and time go in, bytes come out.
+//! Shares the line of one controller between many clients. The module does no I/O: its functions take received bytes
+//! and the time, and return the bytes to write.
 //!
 //! Each client speaks the protocol of the line as if no other client existed, and receives every status with the
 //! records of its own frames only. So every program that can use a serial port can use a shared line. The shared line
@@ -41,22 +42,22 @@ use moving::Moving;
 use outbox::Outbox;
 use supervision::Supervision;
 
-/// Time after a frame within which its record arrives. Later it is given up.
+/// Longest wait for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(2);
-/// Time after a record within which the frame arrives that the request returns. Later it is given up.
+/// Longest wait, after the record, for the frame that the request returns.
 const RETURN_TIME: Duration = Duration::from_millis(500);
 /// Hold-off after a Stop or a Pause of another client: a request for a motion that arrives in this time may have been sent before the Stop.
 const CALM: Duration = Duration::from_secs(3);
-/// Hold-off after a refused attempt, if the present one would end sooner.
+/// Shortest hold-off after a refused attempt.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
 
 /// A written frame whose record has not arrived yet.
 struct Sent {
     client: ClientId,
     kind: u8,
-    /// Set if the frame was abandoned halfway: the controller then answers with a bad record.
+    /// Set if the frame was abandoned halfway. The controller then answers with an error record.
     abandoned: bool,
-    /// Time at which the last byte leaves the line.
+    /// Time at which the line finishes the last byte.
     at: Duration,
 }
 
@@ -78,12 +79,12 @@ pub struct SharedLine {
     last_turn: ClientId,
     lease: Option<Lease>,
     halts: Halts,
-    /// Last Stop or Pause: its number, who requested it, and which of the two.
+    /// Last Stop or Pause: its number, the name of its client, and the command.
     halted: (u64, String, ExecCommand),
     /// End of the hold-off. Until then only the client of the last Stop or Pause may begin a motion.
     calm_until: Duration,
     moving: Moving,
-    /// Last holder of the lease, whose policy applies to the motion while no client holds the lease.
+    /// Name and policy of the last lease holder. While no client holds the lease, this policy applies to the motion.
     left: (String, Policy),
     /// Will that was reported last.
     will: Option<Will>,
@@ -94,9 +95,9 @@ pub struct SharedLine {
     counts: Counts,
 }
 
-/// Number of the line's owner, which acts for disconnected clients and for those without a connection of their own.
+/// Number of the line's owner. The owner acts for clients that are disconnected or have no connection of their own.
 pub const OWNER: ClientId = ClientId(0);
-/// Stands for all clients that have requested a Stop or a Pause.
+/// Placeholder for all clients that have requested a Stop or a Pause.
 const HALTS: ClientId = ClientId(u64::MAX);
 
 impl SharedLine {
@@ -129,13 +130,13 @@ impl SharedLine {
         let id = ClientId(self.next_id);
         self.next_id += 1;
         let mut client = Client::new(introduction);
-        // The client may make requests after earlier Stops; but its user may have decided before them, so the hold-off applies.
+        // Earlier Stops do not block a new client. But its user may have decided before the Stop, so the hold-off applies.
         (client.asked_after, client.calm_until) = (self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
     }
 
-    /// Removes a client. Drops its frames that are not on the line yet, and applies its policy to its motion.
+    /// Removes a client. Drops those of its frames that are not written yet, and applies its policy to its motion.
     pub fn leave(&mut self, client: ClientId, now: Duration) {
         let Some(gone) = self.clients.remove(&client) else { return };
         if let Some((outgoing, _)) = self.outbox.writing()
@@ -150,7 +151,7 @@ impl SharedLine {
         }
     }
 
-    /// Name, role and policy of a client.
+    /// Returns the name, role and policy of a client.
     pub fn introduction(&self, client: ClientId) -> Option<&Introduction> {
         self.clients.get(&client).map(|client| &client.introduction)
     }
@@ -162,19 +163,19 @@ impl SharedLine {
         }
     }
 
-    /// Number of clients.
+    /// Returns the number of clients.
     pub fn clients(&self) -> usize {
         self.clients.len()
     }
 
-    /// Last status, and the time at which it arrived.
+    /// Returns the last status, and the time at which it arrived.
     pub fn status(&self) -> Option<&(Duration, Status)> {
         self.status.as_ref()
     }
 
     /// Sends a Stop or a Pause of a client before all other frames, and repeats it until the controller confirms it.
-    /// Drops all frames that need the lease and are not on the line yet. `name` is reported to the clients whose frames
-    /// are dropped.
+    /// Drops all frames that need the lease and are not written yet. The clients of these frames are told that `name`
+    /// stopped the arm.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(client, client, name, command, now);
     }
@@ -184,7 +185,7 @@ impl SharedLine {
         self.halt_by(OWNER, client.unwrap_or(OWNER), name, command, now);
     }
 
-    /// `asker` receives the record. The hold-off does not apply to `own`.
+    /// Sends a Stop or a Pause whose record goes to `asker`. The hold-off does not apply to `own`.
     fn halt_by(&mut self, asker: ClientId, own: ClientId, name: &str, command: ExecCommand, now: Duration) {
         let name = name.to_owned();
         self.halted = (self.halted.0 + 1, name.clone(), command);
@@ -195,7 +196,8 @@ impl SharedLine {
             other.halts.stops += u64::from(command == ExecCommand::Stop);
         }
         self.halts.ask(asker, command);
-        // A Stop means that the arm is held. In Teaching, or if Teaching begins as soon as the arm stands, it would be compliant.
+        // After a Stop the arm must hold its position. In Teaching it would be compliant, also if Teaching begins as soon as the
+        // arm is at rest.
         if self.moving.may_teach(self.status.as_ref()) {
             self.moving.end_teaching(now);
         }
@@ -227,7 +229,7 @@ impl SharedLine {
             };
             client.heard_at = now;
             let allowed = client.allow(now);
-            // A Stop is taken even if the client is disconnected for its other frames.
+            // A Stop is executed even if the client is disconnected because of its other frames.
             if allowed.is_ok() || matches!(frame.class, Class::Halt(_)) {
                 self.take_frame(id, frame, now);
             }
@@ -272,7 +274,7 @@ impl SharedLine {
     fn may_send(&mut self, id: ClientId, frame: &HostFrame, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         let motion = frame.class == Class::Motion;
-        // An upload ends at once if its motion was stopped.
+        // If a client stopped the motion, its upload ends at once.
         if (motion || frame.frame_type == FrameType::Trajectory) && self.is_halted(id) {
             return Err(self.stopped(id));
         }
@@ -294,22 +296,22 @@ impl SharedLine {
         }
     }
 
-    /// Refusal of a request that a Stop or a Pause has overtaken.
+    /// Returns the refusal of a request that a Stop or a Pause has overtaken.
     pub(super) fn stopped(&self, id: ClientId) -> Denied {
         Denied::Stopped { by: self.halted_by(id).to_owned() }
     }
 
-    /// Name of the client whose Stop or Pause has overtaken the requests of this client.
+    /// Returns the name of the client whose Stop or Pause has overtaken the requests of this client.
     pub fn halted_by(&self, id: ClientId) -> &str {
         if self.asked_after(id) == Some(NOT_ASKED) { POLICY } else { &self.halted.1 }
     }
 
     /// Permits the client's next motion. `after` is the number of the last Stop or Pause that the client has seen. Any
-    /// later one revokes the permission, even while the request still waits.
+    /// later Stop or Pause revokes the permission, even while the request still waits.
     ///
     /// # Errors
     ///
-    /// [`Denied`] if another client holds the lease, during the hold-off, and if a later Stop or Pause exists.
+    /// [`Denied`] if another client holds the lease, during the hold-off, and after a Stop or Pause later than `after`.
     pub fn ask_to_move(&mut self, id: ClientId, after: u64, now: Duration) -> Result<(), Denied> {
         self.ask(id, after, Duration::ZERO, now)
     }
@@ -324,7 +326,8 @@ impl SharedLine {
         self.ask(id, after, CALM_AGAIN, now)
     }
 
-    /// Returns an error if another client prevents a jog of this client now. Each refused attempt extends the hold-off.
+    /// Returns an error if the lease or a Stop of another client prevents a jog of this client now. Each refused
+    /// attempt extends the hold-off.
     ///
     /// # Errors
     ///
@@ -334,7 +337,7 @@ impl SharedLine {
         self.is_calm(id, now, CALM_AGAIN)
     }
 
-    /// Returns an error if another client prevents a motion of this client now.
+    /// Returns an error if the lease or a Stop of another client prevents a motion of this client now.
     ///
     /// # Errors
     ///
@@ -361,12 +364,13 @@ impl SharedLine {
         self.asked_after(id).is_some_and(|number| number != self.halted.0)
     }
 
-    /// Number of the last Stop or Pause before the client's last request for a motion; before it connected, if it has made none.
+    /// Returns the number of the last Stop or Pause before the client's last request for a motion. If the client has made no
+    /// request, returns the number of the last one before it connected.
     pub fn asked_after(&self, id: ClientId) -> Option<u64> {
         self.clients.get(&id).map(|client| client.asked_after)
     }
 
-    /// Stops and Pauses of other clients since this client connected.
+    /// Returns the Stops and Pauses of other clients since this client connected.
     pub fn halts_of_others(&self, id: ClientId) -> jtc_host::port::Halts {
         self.clients.get(&id).map(|client| client.halts).unwrap_or_default()
     }
@@ -376,20 +380,20 @@ impl SharedLine {
         self.halted.0
     }
 
-    /// Requester of the last Stop or Pause, and which of the two it was.
+    /// Returns the name of the client that requested the last Stop or Pause, and the command.
     pub fn last_halt_by(&self) -> (&str, ExecCommand) {
         (&self.halted.1, self.halted.2)
     }
 
-    /// Stops the arm because the agent ends. Motions that clients still prepare do not begin.
+    /// Stops the arm because the agent ends. Prevents the motions that clients still prepare.
     pub fn end(&mut self, now: Duration) {
         self.halt(OWNER, "the end of the agent", ExecCommand::Stop, now);
         self.moving.end_teaching(now);
     }
 
-    /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to stand, because the last
-    /// status is older than the last command; the controller may refuse it then, and other clients are not affected.
-    /// Returns true if the arm may have been moving.
+    /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to be at rest, because the
+    /// last status is older than the last command. If the controller refuses the command, other clients are not
+    /// affected. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.moving.may_move(self.status.as_ref(), now);
         if moved {
@@ -401,7 +405,7 @@ impl SharedLine {
         moved
     }
 
-    /// Returns true unless the arm certainly stands and no motion is about to begin.
+    /// Returns false only if the arm is certainly at rest and no motion is about to begin.
     pub fn may_move(&self, now: Duration) -> bool {
         self.moving.may_move(self.status.as_ref(), now)
     }
@@ -426,7 +430,7 @@ impl SharedLine {
         self.deliver(id, Delivery::Denied(denied));
     }
 
-    /// Queues something for a client to read.
+    /// Queues a delivery for a client.
     pub fn deliver(&mut self, id: ClientId, delivery: Delivery) {
         if let Some(Err(reason)) = self.clients.get_mut(&id).map(|client| client.deliver(delivery)) {
             self.put_out(id, reason, self.now());
@@ -438,7 +442,7 @@ impl SharedLine {
         self.leave(client, now);
     }
 
-    /// Takes what is queued for a client; `None` if the client is disconnected.
+    /// Takes the deliveries that are queued for a client. `None`: the client is disconnected.
     pub fn take_deliveries(&mut self, client: ClientId) -> Option<Vec<Delivery>> {
         self.clients.get_mut(&client).map(Client::take_deliveries)
     }
@@ -450,17 +454,17 @@ impl SharedLine {
         events
     }
 
-    /// Number of events of each kind that [`take_events`](Self::take_events) has returned.
+    /// Returns the number of events of each kind that [`take_events`](Self::take_events) has returned.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Counters of the bytes and statuses that the controller has sent.
+    /// Returns the counters of the bytes and statuses that the controller has sent.
     pub fn received(&self) -> StatusCounters {
         self.receiver.counters()
     }
 
-    /// Approximate time: the arrival of the last status.
+    /// Returns the approximate time: the arrival time of the last status.
     fn now(&self) -> Duration {
         self.status.map_or(Duration::ZERO, |(at, _)| at)
     }

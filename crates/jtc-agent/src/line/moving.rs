@@ -1,5 +1,5 @@
-//! Motion tracker: tells from frames and statuses whether the arm may move. Also repeats the end of Teaching until the
-//! controller confirms it.
+//! Motion tracker: tells from frames and statuses whether the arm may move. Also repeats the frame that ends Teaching
+//! until the controller confirms it.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
@@ -7,11 +7,11 @@ use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
 use super::Moves;
 use super::class::HostFrame;
 
-/// Time within which a frame that begins a motion shows in the statuses. An older status is not used.
+/// Time within which the statuses show the motion that a frame begins. A status older than this is not used.
 const SHOWS: Duration = Duration::from_secs(1);
 /// Time after an upload within which its motion is expected.
 const FOLLOWS: Duration = Duration::from_secs(5);
-/// Interval at which the end of Teaching is repeated while it is not confirmed.
+/// Interval at which the frame that ends Teaching is repeated until the controller confirms it.
 const AGAIN: Duration = Duration::from_millis(250);
 
 #[derive(Debug, Default)]
@@ -23,35 +23,35 @@ pub(super) struct Moving {
     /// Set after Teaching was requested. Teaching can start seconds later, when position hold begins, and no status
     /// shows the request.
     teaches: bool,
-    /// Time at which the end of Teaching is sent.
+    /// Time at which the frame that ends Teaching is sent next.
     end_at: Option<Duration>,
 }
 
 impl Moving {
-    /// A frame that may begin a motion was sent at `at`.
+    /// Notes that a frame that may begin a motion was sent at `at`.
     pub fn begun(&mut self, frame_type: FrameType, at: Duration) {
         self.begun_at = Some(at);
         self.teaches |= frame_type == FrameType::TeachingModeEnable;
     }
 
-    /// A part of a trajectory was sent at `at`.
+    /// Notes that a part of a trajectory was sent at `at`.
     pub fn uploaded(&mut self, at: Duration) {
         self.uploaded_at = Some(at);
     }
 
-    /// The end of Teaching was sent.
+    /// Notes that the frame that ends Teaching was sent.
     pub fn taught(&mut self) {
         self.teaches = false;
     }
 
-    /// Returns true unless the arm certainly stands and no motion is about to begin.
+    /// Returns false only if the arm is certainly at rest and no motion is about to begin.
     pub fn may_move(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
         let shown = |at: Duration| now.saturating_sub(at) < SHOWS;
         let rests = status.is_some_and(|(at, status)| shown(*at) && !shows_motion(status));
         self.teaches || self.begun_at.is_some_and(shown) || !rests
     }
 
-    /// Returns what moves the arm or is about to; `before` if no recent status shows it.
+    /// Returns the cause of the present or next motion. If no recent status shows it, returns `before`.
     pub fn what(
         &self,
         status: Option<&(Duration, Status)>,
@@ -71,7 +71,8 @@ impl Moving {
         }
     }
 
-    /// Returns true if host supervision (J-59) would end what the controller does: a motion or Teaching. A paused arm does not move.
+    /// Returns true during a motion or Teaching, which host supervision (J-59) would end. A paused arm is not supervised, because it
+    /// does not move.
     pub fn is_supervised(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
         let moves = [ControllerState::Operate, ControllerState::Teaching];
         self.begun_at.is_some_and(|at| now.saturating_sub(at) < SHOWS)
@@ -95,12 +96,12 @@ impl Moving {
         HostFrame::parse(fixed::empty(FrameType::TeachingModeDisable).to_vec())
     }
 
-    /// The controller confirmed the end of Teaching, or refused it because Teaching was off.
+    /// Notes that the controller confirmed the end of Teaching, or refused the frame because Teaching was off.
     pub fn answered(&mut self) {
         self.end_at = None;
     }
 
-    /// Time at which the frame that ends Teaching is due.
+    /// Returns the time at which the frame that ends Teaching is due.
     pub fn due(&self) -> Option<Duration> {
         self.end_at
     }

@@ -1,7 +1,8 @@
-//! Transmit queue of the line: whole frames, one after the other, a few bytes ahead of the line.
+//! Transmit queue of the line. It sends whole frames, one after the other, and hands their bytes to the operating
+//! system shortly before the line can send them.
 //!
-//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] of them are queued there. A
-//! Stop does not wait for the remainder of a long frame: the frame is abandoned, and the controller detects that by the
+//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] bytes are queued there. A
+//! Stop does not wait for the remainder of a long frame. The frame is abandoned, and the controller detects this by the
 //! gap after it (J-05).
 use std::time::Duration;
 
@@ -10,14 +11,14 @@ use jtc_host::port::line_time;
 use super::ClientId;
 use super::class::HostFrame;
 
-/// Largest number of bytes queued in the operating system: 256 (J-05), less a margin, because each delay of the system
-/// makes the estimate of the line up to a byte too early.
+/// Largest number of bytes queued in the operating system: 256 (J-05), less a margin. Each delay of the system can make
+/// the line up to a byte later than the estimate.
 const AHEAD: usize = 250;
-/// Silence after an abandoned frame: the 5 ms of J-03, and what adapters may shorten it by.
+/// Silence after an abandoned frame: 5 ms (J-03), plus a margin because USB adapters may shorten the gap.
 const GAP: Duration = Duration::from_millis(8);
-/// Remainders of frames up to this length, in bytes, are sent before a Stop: that takes no longer than the gap.
+/// Remainders of frames up to this length, in bytes, are sent before a Stop: sending them takes no longer than the gap.
 const SHORT: usize = 64;
-/// Least number of bytes of a longer frame that are written at once.
+/// Smallest number of bytes of a longer frame that are written at once.
 const PIECE: usize = 64;
 
 /// A frame for the controller.
@@ -44,7 +45,7 @@ struct Writing {
     at: usize,
 }
 
-/// Paces the bytes of a line, and lets an urgent frame overtake.
+/// Paces the bytes of a line. An urgent frame can overtake a frame that is being written.
 pub struct Outbox {
     baud: Option<u32>,
     urgent: Option<Outgoing>,
@@ -85,7 +86,7 @@ impl Outbox {
         self.baud
     }
 
-    /// Returns true if a frame can begin.
+    /// Returns true if a new frame can be begun.
     pub fn is_free(&self) -> bool {
         self.writing.is_none() && self.urgent.is_none()
     }
@@ -95,13 +96,14 @@ impl Outbox {
         self.writing = Some(Writing { outgoing, at: 0 });
     }
 
-    /// Time at which [`next`](Self::next) may have more to write; `None` if nothing waits.
+    /// Returns the time at which [`next`](Self::next) may have more to write. `None`: no bytes wait.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         if now < self.silent_until {
             return Some(self.silent_until);
         }
         if let Some(urgent) = &self.urgent {
-            // A frame that is abandoned for it is abandoned when the next piece would fit.
+            // If the urgent frame replaces the current one, the current frame is abandoned when its next piece could be
+            // written.
             let needed =
                 urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
             let ahead = AHEAD.saturating_sub(needed);
@@ -118,7 +120,8 @@ impl Outbox {
         if now < self.silent_until {
             return (bytes, passed);
         }
-        // A line without a rate has nothing queued; its frames are written in pieces all the same, so that a Stop can overtake.
+        // On a line without a rate, no bytes are assumed to be queued. Its frames are still written in pieces, so that a Stop
+        // can overtake them.
         let queued = bytes_in(self.free_at.saturating_sub(now), self.baud);
         let room = AHEAD.saturating_sub(queued);
         if self.urgent.is_some() {
@@ -128,7 +131,8 @@ impl Outbox {
                 passed.extend(self.writing.take().map(|writing| Passed::Abandoned(writing.outgoing)));
                 return (bytes, passed);
             }
-            // At most a piece of a frame may be ahead of it. Writing earlier would not make it arrive sooner.
+            // The next piece is written when at most one piece is still queued. Writing it earlier would not make it
+            // arrive sooner.
             let needed =
                 self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
             if queued == 0 || needed <= room {
@@ -162,7 +166,8 @@ impl Outbox {
         (bytes, passed)
     }
 
-    /// The system has accepted the bytes only now. If the line was idle it began later, and is free later.
+    /// Notes that the operating system accepted the bytes only now. If the line was idle, it began later than
+    /// estimated, so it is free later.
     pub fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);
@@ -178,19 +183,19 @@ impl Outbox {
         Some((writing.outgoing, writing.at > 0))
     }
 
-    /// Bytes that are left of a frame that has begun.
+    /// Returns the number of bytes that remain of the current frame.
     fn rest(&self) -> Option<usize> {
         let writing = self.writing.as_ref().filter(|writing| writing.at > 0)?;
         Some(writing.outgoing.frame.bytes.len() - writing.at)
     }
 
-    /// Frame that has begun, and the number of its bytes that were written.
+    /// Returns the current frame, and the number of its bytes that were written.
     pub fn writing(&self) -> Option<(&Outgoing, usize)> {
         self.writing.as_ref().map(|w| (&w.outgoing, w.at))
     }
 }
 
-/// Bytes that a line of 8N1 carries in this time, rounded up.
+/// Returns the number of 8N1 bytes that the line sends in this time, rounded up.
 fn bytes_in(time: Duration, baud: Option<u32>) -> usize {
     baud.map_or(0, |baud| (time.as_secs_f64() * f64::from(baud) / 10.0).ceil() as usize)
 }

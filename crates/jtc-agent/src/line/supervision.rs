@@ -1,5 +1,5 @@
-//! Host supervision (J-59) on a shared line: for the controller all clients are one host, so questions of others must
-//! not stand for the client that commands.
+//! Host supervision (J-59) on a shared line: the controller sees all clients as one host. So questions of other clients
+//! must not hide that the lease holder is silent.
 use std::time::Duration;
 
 use jtc_host::session::host_timeout_ms;
@@ -10,8 +10,8 @@ use super::{ClientId, Denied, SharedLine};
 /// Known state of the controller's host supervision.
 #[derive(Debug, Default)]
 pub(super) struct Supervision {
-    /// Value of `host_timeout_ms` that was last read or set on this line; `None` without supervision, or if it is not
-    /// known.
+    /// Value of `host_timeout_ms` that was last read or set on this line. `None`: supervision is off, or the value is
+    /// not known.
     timeout: Option<Duration>,
     /// Timeout in a SetSettings whose record has not arrived, ms.
     written_ms: Option<f64>,
@@ -46,7 +46,8 @@ impl Supervision {
         }
     }
 
-    /// Takes a status: a controller without torque may have started again, with other settings.
+    /// Takes a status. If the status shows no torque, the controller may have restarted with other settings, so the
+    /// timeout is forgotten.
     pub fn take_status(&mut self, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.timeout = None;
@@ -56,8 +57,8 @@ impl Supervision {
 
 impl SharedLine {
     /// Checks that this client may ask the controller. While the arm moves under host supervision, other clients may
-    /// ask only if a frame of the lease holder arrived within half of the timeout. The project's own clients send one
-    /// in each third of it.
+    /// ask only if a frame of the lease holder arrived within half of the timeout. The project's own clients send a
+    /// frame in each third of the timeout.
     pub(super) fn may_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(timeout) = self.supervision.timeout else { return Ok(()) };
         self.end_lapsed(now);

@@ -1,5 +1,5 @@
-//! Last will of a client, as in MQTT: its policy for the current motion, to be applied by another agent if this agent
-//! is killed.
+//! Last will of a client, as in MQTT: its policy for the current motion. If this agent is killed, another agent applies
+//! the policy.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, ExecCommand, TrajectoryState};
@@ -10,11 +10,11 @@ use super::{LineEvent, POLICY, Policy, SharedLine};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moves {
-    /// Upload of a trajectory: the arm stands, and a motion usually follows.
+    /// Upload of a trajectory. The arm is at rest, and a motion usually follows.
     Upload,
     /// Motion, also a paused one.
     Motion,
-    /// Teaching: the arm is led by hand, or may be soon.
+    /// Teaching. The arm is led by hand, or may be led by hand soon.
     Teaching,
 }
 
@@ -29,7 +29,7 @@ impl Moves {
     }
 }
 
-/// Client whose policy applies to the motion after the agent was killed.
+/// Client whose policy applies to the motion if the agent is killed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Will {
     /// Name of the client for people.
@@ -43,7 +43,7 @@ pub struct Will {
 /// Result of applying a last will.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
-    /// No motion any more.
+    /// The arm is at rest.
     Rests,
     /// The motion continues.
     GoesOn,
@@ -59,12 +59,13 @@ impl SharedLine {
         self.left = (client, policy);
     }
 
-    /// Applies the will of a client whose agent was killed before it could. The command is sent even if the arm seems
-    /// to stand, because a status is older than the last command.
+    /// Applies the will of a client whose agent was killed. Sends the command even if the arm seems to be at rest,
+    /// because a status is older than the last command.
     pub fn apply_left(&mut self, client: &str, policy: Policy, now: Duration) -> Applied {
         self.bequeath(client.to_owned(), policy);
         if self.status.is_none() {
-            // The motion is not known: the will applies until the controller reports that the arm stands.
+            // The cause of the motion is not known. The will applies until the controller reports that the arm is at
+            // rest.
             self.will = Some(self.will_of(Moves::Motion));
         }
         let moves = self.moving.may_move(self.status.as_ref(), now);
@@ -95,8 +96,8 @@ impl SharedLine {
         }
     }
 
-    /// Returns the will with the policy of the present or last lease holder; a stronger command that the controller has
-    /// not confirmed takes precedence.
+    /// Returns the will with the policy of the present or last lease holder. A stronger command that the controller has
+    /// not confirmed yet takes precedence.
     fn will_of(&self, what: Moves) -> Will {
         let holder = self.lease.as_ref().and_then(|lease| self.introduction(lease.holder));
         let (client, policy) =

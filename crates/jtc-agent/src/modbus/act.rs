@@ -19,7 +19,7 @@ use crate::owner::ClientPort;
 /// Reason why a command was not executed.
 pub(super) struct Refusal {
     pub outcome: Outcome,
-    /// Number of the error; 0 without one.
+    /// Number of the error. 0: no error.
     pub error: u16,
     /// Reason in words.
     pub why: String,
@@ -96,7 +96,7 @@ impl Plc {
             Command::GripperOn => self.call(&commander, |session| session.gripper(true)).await,
             Command::GripperOff => self.call(&commander, |session| session.gripper(false)).await,
             Command::Clear => self.call(&commander, Session::clear_all).await,
-            // These commands are executed when they arrive.
+            // These commands were already executed when they arrived.
             Command::None | Command::Pause | Command::Stop | Command::Release => Ok(()),
         }
     }
@@ -106,7 +106,7 @@ impl Plc {
         if self.is_held_by_a_coil() { Err(Refusal::new(Outcome::Coil)) } else { Ok(()) }
     }
 
-    /// Takes or renews the lease; it lasts for the time of the watchdog.
+    /// Takes or renews the lease, which lasts for the time of the watchdog.
     fn take_lease(&self, commander: &Commander) -> Result<(), Refusal> {
         let (policy, lasts) = self.watchdog();
         let taken = self.line.with(|line, now| {
@@ -132,7 +132,7 @@ impl Plc {
         let number = order.trajectory;
         let stored = self.jobs.store.get(number).ok_or_else(|| Refusal::new(Outcome::NoTrajectory))?;
         self.free_to_move()?;
-        // A running job is reported as busy before any consequence of it for the arm.
+        // The turn is requested first. So while a job runs, the answer is "busy" and not a consequence of that job.
         let turn = commander.turn()?;
         self.take_lease(commander)?;
         let reported = self.reported();
@@ -146,7 +146,7 @@ impl Plc {
         let order = RunOrder {
             course: Course::Along(Arc::new(stored.trajectory.clone())),
             approach: order.approach,
-            // The register always has a value; its default 100 means that no speed was chosen.
+            // The register always has a value. Its default of 100 means that the PLC has not chosen a speed.
             speed_percent: Some(order.speed).filter(|speed| *speed != 100).map(f64::from),
             repeat: order.repeat.into(),
             accept_device_limits: false,
@@ -224,7 +224,7 @@ impl Plc {
         if let Some(job) = commander.job() {
             return Err(Unable::Busy(Some(job)).into());
         }
-        // A client that does not hold the lease has none to release.
+        // If the client does not hold the lease, this has no effect.
         let _ = self.line.with(|line, now| line.release_lease(commander.client, now));
         self.line.wake();
         self.resign();

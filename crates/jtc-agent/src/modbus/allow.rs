@@ -20,7 +20,7 @@ impl Network {
     pub fn contains(&self, address: IpAddr) -> bool {
         let (own, other) = (number(self.address), number(address.to_canonical()));
         let left = own.1 - u32::from(self.bits);
-        // `left` may be the full width; `checked_shr` returns `None` then.
+        // `left` may be the full width. `checked_shr` then returns `None`.
         own.1 == other.1 && own.0.checked_shr(left).unwrap_or(0) == other.0.checked_shr(left).unwrap_or(0)
     }
 }

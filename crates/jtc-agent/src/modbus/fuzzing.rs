@@ -42,9 +42,9 @@ impl Device for Sixteen {
     }
 }
 
-/// Simulates a connection that sends these bytes. Checks that each request has one response with its own transaction
-/// number and within the length of the standard. The response tells if the request was executed. A refused request
-/// writes nothing, and a written value is read back.
+/// Simulates a connection that sends these bytes. Checks that each request gets one response with its transaction
+/// number, no longer than the standard allows, and that the response tells if the request was executed. Also checks
+/// that a refused request writes nothing, and that written values can be read back.
 ///
 /// # Panics
 ///
@@ -70,7 +70,7 @@ pub fn modbus_stream(mut data: &[u8]) {
         let writes = [5, 6, 15, 16].contains(&pdu[0]);
         assert_eq!(device.writes, before.writes + usize::from(writes));
         if writes {
-            // Written values must be read from the same addresses, packed as in the standard.
+            // Written values must be read back from the same addresses, packed as the standard requires.
             let (read, count) = match pdu[0] {
                 5 => (1, [0, 1]),
                 6 => (3, [0, 1]),

@@ -1,10 +1,10 @@
-//! Holding registers, and the handshake that turns them into commands: each command is executed once, even if writes
+//! Holding registers, and the handshake that turns them into commands: Each command is executed once, even if writes
 //! are repeated or answers are lost.
 use super::codes::{Command, Outcome};
 use super::map::{HOLDINGS, WATCHDOG_MIN, holding};
 use super::pdu::Exception;
 
-/// Command with all its parameters, as they were when its sequence number was written.
+/// Command with the values that its parameters had when the sequence number was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Order {
     /// Sequence number.
@@ -17,7 +17,7 @@ pub struct Order {
     pub speed: u16,
     /// Number of runs.
     pub repeat: u16,
-    /// `true`: first move the arm to the first point, if it stands elsewhere.
+    /// `true`: if the arm is not at the first point, move it there first.
     pub approach: bool,
     /// Watchdog, ms.
     pub watchdog_ms: u16,
@@ -25,9 +25,9 @@ pub struct Order {
 
 /// Holding registers of the commanding PLC, and its last command.
 ///
-/// A command needs the sequence number after that of the last command. With any other number, or without a new one,
-/// no command is executed. So a write that is repeated after a lost answer has no effect. Values that a PLC still writes
-/// from before the start of the agent have no effect either, because each agent starts with another number.
+/// A command must have the next sequence number after the last command. With any other number, no command is executed.
+/// So a write that is repeated after a lost answer has no effect. A PLC may repeat values that it has written before
+/// the agent was started. They have no effect either, because each agent starts with a different number.
 #[derive(Clone, Debug)]
 pub struct Handshake {
     values: [u16; holding::COUNT],
@@ -39,7 +39,7 @@ pub struct Handshake {
 }
 
 impl Handshake {
-    /// Returns the handshake after a last command with this sequence number.
+    /// Returns a handshake whose last command has this sequence number.
     pub fn new(sequence: u16) -> Self {
         let mut new = Self {
             values: [0; holding::COUNT],
@@ -52,7 +52,7 @@ impl Handshake {
         new
     }
 
-    /// Resets the registers, which another PLC has written. The sequence number continues.
+    /// Resets the registers, because another PLC has written them. The sequence number continues.
     pub fn forget(&mut self) {
         self.values = HOLDINGS.map(|row| row.default);
         self.values[holding::SEQUENCE] = self.taken;
@@ -78,7 +78,8 @@ impl Handshake {
         self.taken != self.acknowledged
     }
 
-    /// Checks that these values may be written. `commands`: this PLC holds the lease, so its watchdog cannot be off.
+    /// Checks that these values may be written. `commands`: this PLC holds the lease, so it cannot switch its watchdog
+    /// off.
     ///
     /// # Errors
     ///
@@ -128,7 +129,7 @@ impl Handshake {
         })
     }
 
-    /// Reports the outcome of a command. Has no effect unless `sequence` is that of the last accepted command.
+    /// Reports the outcome of a command. Has no effect unless `sequence` belongs to the last accepted command.
     pub fn acknowledge(&mut self, sequence: u16, outcome: Outcome, error: u16) {
         if sequence == self.taken {
             (self.acknowledged, self.outcome, self.error) = (sequence, outcome, error);
@@ -153,7 +154,7 @@ mod tests {
     fn a_command_is_what_was_written_when_its_number_came() {
         let mut handshake = Handshake::new(41);
         assert_eq!(handshake.values()[holding::SEQUENCE], 41);
-        // Partly written, in any order: nothing is executed yet.
+        // While the registers are only partly written, in any order, no command is executed.
         assert_eq!(write(&mut handshake, holding::COMMAND, &[START]), Ok(None));
         assert_eq!(write(&mut handshake, holding::TRAJECTORY, &[3]), Ok(None));
         let order = write(&mut handshake, holding::SEQUENCE, &[42]).expect("it may be").expect("a command");
@@ -246,7 +247,7 @@ mod tests {
             let mut handshake = Handshake::new(first);
             let mut last = first;
             for (at, mut values, near) in writes {
-                // Includes numbers near the last one, otherwise the next number would hardly occur.
+                // Sequence numbers near the last one are included. Otherwise the next number would hardly ever occur.
                 let place = holding::SEQUENCE.checked_sub(usize::from(at)).filter(|place| *place < values.len());
                 if let Some(place) = place.filter(|_| near) {
                     values[place] = last.wrapping_add(values[place] % 3);

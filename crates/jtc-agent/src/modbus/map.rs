@@ -1,4 +1,4 @@
-//! Register map: one table for the server and for the page that describes it.
+//! Register map. The server and its documentation page use the same tables.
 use std::time::Duration;
 
 use jtc_host::held_stop;
@@ -10,12 +10,13 @@ use super::codes::{Outcome, error_number};
 use super::pdu::Exception;
 use crate::jobs::{Job, NUMBER_MAX, Stage};
 
-/// Version of this map. The version counts up when the meaning of an address changes, not when entries are added at the end.
+/// Version of this map. The version increases when the meaning of an address changes. It stays when entries are added at the
+/// end.
 pub const VERSION: u16 = 1;
-/// Register value of an unknown number.
+/// Register value that means "not known".
 pub const UNKNOWN: u16 = u16::MAX;
 const UNKNOWN_LONG: u32 = u32::MAX;
-/// Age of the last status after which the controller counts as disconnected.
+/// Age of the last status after which the controller is reported as disconnected.
 pub const FRESH: Duration = Duration::from_secs(1);
 /// Period of the heartbeat counter.
 const HEARTBEAT: Duration = Duration::from_millis(100);
@@ -46,7 +47,7 @@ pub struct View {
     pub status: Option<(Duration, Status)>,
     /// Cause and age in ms of the current held stop.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints whose encoder has jumped, one bit each.
+    /// Joints with an encoder jump, one bit each.
     pub jumped: u8,
     /// Speed override, %.
     pub speed: Option<u16>,
@@ -82,12 +83,12 @@ impl View {
         self.status(f32::NAN, known).to_bits()
     }
 
-    /// Returns a value of the current held stop's cause; 0 without a held stop, or if its cause is not known.
+    /// Returns a value of the cause of the current held stop. 0: no held stop is active, or its cause is not known.
     fn stop(&self, read: impl FnOnce(&StopCause) -> u32) -> u32 {
         self.stop.as_ref().map_or(0, |(cause, _)| read(cause))
     }
 
-    /// Returns the bits of a figure of the cause; NaN if the cause has none.
+    /// Returns the bits of a value or limit of the cause. NaN: the cause does not have one.
     fn figure(&self, read: impl FnOnce((Option<f32>, Option<f32>)) -> Option<f32>) -> u32 {
         let known = self.stop.as_ref().and_then(|(cause, _)| read(held_stop::figures(cause)));
         known.unwrap_or(f32::NAN).to_bits()
@@ -98,17 +99,17 @@ impl View {
         self.job.as_ref().map_or(0, read)
     }
 
-    /// Returns `true` if the controller reports now.
+    /// Returns `true` if the last status is recent.
     pub fn is_fresh(&self) -> bool {
         !self.lost && self.status.as_ref().is_some_and(|(age, _)| *age <= FRESH)
     }
 
-    /// Returns `true` if the controller reports now and its status fulfils a condition.
+    /// Returns `true` if the last status is recent and fulfils a condition.
     fn reports(&self, what: impl FnOnce(&Status) -> bool) -> bool {
         self.is_fresh() && self.status(false, what)
     }
 
-    /// Returns `true` if the arm is in position hold without errors and without a motion: a motion can begin.
+    /// Returns `true` if a motion can begin: the arm is in position hold, without errors and without a motion.
     pub fn is_ready(&self) -> bool {
         self.reports(|s| {
             s.state == ControllerState::HoldPos && s.errors == 0 && words::is_held(s) && !s.is_executing()
@@ -378,7 +379,8 @@ mod tests {
         }
     }
 
-    /// The word order that the page documents, with bytes written by hand: 1.5 is 3FC00000, 70000 is 00011170.
+    /// The registers have the word order that the page documents. The expected words were computed by hand: 1.5 is
+    /// 3FC00000, 70000 is 00011170.
     #[test]
     fn two_registers_have_the_upper_half_first() {
         let mut status = Status { point: 70_000, ..Status::default() };

@@ -1,8 +1,9 @@
 //! Modbus TCP for a PLC: the arm as a map of registers.
 //!
-//! [`pdu`] has the protocol, [`map`] the registers, and [`handshake`] turns registers into commands, each once. [`plc`]
-//! decides which of several connections commands. `act` executes the commands with the same jobs as the API, and
-//! [`server`] has the connections. Modbus has no tokens: [`allow`] names the addresses that may connect.
+//! [`pdu`] contains the protocol and [`map`] the registers. [`handshake`] turns register writes into commands, each of
+//! which is executed once. [`plc`] decides which of several connections may command. `act` executes the commands with
+//! the same jobs as the API. [`server`] manages the connections. Modbus has no tokens, so [`allow`] lists the addresses
+//! that may connect.
 mod act;
 pub mod allow;
 pub mod codes;
@@ -23,8 +24,8 @@ pub use server::Server;
 
 use crate::access::TokenError;
 
-/// Returns a random first sequence number for a new agent, so that a PLC that repeats old writes does not hit the next
-/// number.
+/// Returns a random first sequence number for a new agent, so that a PLC that repeats old writes does not send the next
+/// valid number by chance.
 ///
 /// # Errors
 ///

@@ -1,8 +1,9 @@
-//! Requests and responses of Modbus TCP, without I/O: bytes go in, bytes come out.
+//! Requests and responses of Modbus TCP. The module does no I/O: it takes the bytes of a request and returns those of
+//! the response.
 //!
 //! The standard is the *Modbus Application Protocol* V1.1b3 with the *Messaging on TCP/IP Implementation Guide* V1.0b.
-//! A request is checked in the order of its state diagrams (function, quantity, address) and then executed. Any bytes
-//! lead to an answer or to the end of the connection, and no write is executed in part.
+//! A request is checked in the order of the standard's state diagrams (function, quantity, address) and then executed.
+//! Any received bytes lead to a response or to the end of the connection. A write is executed completely or not at all.
 
 /// Length of the header before a request, bytes: transaction, protocol, length, unit.
 pub const HEADER_LEN: usize = 7;
@@ -27,7 +28,7 @@ pub enum Table {
     InputRegisters,
 }
 
-/// Reason why a request is not executed, with the number of the standard.
+/// Reason why a request is not executed, with its exception code in the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exception {
@@ -37,9 +38,9 @@ pub enum Exception {
     Address = 2,
     /// A quantity, a length or a value is invalid.
     Value = 3,
-    /// The device failed: here, the controller cannot be reached.
+    /// The device failed. Here: the controller cannot be reached.
     Failure = 4,
-    /// The device is busy: here, another connection commands.
+    /// The device is busy. Here: another connection commands.
     Busy = 6,
 }
 
@@ -59,14 +60,14 @@ pub trait Device {
     /// [`Exception`].
     fn registers(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<u16>, Exception>;
 
-    /// Writes coils from address `at` on, all or none.
+    /// Writes coils from address `at` on: all of them, or none.
     ///
     /// # Errors
     ///
     /// [`Exception`]: nothing was written.
     fn write_coils(&mut self, at: u16, values: &[bool]) -> Result<(), Exception>;
 
-    /// Writes holding registers from address `at` on, all or none.
+    /// Writes holding registers from address `at` on: all of them, or none.
     ///
     /// # Errors
     ///
@@ -77,7 +78,7 @@ pub trait Device {
 /// Header of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Request number of the client; it is returned unchanged, like the unit.
+    /// Request number of the client. The response repeats it unchanged, like the unit.
     transaction: [u8; 2],
     unit: u8,
     /// Length of the request after the header, bytes.
@@ -85,8 +86,8 @@ pub struct Header {
 }
 
 impl Header {
-    /// Returns `None` if the header is not Modbus or has an invalid length. The start of the next request is not known
-    /// then.
+    /// Returns `None` if the header is not Modbus or has an invalid length. In this case the start of the next request
+    /// is not known.
     pub fn parse(bytes: [u8; HEADER_LEN]) -> Option<Self> {
         let [t0, t1, p0, p1, l0, l1, unit] = bytes;
         let len = usize::from(u16::from_be_bytes([l0, l1])).checked_sub(1)?;
@@ -182,7 +183,7 @@ fn two(rest: &[u8]) -> Result<(u16, u16), Exception> {
     Ok((u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])))
 }
 
-/// Returns an address, and a quantity of 1 to `most`.
+/// Returns an address, and a quantity from 1 to `most`.
 fn span(rest: &[u8], most: u16) -> Result<(u16, u16), Exception> {
     two(rest).and_then(|(at, count)| quantity(count, most).map(|_| (at, count)))
 }
@@ -191,7 +192,7 @@ fn quantity(count: u16, most: u16) -> Result<usize, Exception> {
     if (1..=most).contains(&count) { Ok(usize::from(count)) } else { Err(Exception::Value) }
 }
 
-/// Returns an address, a quantity, and exactly the data for this quantity.
+/// Returns an address, a quantity, and the data, whose length must match the quantity.
 fn many(rest: &[u8], most: u16, len: fn(usize) -> usize) -> Result<(u16, usize, &[u8]), Exception> {
     let (head, data) = rest.split_at_checked(5).ok_or(Exception::Value)?;
     let (at, count) = two(&head[..4])?;
@@ -211,7 +212,7 @@ mod tests {
         answer(pdu, device).0
     }
 
-    /// Requests with the forms of the standard's examples (V1.1b3, 6.1 to 6.12).
+    /// Requests in the form of the standard's examples (V1.1b3, 6.1 to 6.12).
     #[test]
     fn requests_are_answered_as_the_standard_has_it() {
         let mut device = Sixteen::default();
@@ -262,7 +263,7 @@ mod tests {
     }
 
     proptest! {
-        /// Any bytes get an answer with their function code that is not too long, and never write more entries than
+        /// Any request gets a response with its function code that is not too long. No request writes more entries than
         /// exist.
         #[test]
         fn any_bytes_are_answered(function in 0..24_u8, rest in prop::collection::vec(any::<u8>(), 0..PDU_MAX)) {

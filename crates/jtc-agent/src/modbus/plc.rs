@@ -1,4 +1,4 @@
-//! Requests of PLCs: the values that they read, the connection that commands, and the outcome of commands.
+//! Requests of PLCs: the values that they read, which connection may command, and the outcome of commands.
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,15 +18,15 @@ use crate::owner::Line;
 
 /// Name of the PLC client on the line.
 const NAME: &str = "the PLC (Modbus)";
-/// Silence after which a commanding connection counts as lost: at least `GONE`, longer with a longer watchdog, and
-/// `GONE_UNWATCHED` without a watchdog.
+/// Silence after which a commanding connection is considered lost. The limit is `GONE`, or longer with a longer
+/// watchdog. Without a watchdog it is `GONE_UNWATCHED`.
 const GONE: Duration = Duration::from_secs(1);
 const GONE_UNWATCHED: Duration = Duration::from_secs(60);
 
 /// Connection of a PLC.
 #[derive(Clone, Copy, Debug)]
 pub struct Connection {
-    /// Number of the connection; numbers are not used again.
+    /// Number of the connection. Numbers are not reused.
     pub number: u64,
     /// Network address of the PLC.
     pub peer: SocketAddr,
@@ -35,7 +35,7 @@ pub struct Connection {
 /// PLC that writes the holding registers.
 struct Operator {
     address: IpAddr,
-    /// Number of its connection; `None` after it disconnected or released the lease.
+    /// Number of its connection. `None`: the PLC has disconnected or released the lease.
     connection: Option<u64>,
     seen: Instant,
 }
@@ -46,7 +46,7 @@ struct State {
     /// Coils of each connection that has written a coil.
     coils: BTreeMap<u64, [bool; COILS.len()]>,
     commander: Arc<Commander>,
-    /// Last job; the fields after it are the last event that was read, and the number of runs.
+    /// Last job. The next two fields are the number of the last event that was read, and the number of runs.
     job: Option<u64>,
     looked: u64,
     runs: u32,
@@ -64,7 +64,7 @@ pub struct Plc {
 }
 
 impl Plc {
-    /// Returns the device of a line; the first command has the number after `sequence`.
+    /// Returns the device of a line. The first command must have the sequence number after `sequence`.
     pub fn new(
         line: Line,
         jobs: Arc<Jobs>,
@@ -76,7 +76,7 @@ impl Plc {
             handshake: Handshake::new(sequence),
             operator: None,
             coils: BTreeMap::new(),
-            // Joined now, so that Stops of other clients apply to this client even before its first request.
+            // The client joins now, so that Stops of other clients apply to it even before its first request.
             commander: commander(&line),
             job: None,
             looked: 0,
@@ -97,7 +97,7 @@ impl Plc {
         response
     }
 
-    /// Removes a connection. The lease lasts until the watchdog ends it, for a PLC that connects again.
+    /// Removes a connection. The lease lasts until the watchdog ends it, so that the PLC can connect again.
     pub fn left(&self, connection: &Connection) {
         let mut state = self.lock();
         state.coils.remove(&connection.number);
@@ -106,7 +106,7 @@ impl Plc {
         }
     }
 
-    /// Returns `true` if this connection commands, or if one of its coils holds the arm.
+    /// Returns `true` if this connection must not be closed: it commands, or one of its coils holds the arm.
     pub fn needs_its_place(&self, connection: u64) -> bool {
         let state = self.lock();
         let holds = state.coils.get(&connection).is_some_and(|coils| coils.contains(&true));
@@ -266,7 +266,7 @@ impl Plc {
         if lost.is_some() {
             return Err(Exception::Failure);
         }
-        // After its own Stop or Pause the connection may command again at once.
+        // A connection may command again at once after its own Stop or Pause.
         let state = self.lock();
         let is_own = |operator: &Operator| operator.connection == Some(connection.number);
         let own = state.operator.as_ref().is_some_and(is_own).then_some(state.commander.client);
@@ -291,7 +291,7 @@ impl Plc {
             let outcome = if busy { Outcome::Busy } else { Outcome::Done };
             return self.lock().handshake.acknowledge(order.sequence, outcome, 0);
         }
-        // A Stop between now and the start of the command prevents it.
+        // A Stop between now and the start of the command prevents the command.
         let (plc, halt) = (self.clone(), self.line.last_halt());
         tokio::spawn(async move {
             let refusal = plc.act(&order, halt).await.err();
@@ -309,7 +309,7 @@ impl Plc {
 }
 
 impl Operator {
-    /// Returns `true` if no more requests arrive from the commanding connection.
+    /// Returns `true` if the commanding connection has been silent for too long.
     fn is_gone(&self, handshake: &Handshake) -> bool {
         let after = match handshake.watchdog_ms() {
             0 => GONE_UNWATCHED,

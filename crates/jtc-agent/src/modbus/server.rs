@@ -1,4 +1,4 @@
-//! Connections of PLCs: allowed addresses, number and request rate.
+//! Connections of PLCs, with limits for their addresses, number and request rate.
 use std::collections::BTreeMap;
 use std::io;
 use std::net::TcpListener;
@@ -19,7 +19,8 @@ use super::plc::{Connection, Plc};
 
 /// Largest number of connections.
 pub const CONNECTIONS_MAX: usize = 8;
-/// Silence after which a connection that neither commands nor holds the arm by a coil is closed for a new one.
+/// Silence after which a connection may be closed to make room for a new one, unless it commands or holds the arm by a
+/// coil.
 const GIVES_WAY: Duration = Duration::from_secs(2);
 /// Silence after which a connection is closed; longer than the longest watchdog.
 const IDLE: Duration = Duration::from_secs(90);
@@ -33,7 +34,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Interval at which the controller is asked for its speed override, while a PLC sends requests.
 const SPEED: Duration = Duration::from_secs(2);
 
-/// Modbus server on a thread of its own; it ends on drop.
+/// Modbus server on a separate thread. The server ends on drop.
 pub struct Server {
     ended: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -114,7 +115,7 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
             tokio::time::sleep(LOOK).await;
             continue;
         };
-        // Closed at once by the drop of the stream.
+        // The drop of the stream closes the connection at once.
         if !allowed.contains(peer.ip()) {
             plc.refused(peer, "this address may not connect: --modbus-allow names those that may");
             continue;
@@ -129,14 +130,14 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
         let gone = Gone { connection, plc: plc.clone(), connections: connections.clone() };
         let mut open = lock(&connections);
         let conversing = converse(stream, gone, seen.clone(), start);
-        // The lock is held and this thread runs the connection, so it cannot end before it is in the list.
+        // The connection cannot end before it is in the list: the lock is held, and the connection runs on this thread.
         open.insert(last, Open { seen, abort: tokio::spawn(conversing).abort_handle() });
     }
 }
 
 /// Makes room for another connection, if necessary by closing an idle one. Returns `false` if no connection can be
-/// closed: those that are left command, hold the arm by a coil, or are not idle long enough. If all of them hold the
-/// arm, it stands, and no motion can begin.
+/// closed, because each of them commands, holds the arm by a coil, or was not idle long enough. If all of them hold the
+/// arm, it is at rest, and no motion can begin.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {
@@ -232,7 +233,8 @@ mod tests {
     fn whoever_asks_faster_than_it_may_waits() {
         let (mut pace, begin) = (Pace::new(), Instant::now());
         pace.at = begin;
-        // Each request follows the answer to the one before: first a burst, then the limited rate.
+        // The client sends each request after the answer to the previous one. The first requests form a burst, and the
+        // others are sent at the limited rate.
         let mut now = begin;
         for _ in 0..1000 {
             now += pace.wait(now);

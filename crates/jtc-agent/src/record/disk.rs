@@ -18,7 +18,7 @@ use super::shelf::{Begun, Shelf};
 
 /// Largest number of samples that wait for the disk: minutes of statuses.
 const WAITING_MAX: usize = 1 << 13;
-/// Queue places that samples leave free for the start and end of recordings.
+/// Number of queue places that are reserved for the start and end of recordings.
 const RESERVED: usize = 64;
 /// Time after which a failed write is tried again.
 const AGAIN: Duration = Duration::from_secs(5);
@@ -27,7 +27,7 @@ const AGAIN: Duration = Duration::from_secs(5);
 enum Message {
     Begin(Box<RecordingInfo>),
     Sample(Box<Sample>),
-    /// End of the recording, and number of samples lost before the queue.
+    /// End of the recording, and the number of samples that were lost because the queue was full.
     End(Ending, u64),
 }
 
@@ -82,7 +82,7 @@ impl Disk {
         sent
     }
 
-    /// Begins a recording. Like the other methods, never waits.
+    /// Begins a recording. Like the other methods, this never waits.
     pub fn open(&mut self, info: RecordingInfo) {
         self.lost = 0;
         self.send(Message::Begin(Box::new(info)), 0);
@@ -95,7 +95,7 @@ impl Disk {
         }
     }
 
-    /// Adds a number of samples that were lost before this queue.
+    /// Adds a number of samples that were lost before they reached this queue.
     pub fn lose(&mut self, samples: u64) {
         self.lost += samples;
     }
@@ -118,7 +118,7 @@ struct Writer {
     shelf: Shelf,
     notify: Notify,
     open: Option<Open>,
-    /// Current recording, kept also while it cannot be written.
+    /// Current recording. It is kept even while it cannot be written.
     wanted: Option<Box<RecordingInfo>>,
     failed: Option<Instant>,
     /// Interval until the next attempt.
@@ -226,7 +226,7 @@ impl Writer {
         }
     }
 
-    /// Handles a write error: reports it once, until a write succeeds again.
+    /// Handles a write error. Reports only the first error until a write succeeds again.
     fn fail(&mut self, error: &str) {
         let file = self.break_off();
         if self.failed.replace(Instant::now()).is_none() {
@@ -237,17 +237,17 @@ impl Writer {
         }
     }
 
-    /// Ends the file incomplete.
+    /// Ends the file without completing it.
     fn break_off(&mut self) -> Option<PathBuf> {
         let Open { recorder, begun } = self.open.take()?;
         let (path, samples) = (begun.path.clone(), recorder.samples());
-        // The drop tries to complete the file; a failure has no consequence.
+        // The drop tries to complete the file. If that fails, there is no consequence.
         drop(recorder);
         self.shelf.break_off(begun, samples);
         Some(path)
     }
 
-    /// Passes all data to the operating system, and begins another file if this one is long.
+    /// Passes all data to the operating system. If the file is too long, begins another one.
     fn flush(&mut self) {
         let Some(open) = &mut self.open else { return };
         if let Err(error) = open.recorder.flush() {

@@ -1,8 +1,8 @@
-//! Recordings of every motion of any client, made by a client of the agent with read-only access.
+//! Records every motion of any client. The recorder is itself a client of the agent, with read-only access.
 //!
 //! [`Prepared`] opens the directory, [`Witness`] receives the frames on the line, [`Recorder`] follows the statuses. A thread follows the
-//! statuses and another one writes, so a slow disk delays only the writer. Neither thread delays the line: samples that the queue between
-//! them cannot hold are counted, and the recording contains their number.
+//! statuses and another one writes, so a slow disk delays only the writer. Neither thread delays the line. If the queue between them is
+//! full, samples are dropped, and the recording contains the number of dropped samples.
 mod disk;
 mod motion;
 mod shelf;
@@ -47,7 +47,7 @@ const LAST_WORDS: Duration = Duration::from_secs(5);
 /// Name of the recorder on the line.
 const NAME: &str = "recorder of the agent";
 
-/// Frame to the controller, as far as recordings need it.
+/// Part of a frame to the controller that recordings need.
 enum Seen {
     /// A Trajectory frame.
     Segment(Vec<u8>),
@@ -105,7 +105,7 @@ impl Prepared {
         Ok(Self { shelf: Shelf::open(dir, limit)?, witness, seen, missed })
     }
 
-    /// Returns the witness for the observer of the line's owner, once.
+    /// Returns the witness for the observer of the line's owner. Later calls return `None`.
     pub fn witness(&mut self) -> Option<Witness> {
         self.witness.take()
     }
@@ -169,8 +169,8 @@ struct Identity {
 }
 
 impl Identity {
-    /// Returns the identity of a device that does not report it. A controller with the hash of the built-in arm need
-    /// not be asked for more.
+    /// Returns the identity that is used for a device that does not report its own. A controller with the hash of the
+    /// built-in arm does not need to be asked for its arm.
     fn built_in() -> Self {
         let arm = Arm::avena();
         Self { delay_ticks: arm.config().delay_ticks, hash: arm.hash().ok().flatten(), arm, device: None }
@@ -179,7 +179,7 @@ impl Identity {
 
 /// Possible change of the arm.
 struct Doubt {
-    /// Time of the line since when the arm is uncertain.
+    /// Time of the line since which the arm is uncertain.
     since: Duration,
     asked: Option<Duration>,
 }
@@ -187,7 +187,7 @@ struct Doubt {
 /// Recording in progress.
 struct Reel {
     trajectory: Option<Arc<Trajectory>>,
-    /// Clock of the recording; it begins with the first status.
+    /// Clock of the recording, which begins with the first status.
     clock: Option<StatusClock>,
 }
 
@@ -235,7 +235,7 @@ impl Following {
                     self.follow(steps, &mut session);
                     return;
                 }
-                // The client was disconnected because the computer was suspended: it connects again.
+                // The client was disconnected, for example because the computer was suspended. It connects again.
                 (session, arrived) = connect(line);
             }
             self.take_seen();
@@ -273,7 +273,7 @@ impl Following {
         }
     }
 
-    /// Takes a status: a controller that starts may have another arm, and has no trajectory.
+    /// Takes a status. If the controller has started again, it may have another arm, and it has no trajectory.
     fn look_at(&mut self, now: Duration, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.upload.forget();
@@ -281,8 +281,8 @@ impl Following {
         }
     }
 
-    /// Asks for the identity of the controller if it is uncertain and the line is quiet. Asks no more often than
-    /// needed, because host supervision counts each question as a sign of life (J-59).
+    /// Asks for the identity of the controller if it is uncertain and the line is quiet. Asks as rarely as possible,
+    /// because host supervision takes each question as a sign of life of the host (J-59).
     fn resolve_doubt(&mut self, session: &mut Session<ClientPort>) {
         let now = session.now();
         let due = self.doubt.as_ref().is_some_and(|doubt| {

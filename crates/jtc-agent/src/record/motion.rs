@@ -1,4 +1,4 @@
-//! Start and end of recordings, found from the statuses alone, for motions of any client.
+//! Finds the start and end of recordings from the statuses alone, for motions of any client.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -10,15 +10,15 @@ use jtc_wire::{ControllerState, Status, TrajectoryState};
 const BEFORE: Duration = Duration::from_millis(500);
 /// Largest number of statuses in this time.
 const BEFORE_MAX: usize = 256;
-/// Time at rest after a motion until its recording ends.
+/// Time at rest after a motion before its recording ends.
 const REST: Duration = Duration::from_millis(500);
-/// Time after the end of a motion until its recording ends even if the arm is not quite at rest.
+/// Time after the end of a motion before its recording ends even if the arm is not quite at rest.
 const OVER: Duration = Duration::from_secs(5);
-/// Time after which recording stops while the arm stands in a pause, or in Teaching without being led.
+/// Time after which recording stops while the arm is at rest: in a pause, or in Teaching when no person leads it.
 const STANDS: Duration = Duration::from_secs(10);
 /// Time for which a Jog acts (J-58), plus its time on the line.
 const JOG: Duration = Duration::from_millis(400);
-/// Time without a status after which the motion counts as lost.
+/// Time without a status after which the recording of a motion ends, because the connection is considered lost.
 pub const SILENT: Duration = Duration::from_secs(2);
 
 /// Kinds of motions.
@@ -57,9 +57,9 @@ pub enum Step {
 /// Recording in progress.
 struct Open {
     motion: Motion,
-    /// Time since when the arm stands in a pause, or in Teaching without being led.
+    /// Time since which the arm has been at rest in a pause, or in Teaching when no person leads it.
     stands: Option<Duration>,
-    /// Time since when the motion is over, and since when the arm rests.
+    /// Time of the end of the motion. The next field is the time since which the arm has been at rest.
     over: Option<Duration>,
     rests: Option<Duration>,
     last: Status,
@@ -132,7 +132,7 @@ impl Follower {
         self.end("fault", &format!("no status came for {} s", SILENT.as_secs()))
     }
 
-    /// Ends the recording because following ends, with the given reason.
+    /// Ends the recording with the given reason, because no more statuses will be taken.
     pub fn end(&mut self, outcome: &str, reason: &str) -> Vec<Step> {
         self.last = None;
         self.before.clear();
@@ -158,7 +158,7 @@ impl Follower {
         }
     }
 
-    /// Returns `true` if this status belongs to another execution than the last one.
+    /// Returns `true` if this status belongs to another execution than the last status.
     fn begins_anew(&self, status: &Status) -> bool {
         self.last.is_none_or(|(_, trajectory, point)| {
             !matches!(trajectory, TrajectoryState::Execute | TrajectoryState::Pause) || status.point < point
@@ -286,7 +286,7 @@ mod tests {
         arm.is(HoldPos, Stop, 0.0);
         arm.run_ms(60_000);
         assert_eq!(arm.take(), ["begin execution", "stopped"]);
-        // Half a second before the motion, 4.4 s in motion, half a second at rest.
+        // The statuses of half a second before the motion, 4.4 s in motion, and half a second at rest.
         assert!((130..=140).contains(&arm.statuses), "{}", arm.statuses);
     }
 
@@ -300,7 +300,7 @@ mod tests {
             arm.is(HoldPos, end, 0.0);
             arm.run_ms(200);
         }
-        // The next motion begins after a short rest, or between two statuses.
+        // In the first case the next motion begins after a short rest, in the second case between two statuses.
         arm.is(Operate, Execute, 0.3);
         arm.run_ms(400);
         arm.status.point = 0;

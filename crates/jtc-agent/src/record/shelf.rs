@@ -1,7 +1,7 @@
 //! Recording directory: file names, size limit, and deletion of the oldest recordings.
 //!
-//! A list in the directory names the recordings made here, so that no other file is ever removed. The list is locked,
-//! so two agents cannot share a directory.
+//! A file in the directory lists the recordings that agents have made in it, so that no other file is ever removed. The
+//! list is locked, so two agents cannot share a directory.
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -12,17 +12,17 @@ use std::time::Duration;
 pub const LIST: &str = ".jtc-recordings";
 /// Ending of a complete recording.
 const WHOLE: &str = ".mcap";
-/// Ending of a recording that is incomplete or in progress; every command can read it, too.
+/// Ending of a recording that is incomplete or in progress. Every command can read such a file.
 const PART: &str = ".part.mcap";
 /// Number of list lines for removed files after which the list is rewritten.
 const GONE_MAX: usize = 10_000;
 
-/// Recording that was made here.
+/// Recording that an agent has made in this directory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Own {
     /// Name without its ending.
     name: String,
-    /// Length in bytes, unless it is being written; a file of another length no longer counts as made here.
+    /// Length in bytes, if it is known. A file of another length was changed from outside and is never removed.
     bytes: u64,
     /// `true` if the recording is incomplete or in progress.
     part: bool,
@@ -43,7 +43,7 @@ pub struct Shelf {
     make: Make,
     limit: u64,
     list: File,
-    /// Recordings, oldest first, without the one in progress.
+    /// Completed and interrupted recordings, oldest first. The recording in progress is not included.
     own: VecDeque<Own>,
     number: u64,
     gone: usize,
@@ -84,7 +84,7 @@ impl Shelf {
         Ok(shelf)
     }
 
-    /// Takes a line of the list; ignores invalid lines.
+    /// Takes a line of the list. Ignores invalid lines.
     fn take_line(&mut self, line: &str) {
         let mut words = line.split(' ');
         let (Some(what), Some(name), bytes) = (words.next(), words.next(), words.next()) else { return };
@@ -100,8 +100,8 @@ impl Shelf {
         }
     }
 
-    /// Checks the listed files: files that were removed or changed from outside no longer count as made here. The
-    /// length of a recording whose agent was killed is not known.
+    /// Checks the listed files, and drops from the list those that were removed or changed from outside. The length of
+    /// a recording whose agent was killed is not known.
     fn look(&mut self) {
         let dir = self.dir.clone();
         self.own.retain_mut(|own| match length(&own.path(&dir)) {
@@ -134,7 +134,7 @@ impl Shelf {
         let end = self.list.seek(SeekFrom::End(0))?;
         let written = self.list.write_all(format!("{line}\n").as_bytes());
         if written.is_err() {
-            // The list is as before, even if this fails.
+            // Even if this fails, the list is still valid.
             let _ = self.list.set_len(end);
         }
         written
@@ -152,7 +152,7 @@ impl Shelf {
                 (self.dir.join(format!("{name}{WHOLE}")), self.dir.join(format!("{name}{PART}")));
             self.number += 1;
             if whole.symlink_metadata().is_ok() || path.symlink_metadata().is_ok() {
-                // A file of this name exists and was not made here.
+                // A file of this name exists that is not a recording of an agent.
                 continue;
             }
             self.note(&format!("begin {name}"))?;
@@ -165,7 +165,7 @@ impl Shelf {
     ///
     /// # Errors
     ///
-    /// The recording keeps its name for incomplete ones.
+    /// The recording keeps its name of an incomplete recording.
     pub fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
         let bytes = length(&begun.path).unwrap_or(0);
         let mut own = Own { name: begun.name, bytes, part: true };
@@ -177,7 +177,7 @@ impl Shelf {
         renamed.and(noted).map(|()| whole)
     }
 
-    /// Ends a recording incomplete; the file is kept if it has samples.
+    /// Ends a recording without completing it. The file is kept if it contains samples.
     pub fn break_off(&mut self, begun: Begun, samples: u64) {
         if samples == 0 && std::fs::remove_file(&begun.path).is_ok() {
             let _ = self.note(&format!("gone {}", begun.name));
@@ -198,7 +198,7 @@ impl Shelf {
             && let Some(oldest) = self.own.pop_front()
         {
             let path = oldest.path(&self.dir);
-            // A file that has replaced the recording from outside is kept.
+            // If another program has replaced the recording by another file, that file is kept.
             if length(&path) == Some(oldest.bytes) && std::fs::remove_file(&path).is_ok() {
                 removed.push(path);
             }
@@ -212,7 +212,7 @@ impl Shelf {
         removed
     }
 
-    /// Returns the size after which a recording is continued in another file, so that old parts can be removed, bytes.
+    /// Returns the size in bytes after which a recording continues in another file. So old parts can be removed.
     pub fn longest(&self) -> u64 {
         self.limit / 4
     }
@@ -232,13 +232,13 @@ fn make(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// Returns the length of a file itself, not of the target of a link.
+/// Returns the length of the file itself. For a link this is not the length of its target.
 fn length(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().filter(std::fs::Metadata::is_file).map(|found| found.len())
 }
 
-/// Returns a name of time (UTC) and number, as `20261123T154412Z-000017`. Numbers are always in the order of time,
-/// names unless the clock is set.
+/// Returns a name that consists of time (UTC) and number, such as `20261123T154412Z-000017`. The numbers are always in
+/// the order of time. The names are in this order unless the clock was set back.
 fn name(now: Duration, number: u64) -> String {
     let since = now.as_secs();
     let (year, month, day) = date((since / 86_400) as i64);
@@ -273,7 +273,8 @@ mod tests {
     /// 2026-11-23 15:44:12 UTC.
     const NOW: Duration = Duration::from_secs(1_795_448_652);
 
-    /// Makes a recording of this number of bytes; if not `whole`, its agent is killed.
+    /// Makes a recording of this number of bytes. If `whole` is false, the agent is killed before the recording is
+    /// complete.
     fn make(shelf: &mut Shelf, bytes: usize, whole: bool) -> PathBuf {
         make_at(shelf, NOW, bytes, whole)
     }
@@ -318,7 +319,7 @@ mod tests {
         assert!(shelf.make_room(5000).is_empty() && others.exists());
     }
 
-    /// For any changes of the computer's clock, also between two agents: the first recording is removed first, and no
+    /// Whatever the computer's clock does, also between two agents, the oldest recording is removed first, and no
     /// number is used twice.
     #[test]
     fn the_oldest_are_those_that_were_made_first_whatever_the_clock_shows() {

@@ -13,7 +13,7 @@ use crate::record::Notice;
 
 /// Time within which a connected controller reports.
 const REPORTS: Duration = Duration::from_secs(1);
-/// Longest wait for the confirmation of a Stop; the Stop is repeated after that, too.
+/// Longest wait for the confirmation of a Stop. The line repeats the Stop even after this time.
 const TAKES: Duration = Duration::from_secs(1);
 /// Interval of checks.
 const LOOK: Duration = Duration::from_millis(10);
@@ -40,12 +40,12 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
 }
 
-/// Reads the controller's `host_timeout_ms` for the line. The arm may be moving for a program that was killed, and the
-/// timeout decides which clients' questions may count as that program's sign of life (J-59). Returns without a value if
-/// the controller has none or does not answer.
+/// Reads the controller's `host_timeout_ms` for the line. A motion of a killed program may still run. With the timeout,
+/// the line can refuse questions of other clients that the controller would take for a sign of life of that program
+/// (J-59). Has no effect if the controller has no such setting or does not answer.
 pub fn read_host_timeout(line: &Line) {
     let introduction = Introduction { name: "agent".into(), role: Role::Viewer, policy: Policy::Continue };
-    // The line has seen the value, independent of this result.
+    // The result is not used, because the line itself reads the value from the answer.
     let _ = Session::new(line.connect(introduction)).settings();
 }
 
@@ -63,7 +63,8 @@ fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> boo
     }
 }
 
-/// Returns the result in words; depends on whether the controller reports and has confirmed the command.
+/// Returns the result in words. `reports`: statuses of the controller arrive. `taken`: the controller has confirmed the
+/// command.
 fn in_words(applied: Applied, reports: bool, taken: bool) -> String {
     let sent = match applied {
         Applied::Rests => return "nothing moves any more".into(),

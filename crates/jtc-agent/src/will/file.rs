@@ -1,4 +1,4 @@
-//! File of a last will: one for each port, readable only by its owner, and written completely or not at all.
+//! File of a last will: each port has one. It is readable only by its owner, and written completely or not at all.
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub struct Stored {
 /// State of the file when an agent starts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
-    /// No file: the agent before has ended properly, or nothing moved.
+    /// No file: the previous agent has ended properly, or no motion was in progress.
     Nothing,
     /// Will of an agent that was killed during a motion.
     Left(Stored),
@@ -42,8 +42,8 @@ pub enum Found {
     Doubtful(String),
 }
 
-/// Returns the path of a port's file in this folder. The name of the port is used as given: a name that identifies the
-/// adapter (by-id) stays the same, whereas the name of the device may change.
+/// Returns the path of a port's file in this folder. The name of the port is used as the user has given it. A name that
+/// identifies the adapter (by-id) always stays the same, but a device name may change.
 pub(super) fn path(folder: &Path, port: &str) -> PathBuf {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'.' || byte == b'-';
     let escaped = |byte: u8| if plain(byte) { char::from(byte).to_string() } else { format!("_{byte:02x}") };
@@ -102,8 +102,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Writes the file in one step. The file is valid for a killed agent from then on, and survives a loss of power as soon
-/// as the disk has stored it.
+/// Writes the file in one step. From then on the file is valid even if the agent is killed. It survives a loss of power
+/// as soon as the disk has stored it.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };
@@ -112,16 +112,17 @@ pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> 
     let mut file = begin(&part)?;
     let written = file.write_all(&text).and_then(|()| fs::rename(&part, path));
     if written.is_err() {
-        // The first error is the one to report.
+        // An error here is ignored, because the first error is reported.
         let _ = fs::remove_file(&part);
     }
     written?;
     file.sync_all()
 }
 
-/// Makes a file unreadable that can be neither written nor removed: even on a full disk a file can be shortened.
+/// Empties a file that can be neither replaced nor removed, so that its contents are invalid. A file can be shortened
+/// even on a full disk.
 pub(super) fn spoil(path: &Path) {
-    // If even this fails, no other way is left.
+    // If even this fails, nothing more can be done.
     let _ = OpenOptions::new().write(true).truncate(true).open(path);
 }
 
@@ -217,7 +218,7 @@ mod tests {
         doubtful("another port");
         write(&path, PORT, &will(Policy::Continue), 0.0).expect("there is room");
         let good = fs::read_to_string(&path).expect("text");
-        // A file that is cut off at any byte is damaged, and never shows another policy.
+        // A file that is cut off at any byte is reported as damaged, and is never read as another policy.
         for n in 0..good.len() {
             fs::write(&path, &good[..n]).expect("a file");
             doubtful("damaged");

@@ -1,4 +1,4 @@
-//! Keeper of the file: updates it as soon as the disk accepts a write.
+//! Keeper of the file of a last will. It updates the file as soon as the disk accepts a write.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -20,7 +20,7 @@ type Wanted = Option<(Will, f64)>;
 
 struct Slot {
     wanted: Wanted,
-    /// `true` while the file of the agent before must be kept, until its will was applied.
+    /// `true` until the will of the previous agent was applied. Meanwhile its file must be kept.
     held: bool,
     ended: bool,
     /// `true` after the thread has ended.
@@ -85,7 +85,7 @@ impl Keeper {
         Witness(self.0.clone())
     }
 
-    /// Notes that the will of the agent before was applied: from now on the file follows the line, whose present will
+    /// Notes that the will of the previous agent was applied. From now on the file follows the line, whose present will
     /// is `will`. `since`: start of a motion that still continues.
     pub fn settle(&self, will: Option<Will>, since: Option<f64>) {
         let mut slot = self.0.lock();
@@ -150,7 +150,7 @@ impl Writer {
                 None => file::remove(&self.path),
             };
             if done.is_err() {
-                // The file has outdated contents: if in doubt, the arm is stopped.
+                // The contents of the file are outdated. Without a valid file the next agent stops the arm.
                 file::spoil(&self.path);
             }
             self.there = done.is_ok().then_some(wanted);
@@ -160,7 +160,7 @@ impl Writer {
         self.shared.changed.notify_all();
     }
 
-    /// Waits until the contents must change, and returns the new contents; `None`: the end.
+    /// Waits until the contents must change, and returns the new contents. `None`: the keeper ends.
     fn next(&self) -> Option<Wanted> {
         let mut slot = self.shared.lock();
         let mut tried = self.fails.then(|| slot.wanted.clone());
@@ -186,7 +186,7 @@ impl Writer {
         }
     }
 
-    /// Reports the first write error, and its end.
+    /// Reports the first write error, and the first success after it.
     fn report(&mut self, done: io::Result<()>) {
         let path = self.path.display().to_string();
         match &done {
@@ -255,7 +255,7 @@ mod tests {
         drop(keeper);
         let (keeper, found, _notices) = begin(dir.path());
         let Found::Left(stored) = &found else { panic!("{found:?}") };
-        // The file stays until its will was applied, however the agent ends, and keeps its time.
+        // However the agent ends, the file and its time stay unchanged until the will was applied.
         drop(keeper);
         assert_eq!(begin(dir.path()).1, found);
         let (keeper, _, _notices) = begin(dir.path());
@@ -302,7 +302,7 @@ mod tests {
         keeper.settle(None, None);
         keeper.witness().see(&moves(Policy::Continue));
         until(dir.path(), "continue", left(Policy::Continue));
-        // From now on no file can be created there, as on a full disk.
+        // From now on no file can be created there. This simulates a full disk.
         let part = file::path(dir.path(), PORT).with_extension("part");
         std::fs::create_dir(&part).expect("a folder");
         keeper.witness().see(&moves(Policy::Stop));

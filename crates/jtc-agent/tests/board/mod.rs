@@ -1,5 +1,5 @@
-//! The controller's end of a serial line, bit by bit in virtual time. The only code that it shares with the tested code is the parser of
-//! `jtc-wire`.
+//! Simulates the controller's end of a serial line, bit by bit in virtual time. The only code that it shares with the tested code is the
+//! parser of `jtc-wire`.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -19,13 +19,14 @@ pub struct Board {
     pub line: SharedLine,
     baud: f64,
     now_us: u64,
-    /// Bytes that the operating system has accepted; the next field is the time at which the first of them has been carried.
+    /// Bytes that the operating system has accepted. The next field is the time at which the line has sent the first of
+    /// them.
     queue: VecDeque<u8>,
     byte_over_us: f64,
     /// Largest number of these bytes so far.
     pub queued_most: usize,
-    /// Delays of the operating system before it accepts bytes, µs, one for each write; the next field has the bytes of the present write
-    /// and the time of their acceptance.
+    /// Delays before the operating system accepts bytes, in µs, one for each write. The next field has the bytes of the present write,
+    /// and the time at which they are accepted.
     pub held_up_us: VecDeque<u64>,
     handed_over: Option<(u64, Vec<u8>)>,
     receiver: Receiver<Vec<u8>>,
@@ -35,7 +36,7 @@ pub struct Board {
     /// Bytes of each write to the operating system, with the time.
     pub written: Vec<(Duration, Vec<u8>)>,
     pub status: Status,
-    /// Number of next bytes that arrive damaged.
+    /// Number of bytes, beginning with the next one, that arrive damaged.
     pub damaged: usize,
     /// Time before which no status is sent.
     pub deaf_until: Duration,

@@ -5,7 +5,7 @@ use jtc_host::recording::Topic;
 
 use super::protocol::{Channel, Service, Shape, Subscription};
 
-/// Number of the channel with the status as text; the other channels carry numbers.
+/// Number of the channel that carries the status as text. The other channels carry numbers.
 pub const STATUS: u32 = Topic::ALL.len() as u32 + 1;
 const STATUS_SCHEMA: &str = r#"{
   "type": "object",
@@ -78,7 +78,7 @@ struct Subscribed {
 pub struct Subscriptions(BTreeMap<u32, Subscribed>);
 
 impl Subscriptions {
-    /// Adds a subscription; the error is a message for people.
+    /// Adds a subscription. The error is a message for the user.
     pub fn add(&mut self, Subscription { id, channel_id: channel }: &Subscription) -> Result<(), String> {
         if topic(*channel).is_none() && *channel != STATUS {
             return Err(format!("subscription {id} is not taken: there is no channel {channel}"));
@@ -108,7 +108,7 @@ impl Subscriptions {
         self.0.iter_mut().filter_map(due).collect()
     }
 
-    /// Returns the subscriptions of changing data: subscription and channel.
+    /// Returns the subscription and channel numbers of all subscriptions to changing data.
     pub fn live(&self) -> Vec<(u32, u32)> {
         let live =
             self.0.iter().filter(|(_, subscribed)| topic(subscribed.channel) != Some(Topic::Description));

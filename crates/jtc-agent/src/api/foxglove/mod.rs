@@ -46,7 +46,7 @@ const PERIOD: Duration = Duration::from_millis(40);
 const QUIET: Duration = Duration::from_millis(500);
 /// Interval at which the progress of a client is checked.
 const PING_TIME: Duration = Duration::from_millis(200);
-/// Time without reading after which a client gets no data for now.
+/// Time without reading after which a client gets no new data until it reads again.
 const LATE: Duration = Duration::from_millis(400);
 /// Time without reading after which a client is disconnected.
 const GONE: Duration = Duration::from_secs(10);
@@ -85,7 +85,7 @@ struct Shared {
     wanted: Mutex<Wanted>,
     /// Notification that a message must be sent at once.
     wake: Notify,
-    /// Number of the last ping that came back.
+    /// Number of the last ping that the client has answered.
     read: AtomicU64,
 }
 
@@ -116,7 +116,7 @@ impl Shared {
 async fn serve(agent: &Agent, caller: &Caller, socket: WebSocket) {
     let shared = Shared { wanted: Mutex::default(), wake: Notify::new(), read: AtomicU64::new(0) };
     let (to, from) = socket.split();
-    // The directions do not wait for each other, so a Stop is accepted also from a client that does not read.
+    // The two directions do not wait for each other. So a Stop is accepted even from a client that does not read.
     tokio::select! {
         () = receive(agent, caller, &shared, from) => {}
         () = Sender { agent, caller, shared: &shared, to, pinged: 0, pinged_at: Instant::now() }.run() => {}
@@ -205,7 +205,7 @@ struct Sender<'a> {
     pinged_at: Instant,
 }
 
-/// Marks a client that has disconnected, or is disconnected by the agent.
+/// Error: the client has disconnected, or the agent disconnects it.
 struct Gone;
 
 impl Sender<'_> {
@@ -290,7 +290,7 @@ impl Sender<'_> {
         Ok(())
     }
 
-    /// Sends the values of a status, with its time of the line, to all subscriptions; for an old status only the text.
+    /// Sends the values of a status to all subscriptions. For an old status, sends only the text.
     async fn values(
         &mut self,
         writer: &mut MessageWriter,
@@ -347,7 +347,7 @@ impl Sender<'_> {
         }
     }
 
-    /// Sends a ping after the data: when it comes back, the client has read the data.
+    /// Sends a ping after the data. When the client answers the ping, it has read the data.
     async fn ping(&mut self) -> Result<(), Gone> {
         let back = self.shared.read.load(Ordering::Relaxed) >= self.pinged;
         if !back || self.pinged_at.elapsed() < PING_TIME {
@@ -369,7 +369,7 @@ impl Sender<'_> {
     }
 }
 
-/// Returns the time that lies `ago` in the past, ns since 1970.
+/// Returns the time `ago` before now, in ns since 1970.
 fn unix_ns(ago: Duration) -> u64 {
     u64::try_from(host_kit::unix_time().saturating_sub(ago).as_nanos()).unwrap_or(u64::MAX)
 }

@@ -2,7 +2,7 @@
 //! with a byte for their type. Numbers are little-endian.
 use std::collections::BTreeMap;
 
-/// Names of the protocol in the handshake; it has two.
+/// The two names of the protocol in the handshake.
 pub const NAMES: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 
 /// Text messages to a client.
@@ -75,7 +75,7 @@ pub enum FromClient {
     Unsubscribe {
         subscription_ids: Vec<u32>,
     },
-    /// Request for a capability that the server has not announced.
+    /// Message about a capability that the server has not announced.
     #[serde(other)]
     Other,
 }

@@ -35,7 +35,8 @@ fn files(dir: &tempfile::TempDir) -> Vec<PathBuf> {
     all
 }
 
-/// A blocked disk delays nothing and lost samples are counted; the end of a recording always finds a place.
+/// A blocked disk delays no other thread, and lost samples are counted. The queue always has a place for the end of a
+/// recording.
 #[test]
 fn what_finds_no_room_is_counted() {
     let (mut disk, messages) = Disk::new();
@@ -52,8 +53,8 @@ fn what_finds_no_room_is_counted() {
     assert_eq!(*lost, 100_005 - samples as u64);
 }
 
-/// All files together stay within the limit. A long motion continues in the next file, with no sample missing or
-/// doubled.
+/// All files together stay within the limit. A long motion continues in the next file, and no sample is missing or
+/// duplicated.
 #[test]
 fn recordings_stay_within_their_limit() {
     const LIMIT: u64 = 400_000;

@@ -1,8 +1,8 @@
-//! Ends of commands whose recording is lost or interrupted.
+//! Failures of commands whose recording is lost or interrupted.
 
 use cli_kit::{ErrorKind, Failure};
 
-/// Hint if a file cannot be written to its end.
+/// Hint if a file cannot be written completely.
 const MAKE_ROOM: &str = "make room or name another place, and run again";
 
 /// Returns the failure if measured data cannot be written: the result of the command is lost.
@@ -11,7 +11,7 @@ pub fn output_lost(failure: impl Into<Failure>) -> Failure {
     Failure::new(ErrorKind::Fault, "output-lost", message).next(MAKE_ROOM)
 }
 
-/// Returns the failure of an interrupted recording: it keeps the data written before.
+/// Returns the failure of an interrupted recording. The data that was written before is kept.
 pub fn recording_broken_off(failure: impl Into<Failure>) -> Failure {
     let message = format!("{}; the recording ends where that happened", failure.into().message);
     Failure::new(ErrorKind::Fault, "output-lost", message).next(MAKE_ROOM)

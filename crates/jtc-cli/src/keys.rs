@@ -1,4 +1,4 @@
-//! Requests by keys while an arm moves.
+//! Requests that the user makes with keys while an arm moves.
 
 use cli_kit::{Key, Keys};
 
@@ -37,7 +37,7 @@ fn strongest(keys: &[Key]) -> Option<Wish> {
     } else if pressed(&[' ']) {
         Some(Wish::PauseOrResume)
     } else {
-        // On many keyboards the same keys without Shift.
+        // On many keyboards, `=` is the key of `+` without Shift.
         let faster = pressed(&['+', '=']).then_some(Wish::Faster);
         faster.or_else(|| pressed(&['-', '_']).then_some(Wish::Slower))
     }

@@ -1,4 +1,5 @@
-//! Parameters of an arm file that a controller does not use: listed, and refused if they matter.
+//! Parameters of an arm file that a controller does not use. The command lists them, and refuses them unless the user
+//! accepts them.
 
 use cli_kit::{ErrorKind, Failure, Output, error_object};
 use host_kit::next;
@@ -7,8 +8,8 @@ use jtc_host::CheckError;
 use jtc_host::arm::{Arm, Difference};
 use serde_json::json;
 
-/// Returns the settings of `arm` that differ from the controller's, and prints each of them as a warning. Refuses them
-/// if they are not accepted.
+/// Returns the settings of `arm` that differ from the controller's, and prints each of them as a warning. Returns an
+/// error unless the user has accepted the differences.
 pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
     let differences = arm.device_differences(device);
     if !differences.is_empty() && !accepted {
@@ -27,7 +28,7 @@ pub fn refused(arm: &str, differences: &[Difference], out: &Output) -> Failure {
     listed(&Failure { message, ..Failure::of(&error) }, differences, out)
 }
 
-/// Like [`accept`], for all parameters of an arm and the arm that a controller `has` (J-55).
+/// Like [`accept`], but compares all parameters of an arm with the arm that the controller `has` (J-55).
 pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
     let differences = arm.differences(has);
     if differences.is_empty() || accepted {
@@ -50,7 +51,7 @@ fn values(count: usize) -> String {
     if count == 1 { "1 value".into() } else { format!("{count} values") }
 }
 
-/// Returns how many values differ, as text.
+/// Returns a text with the number of values that differ.
 pub fn values_differ(count: usize) -> String {
     format!("{} {}", values(count), if count == 1 { "differs" } else { "differ" })
 }
@@ -60,7 +61,7 @@ fn warned(differences: Vec<Difference>, out: &Output) -> Vec<Difference> {
     differences
 }
 
-/// Prints a failure with the differences that are its reason. Returns a failure that is already shown.
+/// Prints a failure with the differences that are its reason. The returned failure is not printed again.
 fn listed(failure: &Failure, differences: &[Difference], out: &Output) -> Failure {
     if out.is_json() {
         let error = error_object(failure);

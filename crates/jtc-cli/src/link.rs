@@ -1,4 +1,5 @@
-//! Link to the controller: the named port, or the only one found; the port itself, or the agent that owns it.
+//! Link to the controller. It uses the port that the user has given, or the only port of the computer. If an agent owns
+//! the port, the link goes through the agent.
 use cli_kit::{ErrorKind, Failure};
 use jtc_agent::access::Tokens;
 use jtc_client::agents::{Registered, is_same_port, owner_of, registered};
@@ -30,11 +31,11 @@ impl LinkArgs {
         Ok(self.open_as(policy, true)??)
     }
 
-    /// Opens the link for a Stop or a Pause, for which an agent on this computer needs no token: even an unknown token
-    /// prevents neither. The inner error is that of a serial port that no agent of this user owns.
+    /// Opens the link for a Stop or a Pause. An agent on this computer needs no token for these, and accepts them even
+    /// with an unknown token. The inner error is the error of a serial port that no agent of this user owns.
     pub fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
-            // The agent does not answer: a second attempt would only take time.
+            // The agent does not answer, so a second attempt would only take time.
             ErrorKind::NoLink => Err(error),
             _ => self.open_as(None, false).map_err(|_| error),
         })
@@ -71,8 +72,8 @@ impl LinkArgs {
         Ok(Ok(Box::new(port)))
     }
 
-    /// Returns how this program presents itself to an agent. A token is sent only to agents of this user, and if its
-    /// file was named.
+    /// Returns the name and token that this program sends to an agent. The token is sent only to agents of this user,
+    /// or if the user has given its file.
     fn options(
         &self,
         agent: Option<&Registered>,
@@ -86,7 +87,7 @@ impl LinkArgs {
         Ok(Options { name: who(), token, policy, certificates })
     }
 
-    /// Opens a session over it.
+    /// Opens a session over the link.
     pub fn session(&self) -> Result<Session<LinkPort>, Failure> {
         Ok(Session::new(self.open()?))
     }

@@ -1,4 +1,5 @@
-//! The `jtc` command: parses, calls the libraries, prints. Results go to stdout, progress and logs to stderr.
+//! The `jtc` command: parses the arguments, calls the libraries and prints the results. Results go to stdout, progress
+//! and logs to stderr.
 #![forbid(unsafe_code)]
 
 mod args;

@@ -1,4 +1,4 @@
-//! User who watches an arm move: keys, Ctrl-C, and the message at a sudden end.
+//! Interaction with the user while an arm moves: keys, Ctrl-C, and the message at a sudden end.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -13,7 +13,7 @@ use crate::keys::{HELP, HELP_WITH_SPEED, NO_SPEED, Wish, wish};
 use crate::progress::Progress;
 use cli_kit::output_file;
 
-/// Longest time for the last message: a blocked reader does not block the command.
+/// Longest time for the last message, so that a blocked reader cannot block the command.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
 /// Handles the second signal: removes empty files, reports the reason of the end, and returns the exit code.
@@ -29,7 +29,7 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
     FAULT
 }
 
-/// Speed steps of the keys on the path, in percent.
+/// Steps of the speed override that the keys select, in percent.
 const SPEEDS: [u8; 10] = [5, 10, 20, 30, 40, 50, 60, 70, 85, 100];
 
 /// Requests of the user, read at each status.
@@ -39,7 +39,7 @@ pub struct Operator<'a> {
     /// Events for programs.
     pub progress: Progress,
     stop: Stop,
-    /// Keyboard input, only while the arm moves: otherwise the terminal is unchanged.
+    /// Keyboard input. It exists only while the arm moves. At other times the terminal is unchanged.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,
@@ -78,8 +78,8 @@ impl<'a> Operator<'a> {
         })
     }
 
-    /// Returns `true` if the command must end. A Stop counts even if the motion ended before it, because no other
-    /// motion follows.
+    /// Returns `true` if the command must end. A Stop of the user ends the command even if the motion had already
+    /// ended, so that no other motion follows.
     pub fn wants_the_end(&self) -> bool {
         self.stop.asked() || self.stopping
     }
@@ -105,7 +105,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Returns the keys as shown below a bar; empty if no keys are read.
+    /// Returns the key help that is shown below a bar. Empty if no keys are read.
     pub fn keys(&self) -> &'static str {
         match (&self.keys, self.speed) {
             (None, _) => "",
@@ -156,7 +156,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Requests a step up or down.
+    /// Requests the next speed step up or down.
     fn another_speed(&mut self, wish: Wish) -> Flow {
         let Some(speed) = &mut self.speed else {
             self.out.note(NO_SPEED.replace('`', ""));

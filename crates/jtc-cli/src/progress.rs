@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 /// Page of `jtc help events`.
 pub const EVENTS_HELP: &str = include_str!("progress.md");
 
-/// Shortest period of samples and of upload events.
+/// Shortest interval between two samples, or two upload events.
 const MODEST: Duration = Duration::from_millis(200);
 
 /// States of controller and trajectory, and errors.
@@ -51,16 +51,16 @@ impl Progress {
         self.0.out.event(name, value);
     }
 
-    /// Turns all further statuses of this session into events; callers with their own observer pass statuses to
-    /// [`Progress::see`].
+    /// Turns all further statuses of this session into events. Callers with their own observer pass the statuses to
+    /// [`Progress::see`] instead.
     pub fn watch<P: Port>(&self, session: &mut Session<P>) {
         *self.0.link.borrow_mut() = json!({ "port": session.port().name(), "baud": session.port().baud() });
         let own = self.clone();
         session.observe(move |_, status| own.see(status));
     }
 
-    /// Takes a status: the first one means connected, changes of the state are reported at once, and measured values at
-    /// a limited rate while the arm moves or may be moved.
+    /// Takes a status. The first status is reported as `connected`. Changes of the state are reported at once. While
+    /// the arm moves or may be moved, measured values are reported at a limited rate.
     pub fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);
         let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": words::causes(s) });
@@ -80,7 +80,7 @@ impl Progress {
         }
     }
 
-    /// Reports the progress of an upload; `phase` names its motion.
+    /// Reports the progress of an upload. `phase` is the motion that is uploaded.
     pub fn uploading(&self, phase: &str, p: &session::Progress) {
         if due(&self.0.uploaded) || p.segments_done == p.segments {
             let fraction = if p.segments == 0 { 0.0 } else { p.segments_done as f64 / p.segments as f64 };

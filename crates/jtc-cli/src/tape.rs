@@ -15,8 +15,8 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// Begins a recording in `output`, in the format of its file ending; an earlier recording in it is discarded. A
-    /// later write error is reported at once, with `goes_on` as the consequence.
+    /// Begins a recording in `output`, in the format of its file ending. An earlier recording in the file is discarded.
+    /// A later write error is reported at once. `goes_on` is the part of the message about the consequence.
     pub fn begin(
         output: &mut OutputFile,
         info: &RecordingInfo,
@@ -32,7 +32,7 @@ impl Tape {
         match live {
             Ok(live) => Ok(Self { name: output.name(), live, on_disk }),
             Err(e) => {
-                // Without its beginning the file is useless.
+                // A file without its beginning is useless.
                 output.is_worthless();
                 Err(e.into())
             }
@@ -56,7 +56,7 @@ impl Tape {
         settle(&on_disk).map_err(|e| recording_broken_off(Failure::usage(format!("{name}: {e}"))))
     }
 
-    /// Ends the recording without completing the file, which will be started again.
+    /// Ends the recording without completing the file. The file will be started again.
     pub fn abandon(self) {
         self.live.abandon();
     }

@@ -12,7 +12,7 @@ fn phases(value: &Value) -> Vec<&str> {
     value["runs"].as_array().unwrap().iter().map(|run| run["phase"].as_str().unwrap()).collect()
 }
 
-/// A closed path begins and ends at the position of a restarted controller: the whole path is run.
+/// If a closed path begins and ends at the position of a restarted controller, the whole path is run.
 #[test]
 fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let dir = tempfile::tempdir().unwrap();
@@ -44,7 +44,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let of_first = &value["verdict"]["joints"][0];
     assert!(of_first["position_max_rad"].as_f64().unwrap() > 0.399, "{of_first}");
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
-    // The whole motion again, and its measured version.
+    // Replays the whole motion, and then its measured version.
     let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach"]).ends(0);
     assert!(
         output.err.contains("the whole trajectory that the recording holds; the run got to"),
@@ -57,7 +57,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     assert!(part["position_min_rad"].as_f64().unwrap() > -0.01, "{part}");
 }
 
-/// A recording without its trajectory ends in motion: the output names the possible next step, and this step works.
+/// If a recording without its trajectory ends in motion, the output suggests a possible next step, and this step works.
 #[test]
 fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -73,7 +73,7 @@ fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     sim.json(&["traj", "continue", &record, "--trajectory", &file], 0);
 }
 
-/// As fast as the limits allow: the measured motion runs again within the limits.
+/// A motion as fast as the limits allow was recorded. Its measured version runs again within the limits.
 #[test]
 fn a_measured_motion_at_its_limits_is_run_again() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -84,13 +84,13 @@ fn a_measured_motion_at_its_limits_is_run_again() {
     let words = ["traj", "replay", &record, "--measured", "--approach", "--record", &again];
     let value = sim.json(&words, 0);
     let executed = value["verdict"]["duration_s"].as_f64().unwrap();
-    // 2.4 s; the time of a measured end is known to a tenth of a second.
+    // The motion takes 2.4 s. The time of a measured end is known to a tenth of a second.
     assert!((2.3..8.0).contains(&executed), "{executed} s");
     let most = value["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
 }
 
-/// Also at its beginning, before it has a speed.
+/// No pose is saved during a motion, not even at its beginning, before the arm has a speed.
 #[test]
 fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -163,7 +163,8 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         let before = place(&sim);
         assert!(before[0] > 0.01, "{before:?}");
         let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-        // A recorded stop shows the final position of the arm; an unrecorded stop shows none.
+        // A recording with the stop contains the final position of the arm. A recording that ends before the stop does
+        // not.
         let stands = output.err.contains("and the arm stands there: it goes on from there");
         assert!(stands || signal == "-KILL" && output.err.contains("no later place of it"), "{}", output.err);
         let value = output.json();
@@ -172,14 +173,14 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         assert!((3.0..6.0).contains(&executed), "{executed} s of the 6 s are left");
         at(&sim, [0.0; 6]);
     }
-    // A run at another speed has other points.
+    // A trajectory at another speed has other points, so it does not match the recording.
     let half = sim.path("half.csv");
     let mut child = moving_with(&sim, &[&file, "--speed", "80", "--record", &half]);
     cli_kit::trial::signal(&child, "-INT");
     child.wait().unwrap();
     let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
     assert!(output.err.contains("at another speed"), "{}", output.err);
-    // A finished run has no remainder, and a CSV file does not hold the path.
+    // A finished run has no remainder, and a CSV file does not contain the path.
     let (other, whole, rest) =
         (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
     sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
@@ -190,12 +191,12 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     assert!(!std::path::Path::new(&rest).exists());
 }
 
-/// After an error the arm is recovered first. If it was moved meanwhile, an approach leads to the position.
+/// After an error the arm must be recovered first. If it was moved meanwhile, an approach leads to the resume point.
 #[test]
 fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     let faults =
         "format = 2\n[[fault]]\nkind = \"motor-fault\"\njoint = 3\nbits = 2\nfor_s = 0.05\nat_point = 1500\n";
-    // In real time, so that the recording knows each 40 ms of the path.
+    // The simulator runs in real time, so that the recording has a status for each 40 ms of the path.
     let sim = Sim::with_faults(&["--no-throttle"], faults).held();
     let (file, record) = (sim.file("motion.csv", &slow_motion(60)), sim.path("fault.mcap"));
     sim.jtc(&["traj", "run", &file, "--record", &record]).ends(5);
@@ -212,8 +213,8 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     at(&sim, [0.0; 6]);
 }
 
-/// After one of three runs: the remainder of the second and the third are run, also if the recording is that of
-/// a remainder, and if the controller finished the run by itself.
+/// After an interruption in the second of three runs, its remainder and the third run are executed. This also works if
+/// the recording is itself of a remainder, and if the controller has finished the run by itself.
 #[test]
 fn the_runs_that_are_left_are_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -223,7 +224,7 @@ fn the_runs_that_are_left_are_run() {
     let child = moving_after(&sim, &words, "run 1 of 3 finished", 0.7);
     cli_kit::trial::signal(&child, "-INT");
     child.wait_with_output().unwrap();
-    // Interrupted again, in the last run.
+    // Interrupts the command again, in the last run.
     let words = ["traj", "continue", &run, "--record", &rest];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
     cli_kit::trial::signal(&child, "-KILL");
@@ -231,18 +232,18 @@ fn the_runs_that_are_left_are_run() {
     std::thread::sleep(std::time::Duration::from_secs(3));
     let output = sim.jtc(&["traj", "continue", &rest]).ends(4);
     assert!(output.err.contains("nothing is left of it"), "{}", output.err);
-    // The user asked for one more run.
+    // With this option the user requests one more run.
     let value = sim.json(&["traj", "continue", &rest, "--repeat", "3"], 0);
     assert_eq!((phases(&value), &value["runs_finished"]), (vec!["motion"], &1.into()), "{value}");
-    // The first recording again, while the controller shows another motion: the remainder of its second run, and the
-    // third.
+    // Continues from the first recording again, after the controller has executed another motion. The remainder of the
+    // second run and the third run are executed.
     sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]).ends(0);
     let output = sim.jtc(&["--json", "traj", "continue", &run]).ends(0);
     assert!(output.err.contains("then the whole trajectory is run once"), "{}", output.err);
     let value = output.json();
     assert_eq!(value["runs_finished"], 2, "{value}");
     assert!((value["verdict"]["duration_s"].as_f64().unwrap() - 2.0).abs() < 1e-6, "{value}");
-    // Data that a recording does not hold is reported.
+    // If a recording lacks required data, this is reported.
     let csv = path("run.csv");
     let words = ["traj", "run", &file, "--repeat", "2", "--record", &csv];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);

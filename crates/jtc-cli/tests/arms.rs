@@ -23,7 +23,7 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     let (arm, motion_file) = (slower(dir.path()), dir.path().join("motion.csv"));
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let file = motion_file.to_str().unwrap();
-    // The controller is asked for its data; if it is silent, that error comes first.
+    // The controller is asked for its data first. If it cannot be reached, this error is reported.
     let port = ["--port", "/nowhere/tty"];
     jtc(&["params", "push", &arm, port[0], port[1]]).ends(3);
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -50,8 +50,8 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     }
 }
 
-/// Parameters that a URDF cannot give are not zero: they make no difference to the controller, and a check without them
-/// reports it.
+/// Parameters that a URDF cannot contain are unknown, not zero. They are not listed as differences to the controller,
+/// and a check without them reports this.
 #[test]
 fn j55_what_a_urdf_cannot_say_is_not_given() {
     let dir = tempfile::tempdir().unwrap();
@@ -60,7 +60,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     std::fs::write(&urdf, arm.to_urdf()).unwrap();
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let (urdf, file) = (urdf.to_str().unwrap(), motion_file.to_str().unwrap());
-    // Its limits are the controller's own: the command goes on to the port, which does not exist.
+    // The limits are equal to the controller's, so the command continues and opens the port, which does not exist.
     let output = jtc(&["params", "push", urdf, "--port", "/nowhere/tty"]).ends(3);
     assert!(!output.err.contains("rotor_inertia"), "{}", output.err);
 
@@ -72,13 +72,13 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     assert_eq!(left_out(urdf), serde_json::json!(["friction", "rotor inertia"]));
     let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
     assert_eq!(left_out(whole), serde_json::json!([]));
-    // A run uses the rotors of the controller.
+    // A run uses the rotor values of the controller.
     let sim = Sim::start(&["--no-throttle"]).held();
     let output = sim.jtc(&["traj", "run", file, "--arm", urdf]).ends(0);
     assert!(output.err.contains("without friction, which"), "{}", output.err);
 }
 
-/// J-55: a URDF has neither friction nor gains, and those of another arm are not filled in.
+/// J-55: a URDF has neither friction nor gains. They are not replaced by the values of another arm.
 #[test]
 fn j55_recover_refuses_an_arm_that_is_not_whole() {
     let dir = tempfile::tempdir().unwrap();
@@ -94,7 +94,7 @@ fn j55_recover_refuses_an_arm_that_is_not_whole() {
     jtc(&["recover", "--arm", path.to_str().unwrap(), "--defaults", "--port", "/nowhere/tty"]).ends(2);
 }
 
-/// From a description with a gripper to a usable arm file.
+/// A robot description with a gripper is imported as a usable arm file.
 #[test]
 fn an_arm_file_is_made_from_a_robot_description() {
     let dir = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     let output = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
     assert!(output.err.contains("is no robot description"), "{}", output.err);
 
-    // The text shows the changes and proposals as well, and the file passes its check with warnings.
+    // The text output also shows the changes and proposals, and the file passes its check with warnings.
     let output = jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml, "--overwrite"]).ends(0);
     for words in [
         "left out: ",
@@ -147,7 +147,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     assert!(codes.contains(&"proposed") && codes.contains(&"holding"), "{codes:?}");
 }
 
-/// J-06, J-35: the check refuses what a controller would refuse, with joint, value, limit and next step.
+/// J-06, J-35: the check refuses the same values as a controller, and reports joint, value, limit and next step.
 #[test]
 fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
     let dir = tempfile::tempdir().unwrap();
@@ -172,7 +172,7 @@ fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
         "{}",
         output.out
     );
-    // An unreadable file is a different error.
+    // An unreadable file gives another exit code.
     jtc(&["arm", "check", "nowhere.toml"]).ends(2);
     jtc(&["arm", "check", "Cargo.toml"]).ends(2);
 }
@@ -207,7 +207,7 @@ fn an_arm_is_shown_with_units_ranges_and_sources() {
     assert_eq!(one("pid.kp", 2)["value"].as_f64(), Some(8000.0));
 }
 
-/// J-71: the check refuses unstable gains, and no command gives them to a controller.
+/// J-71: the check refuses unstable gains, and no command sends them to a controller.
 #[test]
 fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     let dir = tempfile::tempdir().unwrap();
@@ -240,7 +240,8 @@ fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     sim.jtc(&["arm", "push", whole]).ends(0);
 }
 
-/// Degrees in a robot description leave no file; the unit in a header is not converted twice.
+/// A robot description in degrees is refused, and no file is written. Values with a unit in the header are not
+/// converted twice.
 #[test]
 fn degrees_are_neither_taken_for_radians_nor_turned_twice() {
     let dir = tempfile::tempdir().unwrap();

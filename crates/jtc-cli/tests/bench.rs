@@ -10,7 +10,7 @@ const WITHOUT: &str = "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\
 #[test]
 fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let sim = Sim::with_faults(&["--no-throttle"], WITHOUT);
-    // Without the setting the controller waits for the drive, or has an error.
+    // If the joint is not declared absent, the controller waits for the drive or reports an error.
     std::thread::sleep(std::time::Duration::from_secs(3));
     assert_ne!(sim.json(&["status"], 0)["state"], "HoldPos");
     let set = sim.json(&["bench", "absent", "3=30", "--deg"], 0);
@@ -35,7 +35,7 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let doctor = sim.jtc(&["doctor"]).ends(0).out;
     assert!(doctor.contains("joint 3 is set absent"), "{doctor}");
 
-    // No motion, no teaching; the other joints can be jogged, joint 3 cannot.
+    // Motions and teaching are refused. The other joints can be jogged, but joint 3 cannot.
     let file = sim.file("motion.csv", &motion(0.1));
     let refused = sim.jtc(&["traj", "run", &file]).ends(4).err;
     assert!(refused.contains("joint 3: set absent") && refused.contains("jtc bench present"), "{refused}");
@@ -47,7 +47,7 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let moved = way["to_rad"][4].as_f64().unwrap() - way["from_rad"][4].as_f64().unwrap();
     assert!(moved > 0.02, "{moved} rad");
 
-    // Joints can be set only without torque.
+    // Joints can be declared absent or present only without torque.
     let refused = sim.jtc(&["bench", "present"]).ends(1).err;
     assert!(refused.contains("jtc disable"), "{refused}");
     sim.jtc(&["disable", "--yes"]).ends(0);

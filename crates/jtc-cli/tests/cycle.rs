@@ -1,5 +1,5 @@
-//! docs/from-two-poses-to-a-cycle.md: the real program runs each of its commands against `jtc sim`. `UPDATE_DOCS=1`
-//! writes their output again.
+//! docs/from-two-poses-to-a-cycle.md: the real program runs each command of the page against `jtc sim`. `UPDATE_DOCS=1`
+//! updates the outputs in the page.
 #![cfg(target_os = "linux")]
 
 use test_kit::page::{Page, Printed, blurred};
@@ -9,11 +9,11 @@ use crate::desk::Desk;
 
 const PAGE: &str = "from-two-poses-to-a-cycle.md";
 
-/// Runs a command that must succeed and prints measured values.
+/// Runs a command that must succeed and whose output contains measured values.
 fn done(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command);
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
-    // The width of a table head depends on the figures, which are left out.
+    // The table head is left out, because its width depends on the measured figures.
     let lines = seen.text.lines().filter(|line| !line.contains("peak rad/s"));
     Printed { code: seen.code, text: lines.map(measured).collect() }
 }
@@ -25,7 +25,7 @@ fn exact(desk: &Desk, command: &str) -> Printed {
     seen
 }
 
-/// Blurs the measured figures of a line, but not the typed words.
+/// Replaces the measured figures of a line by placeholders, but not the words that the user types.
 fn measured(line: &str) -> String {
     let (typed, rest) = match line.split_once(": ") {
         Some((typed, rest)) if typed.starts_with("move to ") => (format!("{typed}: "), rest),
@@ -34,7 +34,7 @@ fn measured(line: &str) -> String {
     typed + &blurred(&without_signs(rest))
 }
 
-/// Removes the signs of numbers: a sign after a hyphen counts as part of a name.
+/// Removes the signs of numbers. A hyphen within a name is not a sign.
 fn without_signs(text: &str) -> String {
     let mut before = ' ';
     let mut out = String::new();
@@ -91,7 +91,7 @@ fn plan(desk: &Desk) {
         ("Their motion", "jtc plan cycle-waypoints.csv -o cycle.csv --blend 0.05 --report plan.html"),
         ("The check that every run makes", "jtc traj check cycle.csv"),
     ] {
-        // The poses of the first plan were measured.
+        // The output of the first plan depends on measured poses.
         let printed = if command.contains("poses.csv") { done(desk, command) } else { exact(desk, command) };
         page.case(title, command, &printed);
     }
@@ -135,7 +135,7 @@ fn runs(desk: &Desk) {
     page.finish();
 }
 
-/// In real time, so that a motion can be stopped.
+/// The simulator runs in real time, so that a motion can be stopped.
 fn broken_off() {
     let mut page = Page::new(PAGE, "continue");
     let desk = Desk::simulated(&["--no-throttle"]);

@@ -16,7 +16,7 @@ use test_kit::page::{Printed, blurred};
 
 use crate::common::{Sim, command};
 
-/// The port as the page names it.
+/// Name of the port on the page.
 const PORT: &str = "/tmp/jtc";
 
 /// Output of a command.
@@ -30,13 +30,13 @@ impl std::ops::Deref for Seen {
 }
 
 impl Seen {
-    /// Removes values that differ from run to run.
+    /// Replaces values that differ from run to run by placeholders.
     pub fn blurred(self) -> Printed {
         Printed { code: self.code, text: blurred(&self.text) }
     }
 }
 
-/// Returns the terminal's other end, and the file that a command opens.
+/// Returns the test's end of a terminal, and the name of the file that a command opens.
 fn terminal() -> (File, String, OwnedFd) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -114,7 +114,7 @@ impl Desk {
         }
     }
 
-    /// A shell with both streams in one, as on a terminal.
+    /// Returns a shell that writes both streams into one, like a terminal.
     fn shell(&self, shown: &str) -> Command {
         let jtc = command();
         let mut shell = Command::new("sh");
@@ -125,7 +125,7 @@ impl Desk {
         let programs = Path::new(env!("CARGO_BIN_EXE_jtc")).parent().unwrap();
         let path = std::env::var("PATH").unwrap_or_default();
         let real = shown.replace(PORT, &self.port());
-        // A single command replaces the shell, so that a signal reaches it.
+        // The shell runs a single command with `exec`, so that a signal reaches the command.
         let alone = !real.contains([';', '|']);
         shell
             .args(["-c", &format!("exec 2>&1\n{}{real}", if alone { "exec " } else { "" })])
@@ -149,7 +149,7 @@ impl Desk {
         self.seen(output.status.code(), &String::from_utf8_lossy(&output.stdout))
     }
 
-    /// Like [`Self::run`], for a command that moves the arm; calls `happens` once the arm moves.
+    /// Like [`Self::run`], for a command that moves the arm. Calls `happens` when the arm moves.
     pub fn moving(&self, shown: &str, happens: impl FnOnce(&Child, &Sim)) -> Seen {
         let (_person, _, slave) = terminal();
         let mut child = self.shell(shown).stdin(Stdio::from(slave)).spawn().unwrap();
@@ -168,7 +168,7 @@ impl Desk {
         }
     }
 
-    /// Opens the port, as another program does.
+    /// Opens the port like another program.
     pub fn hold_port(&self) -> jtc_host::port::SerialPort {
         jtc_host::port::SerialPort::open(&self.port(), 115_200).unwrap()
     }

@@ -30,7 +30,7 @@ fn j52_a_controller_tells_who_it_is() {
     }
     let text = sim.jtc(&["info"]).ends(0).out;
     assert!(text.contains(info["hash"].as_str().unwrap()) && text.contains("started:   once"), "{text}");
-    // The hash belongs to the arm: controller and host compute the same value.
+    // Controller and host compute the same hash for the arm.
     let sim = sim.with_parameters();
     assert_eq!(sim.json(&["info"], 0)["hash"], info["hash"]);
     let avena = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
@@ -43,7 +43,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let sim = Sim::start(&["--no-throttle"]);
     let arm = another(&sim);
     let file = sim.file("motion.csv", &motion(0.2));
-    // Before the push the controller has none of its values; gains and friction are the built-in ones.
+    // Before the push the controller has none of these values. Its gains and friction are the built-in values.
     let diff = sim.json(&["arm", "diff", &arm], 4);
     assert_eq!(names(&diff), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
 
@@ -54,7 +54,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     assert_eq!((&info["hash"], info["missing"].as_array().unwrap().len()), (&pushed["hash"], 3));
     assert_eq!(sim.json(&["arm", "diff", &arm], 0)["equal"], true);
 
-    // The defaults now mean this arm, and a run is checked for it; a run for another arm is refused.
+    // The controller's defaults are now this arm, and a run is checked with it. A run for another arm is refused.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let sim = sim.held();
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
@@ -66,7 +66,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let named = sim.jtc(&["traj", "run", &file]).ends(0).err;
     assert!(named.contains("checked for the arm of the controller, another"), "{named}");
 
-    // The pulled arm is the same.
+    // The pulled arm is equal to the pushed arm.
     let pulled = sim.path("pulled.toml");
     assert_eq!(sim.json(&["arm", "pull", "-o", &pulled], 0)["hash"], pushed["hash"]);
     assert_eq!(sim.json(&["arm", "diff", &pulled], 0)["equal"], true);
@@ -74,7 +74,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let shown = sim.json(&["arm", "show"], 0);
     assert_eq!(shown["arm"], "another");
 
-    // Its settings change only without torque.
+    // Settings of the arm can change only without torque.
     let refused = sim.jtc(&["arm", "push", avena]).ends(1);
     assert!(
         refused.err.contains("jtc disable") && refused.err.contains("nothing was changed"),
@@ -82,7 +82,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
         refused.err
     );
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
-    // Without a terminal no user can confirm that the arm may lose its torque.
+    // The command is refused without a terminal, because no user can confirm that the torque may be removed.
     sim.jtc(&["disable"]).ends(4);
     assert_eq!(sim.json(&["disable", "--yes"], 0)["status"]["state"], "Init");
     sim.jtc(&["arm", "push", avena]).ends(0);
@@ -114,7 +114,7 @@ fn j57_the_speed_of_a_motion_changes_while_it_runs() {
     let run = sim.jtc(&["--json", "traj", "run", &file]).ends(0);
     assert!(run.err.contains("speed override is 50 %"), "{}", run.err);
     let executed = run.json()["recorded_s"].as_f64().unwrap();
-    // The approach takes as long as before.
+    // The lower speed does not apply to the approach, which takes as long as before.
     assert!(executed > 1.6 * whole && executed < 2.1 * whole, "{whole} s became {executed} s");
     for wrong in ["4", "101", "nan"] {
         sim.jtc(&["traj", "speed", wrong]).ends(2);
@@ -128,12 +128,12 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     let way = sim.json(&["jog", "3", "0.2", "--duration", "1"], 0);
     let at = |value: &Value, j: usize| value[j].as_f64().unwrap();
     let moved = at(&way["to_rad"], 2) - at(&way["from_rad"], 2);
-    // A jog that a busy computer sends too late comes to rest in between.
+    // The range is wide, because the arm comes to rest if a busy computer repeats the jog too late.
     assert!((0.05..0.25).contains(&moved), "{moved}");
     assert!((at(&way["to_rad"], 0) - at(&way["from_rad"], 0)).abs() < 1e-3);
     let back = sim.json(&["jog", "3", "-10", "--deg", "--duration", "0.5"], 0);
     assert!(at(&back["to_rad"], 2) < at(&way["to_rad"], 2) - 0.05);
-    // A killed command cannot send a stop: the arm comes to rest by itself.
+    // A killed command cannot send a Stop. The controller brings the arm to rest by itself.
     let mut child = sim.command(&["jog", "1", "0.3"]).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_millis(600));
     child.kill().unwrap();
@@ -153,12 +153,12 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!(refused.err.contains("jtc recover"), "{}", refused.err);
 }
 
-/// A script that jogs is told that the arm was released meanwhile, and why.
+/// If an error releases the arm during a jog, the script that jogs is told this, with the reason.
 #[test]
 fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
     let fault =
         "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 4\nin_state = \"hold\"\nafter_s = 10\n";
-    // The drives are enabled 4 s after the arm is in HoldPos. Without the fault it would jog for a minute.
+    // The drives are enabled 4 s after the arm is in HoldPos. Without the fault the jog would take a minute.
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
     let output = sim.jtc(&["--json", "jog", "2", "0.01", "--duration", "60"]).ends(5);
     let error = &output.json()["error"];
@@ -167,7 +167,8 @@ fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() 
     assert!(error.to_string().contains("jtc recover"), "{error}");
 }
 
-/// The simulated board keeps its arm like flash: in a file, beyond the end of the simulator.
+/// The simulated board keeps its arm in a file, like a real board in flash. The file remains after the end of the
+/// simulator.
 #[test]
 fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -181,7 +182,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
         (&status["state"], status["missing_parameters"].as_array().unwrap().len()),
         (&"Init".into(), 3)
     );
-    // A held arm is not disabled without confirmation.
+    // The torque of a held arm is not removed without confirmation.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let refused = sim.jtc(&["arm", "push", &arm, "--store"]).ends(1);
     assert!(
@@ -202,7 +203,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     assert!(refused.err.contains("holds no stored arm"), "{}", refused.err);
 }
 
-/// A user's own simulated arm: its controller gets it from its memory, as a board does.
+/// The simulated controller gets a user's own arm from its memory, like a board.
 #[test]
 fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     let dir = tempfile::tempdir().unwrap();
@@ -217,7 +218,7 @@ fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     assert_eq!(sim.json(&["arm", "diff", arm], 0)["equal"], true);
 }
 
-/// Storing untried parameters must not make the controller hold the arm with them.
+/// If parameters are only stored, the controller must not begin to hold the arm with them.
 #[test]
 fn j54_an_arm_that_is_stored_is_not_held_in_between() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! `jtc firmware` with drives that are folders, and boards on pseudo-terminals. The tests of the library cover all
-//! behaviour of an ST-LINK.
+//! `jtc firmware` with drives that are folders, and boards on pseudo-terminals. The tests of the library cover the
+//! complete behaviour of an ST-LINK.
 
 #[cfg(unix)]
 mod board;
@@ -14,10 +14,10 @@ use common::{Dir, Sim, command};
 use serde_json::Value;
 
 const H745: &str = "nucleo-h745zi-q";
-/// A wrong SHA-256; the library computes the correct one of 4096 bytes.
+/// SHA-256 that does not match the image of 4096 bytes. The library computes the correct one.
 const WRONG: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// Returns an image for this board, which does nothing.
+/// Returns an image for this board. Its program does nothing.
 fn image(board: &str) -> Vec<u8> {
     let mut bytes = vec![0; 0x1000];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
@@ -30,7 +30,7 @@ fn image(board: &str) -> Vec<u8> {
     bytes[0x600] = 1;
     bytes[0xFFF] = 1;
     if board.starts_with("nucleo-h745") {
-        // The program of the second core.
+        // This part is the program of the second core.
         bytes.resize(1024 * 1024, 0xFF);
         for word in [0x3004_8000u32].into_iter().chain([0x0810_0041; 15]).chain([0xE7FD_BF30]) {
             bytes.extend(word.to_le_bytes());
@@ -106,7 +106,7 @@ fn without_a_line_a_person_answers_for_the_arm_and_nothing_is_proved() {
     let question = refused["error"]["message"].as_str().unwrap();
     assert!(question.contains("safety wires") && question.contains("cut short"), "{question}");
     nothing_written(&drive);
-    // A drive that stays mounted has not taken the image, and that is a failure.
+    // If the drive stays mounted, the board has not accepted the image, and the command fails.
     let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(5));
     assert_eq!(done["error"]["code"], "not-taken");
     assert_eq!(fs::read(Path::new(&drive).join("openjtc.bin")).unwrap(), image(H745));
@@ -206,7 +206,7 @@ mod with_a_board {
         let board = Board::new(H745, Path::new(&drive), image(H745).len());
         let words = [&["--json"], &words(&board, &drive, &new)[..], &["--yes"]].concat();
         let crc32 = format!("{:08x}", program_of(&image(H745)).crc32);
-        // The second time the board already runs the image; it is unknown whether it is the board with this drive.
+        // The second time, a board already runs the image. It is not known if this is the board with the drive.
         for _ in 0..2 {
             let done = json(&jtc(&dir, &words).ends(0));
             assert_eq!((&done["written"], &done["proved"]), (&true.into(), &true.into()), "{done}");
@@ -217,7 +217,7 @@ mod with_a_board {
         }
         let verified = jtc(&dir, &["--json", "firmware", "verify", "--image", &new, "--port", &board.port]);
         assert_eq!(json(&verified.ends(0))["proved"], true);
-        // Without proof, too, when the drive has come back.
+        // With `--no-read-back`, the command ends without verification when the drive has come back.
         let done = json(&jtc(&dir, &[&words[..], &["--no-read-back"]].concat()).ends(0));
         assert_eq!((&done["proved"], &done["drive_after"]), (&false.into(), &"came_back".into()), "{done}");
     }
@@ -252,7 +252,7 @@ mod with_a_board {
             },
             "meanwhile the board reports something else",
         );
-        // The drive is unmounted, and the folder stays; another drive is mounted.
+        // The drive is unmounted and its folder stays. Then another drive is mounted there.
         let page = Path::new(&drive).join("MBED.HTM");
         answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is there");
         fs::remove_file(page).unwrap();

@@ -1,4 +1,4 @@
-//! A held stop (J-69) at each front end of `jtc`: each shows it with joint, value, limit, age and next step.
+//! Each front end of `jtc` shows a held stop (J-69) with joint, value, limit, age and next step.
 #![cfg(target_os = "linux")]
 
 use std::io::{BufRead as _, BufReader};
@@ -14,10 +14,10 @@ use test_kit::patience::Patience;
 use crate::common::agent::{command_in, serve};
 use crate::common::{Sim, jtc};
 
-/// Time after which every joint has settled since the enable.
+/// Time after the enable until every joint has settled.
 const SETTLES: Duration = Duration::from_secs(8);
 
-/// 30 % of the 40 N·m of joint 5 count as a push.
+/// External torque that is reported as a push: 30 % of the 40 N·m of joint 5.
 const LIMIT: f64 = 12.0;
 
 fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {
@@ -30,8 +30,8 @@ fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {
     }
 }
 
-/// Pushes joint 5, harder than its friction holds, until `ask` finds a held stop. The joints must have settled since
-/// they were enabled.
+/// Pushes joint 5 with more torque than its friction can hold, until `ask` finds a held stop. The joints must have
+/// settled since they were enabled.
 fn pushed(sim: &mut Sim, mut ask: impl FnMut() -> Option<Value>) -> Value {
     std::thread::sleep(SETTLES);
     let mut looks = 0;
@@ -149,8 +149,8 @@ fn j69_the_agent_asks_for_the_cause_and_shows_it() {
     agent.wait().expect("it ends");
 }
 
-/// The command that gives gains to an arm under torque ends when they have held it, or with the reason why the
-/// controller rejected them.
+/// The command that sends gains to an arm under torque ends when the gains have held the arm. If the controller rejects
+/// them, the command reports the reason.
 #[test]
 fn j71_params_push_waits_for_the_trial_of_its_gains() {
     let mut sim = Sim::start(&["--no-throttle"]).held();

@@ -13,8 +13,8 @@ use serde_json::Value;
 type Vec3 = [f64; 3];
 
 impl Dir {
-    /// Returns the output for a plan of this text, and the flange poses at ten times in each interval of the written
-    /// trajectory, as the controller interpolates.
+    /// Returns the output for a plan of this text, and ten flange poses in each interval of the written trajectory. The
+    /// poses are interpolated like in the controller.
     fn plan(&self, text: &str, options: &[&str]) -> (Value, Vec<(f64, Pose)>) {
         let name = if text.starts_with('[') { "waypoints.json" } else { "waypoints.csv" };
         let (file, out) = (self.file(name, text), self.path("out.csv"));
@@ -60,7 +60,7 @@ fn norm(a: Vec3) -> f64 {
     a.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
-/// Distance of `p` from the straight leg between `a` and `b`.
+/// Returns the distance of `p` from the straight leg between `a` and `b`.
 fn off_leg(p: Vec3, a: Vec3, b: Vec3) -> f64 {
     let (leg, way) = (sub(b, a), sub(p, a));
     let dot: f64 = (0..3).map(|i| leg[i] * way[i]).sum();
@@ -87,7 +87,8 @@ fn a_line_is_straight_and_a_leg_in_joint_space_says_that_it_is_not() {
     let mm: f64 = note.split_once("by up to ").unwrap().1.split_once(" mm").unwrap().0.parse().unwrap();
     assert!((1e3 * furthest(&all) - mm).abs() < 0.5 && mm > 50.0, "{note}: {}", furthest(&all));
     assert!(note.contains("between waypoints 1 and 2") && note.contains("`--line`"), "{note}");
-    // By the option, by the column, and in JSON; at any speed, with and without jumps of the acceleration.
+    // A line can be requested by the option, by the column, and in JSON. It is planned at any speed, with and without
+    // jumps of the acceleration.
     let column = TWO.replace("qw", "qw,leg").replace("0.3,0.4,0,0,0,1\n", "0.3,0.4,0,0,0,1,line\n");
     let json = r#"[{"x":0.6,"y":-0.3,"z":0.4,"qx":0,"qy":0,"qz":0,"qw":1},
         {"x":0.6,"y":0.3,"z":0.4,"qx":0,"qy":0,"qz":0,"qw":1,"leg":"line"}]"#;
@@ -138,12 +139,12 @@ fn corners_are_sharp_stops_or_rounded_within_the_blend() {
         }
         durations.push(printed["duration_s"].as_f64().unwrap());
     }
-    // No blend is slower than stops.
+    // A motion with blends is never slower than one that stops at the waypoints.
     assert!(durations[1] <= durations[0] && durations[2] < durations[1], "{durations:?}");
 }
 
-/// A quarter of a circle about the base's upright axis; the orientation of the point on the arc is ignored, and may be
-/// missing.
+/// A quarter of a circle about the base's upright axis; the orientation of the point on the arc is ignored and may be
+/// omitted.
 #[test]
 fn an_arc_is_round() {
     let dir = Dir::new();
@@ -173,7 +174,7 @@ fn an_arc_is_round() {
     }
 }
 
-/// Named poses and joint positions as ends, sections in joint space between lines, and times.
+/// The ends can be named poses and joint positions. Sections in joint space between lines, and times, are possible.
 #[test]
 fn waypoints_of_any_kind_may_be_ends_of_lines() {
     let dir = Dir::new();
@@ -198,7 +199,7 @@ fn waypoints_of_any_kind_may_be_ends_of_lines() {
     let early = text.replace("\n5,", "\n0.2,");
     let refused = dir.refused(&early, &["--arm", &arm], 4);
     assert!(refused.contains("line 4: waypoint 3: 0.200 s after waypoint 1 is too early"), "{refused}");
-    // Another configuration with an equal pose.
+    // Another joint configuration with the same flange pose.
     let other = robots_other(&q);
     let cells = other.map(|v| v.to_string()).join(",");
     let refused =
@@ -206,7 +207,7 @@ fn waypoints_of_any_kind_may_be_ends_of_lines() {
     assert!(refused.contains("line 5: waypoint 4: the line ends there with joint "), "{refused}");
 }
 
-/// Other joint positions with the same pose of the flange.
+/// Returns other joint positions with the same flange pose.
 fn robots_other(q: &[f64; 6]) -> [f64; 6] {
     use jtc_host::plan::kinematics::Kinematics;
     let all =
@@ -243,11 +244,11 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
     // Three collinear points are not an arc.
     let refused = dir.refused(&legs(&["", "via", "arc"]), &[], 4);
     assert!(refused.contains("line 4: waypoint 3: the arc's three points are on no circle"), "{refused}");
-    // The end is out of reach, or the middle of a line between ends in reach.
+    // First the end is out of reach. Then both ends are in reach, but the middle of the line is not.
     let far = "x,y,z,qx,qy,qz,qw\n0.6,0,0.4,0,0,0,1\n0.6,0.2,0.4,0,0,0,1\n2.6,0,0.4,0,0,0,1\n";
     let refused = dir.refused(far, &["--line"], 4);
     assert!(refused.contains("line 4: waypoint 3: out of reach"), "{refused}");
-    // Through a singular pose: the error names the joints and the place.
+    // The line leads through a singular pose. The error reports the joints and the place.
     let through = "q1,q2,q3,q4,q5,q6\n0.3,-0.2,1.2,0.4,0.3,0.2\n0.5,-0.1,1.1,0.4,-0.3,0.2\n";
     let refused = dir.refused(through, &["--line"], 4);
     let place = refused.split_once("line 3: leg 1 (to waypoint 2), ").map(|(_, rest)| rest);

@@ -1,4 +1,4 @@
-//! The flight recorder as a user reads it (J-56): after a fault, while the arm moves, and again from the file.
+//! A user reads the flight recorder (J-56) after a fault, while the arm moves, and again from the file.
 
 use crate::common;
 
@@ -9,12 +9,12 @@ use serde_json::Value;
 const SILENT: &str =
     "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_point = 700\nfor_s = 0.5\n";
 
-/// Returns a controller after this fault.
+/// Returns a controller in which this fault has occurred.
 fn after_fault() -> Sim {
     let sim = Sim::with_faults(&["--no-throttle"], SILENT).held();
     let file = sim.file("motion.csv", &slow_motion(30));
     sim.jtc(&["traj", "run", &file, "--approach"]).ends(5);
-    // Events after the fault are in the log, too.
+    // The log also contains events after the fault.
     std::thread::sleep(std::time::Duration::from_millis(500));
     sim
 }
@@ -98,7 +98,7 @@ fn j56_a_log_without_a_fault_holds_the_motion_that_was() {
     assert!(count(&fetched, "replayed") > 2_000, "{fetched}");
     let words = fetched["events"].to_string();
     assert!(words.contains("trajectory Finish"), "{words}");
-    // The log has not stopped, and continues.
+    // The log has not stopped, and continues to record.
     assert_eq!(fetched["state"], "recording");
 }
 

@@ -20,10 +20,10 @@ fn arm(sim: &Sim) -> String {
     sim.file("arm.toml", include_str!("../../../arms/avena.toml"))
 }
 
-/// A move and an approach without a named speed are slow, and the speed is printed.
+/// Without a given speed, a move and an approach are slow, and the speed is printed.
 #[test]
 fn j52_a_move_without_a_speed_is_slow() {
-    // In real time, which a run reports.
+    // The simulator runs in real time, because a run reports its duration.
     let sim = Sim::start(&["--no-throttle"]).held();
     let default = "at 25 % of the limits; --speed sets it";
     let to = |words: &[&str]| {
@@ -49,7 +49,7 @@ fn j52_a_move_without_a_speed_is_slow() {
     assert!(!approach(&["--speed", "100"]).contains("of the limits"));
 }
 
-/// J-55: the controller's arm, its limits and its payload decide about the whole run before an approach begins.
+/// J-55: before an approach begins, the whole run is checked with the controller's arm, limits and payload.
 #[test]
 fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let sim = Sim::start(&FAST);
@@ -61,7 +61,7 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let motion = format!("{folder}/motion.csv");
     let elsewhere = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
     let refused = |sim: &Sim, kind: &str| {
-        // At a low speed, because the real arm does not carry the payload that was set.
+        // The speed is low, because the simulated arm does not carry the payload that was set.
         sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "20"]).ends(0);
         let refused = sim.json(&["traj", "run", &motion, "--approach"], 4);
         let kinds: Vec<_> =
@@ -78,7 +78,7 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     loaded.jtc(&["traj", "run", &motion, "--approach", "--speed", "100"]).ends(0);
 }
 
-/// To a pose of the flange in joint space, and from there on a straight line; impossible moves are refused before the
+/// Moves to a flange pose in joint space, and from there on a straight line. Impossible moves are refused before the
 /// arm moves.
 #[test]
 fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
@@ -105,7 +105,7 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
     let there = flange(&place(&sim));
     assert!((there.position[1] - 0.2).abs() < 3e-3, "{there:?}");
     assert!((there.rotation[1][0] - 10f64.to_radians().sin()).abs() < 5e-3, "{there:?}");
-    // Positions commanded during the move.
+    // Reads the positions that were commanded during the move.
     let text = std::fs::read_to_string(&record).unwrap();
     let mut lines = text.lines().skip_while(|line| !line.contains("set_position_rad"));
     let head: Vec<&str> = lines.next().expect("a header").split(',').collect();
@@ -116,7 +116,7 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
         let cells: Vec<&str> = line.split(',').collect();
         let q: Vec<f64> = columns.iter().filter_map(|i| cells[*i].parse().ok()).collect();
         let [x, y, z] = if q.len() == 6 { flange(&q).position } else { continue };
-        // The previous position of the arm is known as it was measured.
+        // The tolerance is wide, because the previous position of the arm was measured.
         assert!((x - 0.6).abs() < 3e-3 && (z - 0.4).abs() < 3e-3, "{x} {y} {z}");
         passed += usize::from(y.abs() < 0.1);
     }
@@ -154,7 +154,8 @@ fn an_arm_moves_between_positions_and_the_poses_that_were_saved() {
     at(&sim, [10f64.to_radians(), 0.0, 0.0, 0.0, 0.0, (-20f64).to_radians()]);
     let list = jtc(&["--json", "pose", "list", "--arm", &arm]).ends(0).json();
     assert_eq!(list["poses_rad"].as_object().unwrap().len(), 2);
-    // An existing pose is overwritten only on request; after a removal the file is as before, except for its end.
+    // An existing pose is overwritten only on request. After a pose is removed, the file is as before, except for its
+    // end.
     let refused = sim.jtc(&["pose", "save", "up", "--arm", &arm]).ends(4);
     assert!(refused.err.contains("pose \"up\" is there already"), "{}", refused.err);
     sim.jtc(&["pose", "save", "up", "--arm", &arm, "--overwrite"]).ends(0);
@@ -199,7 +200,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
     let output = jtc(&["pose", "remove", "hone", "--arm", &arm]).ends(2);
     assert!(output.err.contains("is \"home\" meant?"), "{}", output.err);
     at(&sim, [0.0; 6]);
-    // Like `traj run`: only from HoldPos.
+    // Like `traj run`, a move begins only in HoldPos.
     let sim = Sim::start(&FAST);
     let all_are_there = || sim.json(&["status"], 0)["missing_nodes"].as_array().unwrap().is_empty();
     assert!((0..100).any(|_| all_are_there()), "the drives are brought up");
@@ -228,8 +229,8 @@ fn waypoints_are_run_several_times() {
         }
     }
     assert!(std::fs::metadata(&page).unwrap().len() > 1000);
-    // The recording holds all runs in sequence, even from a simulator whose time runs ahead of ours, and the
-    // trajectory.
+    // The recording contains the trajectory and all runs in sequence, even if the time of the simulator runs ahead of
+    // the computer's.
     let recording = Recording::read(std::path::Path::new(&record)).unwrap();
     let points: Vec<u32> = recording.samples.iter().filter(|s| s.is_operating()).map(|s| s.point).collect();
     assert_eq!(points.windows(2).filter(|pair| pair[1] < pair[0]).count(), 2, "{points:?}");
@@ -240,7 +241,7 @@ fn waypoints_are_run_several_times() {
     assert_eq!(again["outcome"], "finished");
 }
 
-/// The example of lines is planned as it says, and run.
+/// The example with lines is planned as its text says, and runs.
 #[test]
 fn the_example_of_lines_is_run() {
     let sim = ready();
@@ -275,7 +276,8 @@ fn an_open_path_is_repeated_with_approaches() {
     at(&sim, [0.4, 0.1, -0.2, 0.0, 0.3, 0.0]);
 }
 
-/// A small arm with the UR5's proportions, as a description: imported, simulated, and moved through waypoints.
+/// A robot description of a small arm with the proportions of a UR5 is imported, simulated, and moved through
+/// waypoints.
 #[test]
 fn another_arm_is_led_through_waypoints() {
     let dir = tempfile::tempdir().unwrap();
@@ -302,7 +304,7 @@ fn another_arm_is_led_through_waypoints() {
     }
 }
 
-/// Origins, axes, masses and limits of a UR5, with bodies as rods.
+/// Returns a description with the origins, axes, masses and limits of a UR5. Its bodies are rods.
 fn ur5() -> String {
     let half = std::f64::consts::FRAC_PI_2;
     let joints = [
@@ -331,7 +333,7 @@ fn ur5() -> String {
     text + "</robot>"
 }
 
-/// J-33: a move is stopped on its path like a run, and the arm rests.
+/// J-33: a move is stopped on its path like a run, and the arm comes to rest.
 #[test]
 fn j33_a_move_is_stopped_on_its_path() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -345,11 +347,12 @@ fn j33_a_move_is_stopped_on_its_path() {
     assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()));
     let here = place(&sim);
     assert!((0.02..1.4).contains(&here[0]), "{here:?}");
-    // On its path the other joints rest.
+    // On the path of this move the other joints stay at rest.
     assert!(here[1..].iter().all(|q| q.abs() < 3e-3), "{here:?}");
 }
 
-/// J-55: an arm file that is not the controller's arm moves no joint; without one the controller's own limits apply.
+/// J-55: with an arm file that differs from the controller's arm, no joint moves. Without an arm file, the controller's
+/// own limits apply.
 #[test]
 fn j55_a_move_for_another_arm_is_refused() {
     let sim = ready();
@@ -367,7 +370,7 @@ fn j55_a_move_for_another_arm_is_refused() {
     at(&sim, [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// A hand leads the arm; its motion becomes waypoints that are planned, or is run again as measured.
+/// A hand leads the arm. The motion is turned into waypoints and planned, or is replayed as measured.
 #[test]
 fn a_motion_by_hand_is_waypoints_or_run_again() {
     let dir = tempfile::tempdir().unwrap();
@@ -383,7 +386,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     let planned = jtc(&["--json", "plan", &taught, "-o", &out, "--blend", "0.02"]).ends(0).json();
     assert_eq!(planned["waypoints"].as_u64(), Some(count));
     sim.jtc(&["traj", "run", &out, "--approach"]).ends(0);
-    // The replay moves as the hand did: there and back, 0.3 rad.
+    // The replay moves like the hand: 0.3 rad and back.
     let replay = ["traj", "replay", &recording, "--measured", "--approach"];
     let mut patience = Patience::begin();
     let output = loop {
@@ -403,7 +406,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     }
 }
 
-/// Returns a motion of joint 1, which gravity does not turn, there and back in 3 s.
+/// Returns a motion of joint 1 in 3 s, forward and back. Gravity has no torque about joint 1.
 fn lead() -> String {
     let row = |i: i32| {
         let q = 0.15 - 0.15 * (std::f64::consts::TAU * f64::from(i) / 300.0).cos();

@@ -7,7 +7,7 @@ use common::{jtc, jtc_with, motion};
 #[test]
 fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["traj", "rum", "x"]).ends(2);
-    // Nodes must be named, and a bit mask is not accepted: the port is not even opened.
+    // The nodes must be given, and a bit mask is refused. The port is not even opened.
     jtc(&["reset", "--port", "/nowhere/tty"]).ends(2);
     let output = jtc(&["reset", "3", "--port", "/nowhere/tty"]).ends(2);
     assert!(output.err.contains("--joints 3") && output.err.contains("--joints 1,2"), "{}", output.err);
@@ -20,7 +20,7 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
 }
 
-/// Wrong usage gives a JSON answer, too, if JSON was requested before the command, after it, or by its variable.
+/// Wrong usage also gives a JSON answer, if JSON was requested before the command, after it, or by its variable.
 #[test]
 fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     for words in
@@ -46,12 +46,12 @@ fn the_port_may_stand_before_the_command() {
         let output = jtc(words).ends(3);
         assert!(output.err.contains("/nowhere/tty"), "{}", output.err);
     }
-    // The nearer option counts.
+    // The option that is closer to the command is used.
     let output = jtc(&["--port", "/far/tty", "status", "--port", "/near/tty"]).ends(3);
     assert!(output.err.contains("/near/tty"), "{}", output.err);
 }
 
-/// The joint bus is CAN FD: a transport that cannot carry it is refused, and a suitable one is named.
+/// The joint bus is CAN FD. A transport without CAN FD is refused, and the error suggests a suitable one.
 #[cfg(unix)]
 #[test]
 fn a_bus_that_cannot_carry_the_joints_is_refused() {
@@ -86,7 +86,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     let output = jtc(&["--json", "traj", "check", file]).ends(4);
     let problems = output.json()["verdict"]["problems"].clone();
     assert!(problems[0]["joint"].is_u64() && problems[0]["limit"].is_f64(), "{problems}");
-    // The next command can be typed.
+    // The suggested command can be typed as it is printed.
     let spaced = dir.path().join("my motion.csv");
     std::fs::write(&spaced, motion(0.3)).unwrap();
     let spaced = spaced.to_str().unwrap();
@@ -94,7 +94,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     assert!(output.out.contains(&format!("next: jtc traj run '{spaced}' --speed 50")), "{}", output.out);
     let output = jtc(&["traj", "check", file]).ends(4);
     assert!(output.out.contains(&format!("jtc traj check {file} --speed ")), "{}", output.out);
-    // Refused before any file or port is opened: the port does not even exist.
+    // The run is refused before any file or port is opened. The port does not even exist.
     let output = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
     assert_eq!(output.json()["outcome"], "refused");
     let output = jtc(&["--json", "traj", "info", file]).ends(0);
@@ -138,7 +138,7 @@ fn decode_knows_frames_of_both_directions() {
     let output = jtc_with(&["--json", "decode"], "9B0B0007 03 7D9E").ends(0);
     assert_eq!(output.json()["frame"], "TrajSetExecStatus");
     assert_eq!(output.json()["type"], 0x0B);
-    // Noise before and after costs no frame.
+    // No frame is lost because of noise before and after it.
     let output = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
     assert!(output.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", output.out);
     // Bit 2 of the mask is joint 3.
@@ -165,7 +165,7 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
     assert!(output.err.contains("uses itself"), "{}", output.err);
     run(&["--record", &path("no/where.mcap")]).ends(2);
     run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--overwrite"]).ends(4);
-    // Overwriting is allowed, but the port is missing: the old file is unchanged, and an empty file is not left.
+    // Overwriting is allowed, but the port does not exist. The old file stays unchanged, and no empty file is left.
     run(&["--record", &old, "--report", &path("new.html"), "--overwrite"]).ends(3);
     assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
     assert!(!std::path::Path::new(&path("new.html")).exists());
@@ -208,7 +208,8 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
     }
-    // Neither a second demo nor a report overwrites existing files without the option; a refused command runs nothing.
+    // Neither a second demo nor a report overwrites existing files without the option; a refused command runs no
+    // simulation.
     std::fs::write(out.join("picture.svg"), "precious").unwrap();
     let output = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
     assert!(
@@ -231,7 +232,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     }
 }
 
-/// A result that cannot be printed is a failure; a reader that has disconnected is not.
+/// If the result cannot be printed, the command fails. A reader that has closed its end is not a failure.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
@@ -251,7 +252,7 @@ fn a_result_that_cannot_be_printed_is_an_error() {
     }
 }
 
-/// Each example is written, and the command that it names accepts it.
+/// Each example is written, and is accepted by the command that the example suggests.
 #[test]
 fn examples_are_files_that_the_named_commands_take() {
     let dir = tempfile::tempdir().unwrap();
@@ -277,7 +278,7 @@ fn examples_are_files_that_the_named_commands_take() {
             }
             _ => drop(jtc(&["traj", "check", file]).ends(0)),
         }
-        // The file may have been changed since.
+        // The file is not overwritten, because the user may have changed it.
         jtc(&["example", name, "-o", to]).ends(4);
         jtc(&["example", name, "-o", to, "--overwrite"]).ends(0);
     }
@@ -300,7 +301,7 @@ fn help_knows_pages_and_commands() {
     assert!(output.err.contains("traj") && output.err.contains("files"), "{}", output.err);
 }
 
-/// A German spreadsheet, and degrees.
+/// The decimal commas of a German spreadsheet are reported as an error, and a file in degrees is read.
 #[test]
 fn decimal_commas_are_named_and_degrees_are_read() {
     let dir = tempfile::tempdir().unwrap();

@@ -24,7 +24,7 @@ fn terminal() -> (File, OwnedFd) {
     (File::from(master), slave)
 }
 
-/// Reads the output of a command until these words have come.
+/// Reads the output of a command until it contains these words.
 fn until(err: &mut impl BufRead, words: &str) {
     let (mut line, mut all) = (String::new(), String::new());
     while !line.contains(words) {
@@ -34,7 +34,7 @@ fn until(err: &mut impl BufRead, words: &str) {
     }
 }
 
-/// A command in real time, with a user at its terminal.
+/// A command with a user at its terminal. The simulator runs in real time.
 struct Session {
     sim: Sim,
     child: Child,
@@ -60,7 +60,7 @@ impl Session {
         session
     }
 
-    /// Starts a run that is just about to move.
+    /// Starts a run, and waits until the arm is just about to move.
     fn run() -> Self {
         let sim = Sim::start(&["--no-throttle"]).with_parameters();
         let (file, record) = (sim.path("motion.csv"), sim.path("run.csv"));
@@ -68,7 +68,7 @@ impl Session {
         Self::start(sim, &["traj", "run", &file, "--record", &record], "space pauses")
     }
 
-    /// Starts a recording of a taught arm.
+    /// Starts a recording of an arm in teaching.
     fn teaching() -> Self {
         let sim = Sim::start(&["--no-throttle"]).held();
         let file = sim.path("taught.csv");
@@ -130,13 +130,13 @@ fn stands(sim: &Sim) {
     }
 }
 
-/// J-33: after any end of the command by a user or a system, the arm is first stopped on its path.
+/// J-33: whenever the user or the system ends the command, the arm is first stopped on its path.
 #[test]
 fn j33_every_signal_stops_on_the_path_and_then_ends() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let mut run = Session::run();
         if signal == "-HUP" {
-            // The terminal is closed: the output has no reader.
+            // The terminal is closed, so the output has no reader.
             run.err = None;
         }
         run.signal(signal);
@@ -167,17 +167,17 @@ fn j33_keys_pause_resume_and_stop() {
     stands(&sim);
 }
 
-/// A second Ctrl-C ends the command at once, reports the possible state, and restores the terminal.
+/// After a second Ctrl-C the command reports the possible state of the arm, restores the terminal and ends at once.
 #[test]
 fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     let mut run = Session::run();
     run.signal("-INT");
     run.until("stopping on the path");
-    // Signals within 0.1 s count as one.
+    // Signals within 0.1 s are treated as one, so the test waits longer.
     std::thread::sleep(std::time::Duration::from_millis(150));
     run.signal("-INT");
     let Ended { code, value, err, sim } = run.end();
-    // On a slow computer the first one may already have completed.
+    // On a slow computer, the command may already have ended after the first signal.
     let at_once = value["error"]["code"] == "ended-at-once";
     assert!(code == 5 && (at_once || value["outcome"] == "stopped"), "{code} {value}");
     let words = err.contains("MAY BE MOVING") || err.contains("moves nothing any more");
@@ -187,8 +187,8 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     sim.jtc(&["traj", "stop"]);
 }
 
-/// Teaching: a terminal and a wrapper may both send a signal, which counts as one; a second press ends the command with
-/// a message about the controller.
+/// Teaching: if both a terminal and a wrapper send a signal, the two are treated as one. A second press ends the
+/// command with a message about the controller.
 #[test]
 fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching() {
     for close in [true, false] {
@@ -205,13 +205,13 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
             assert!(!close && code == 5, "{code} {value}");
             assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
         } else {
-            // The first one took effect before the second came: the arm was not moved, and is held again.
+            // The first signal took effect before the second one came. The arm was not moved, and is held again.
             assert_eq!((code, state.as_str()), (2, Some("HoldPos")), "{value}");
         }
     }
 }
 
-/// Interrupts a command at a simulated controller at these words on its stderr; returns its exit code and answer.
+/// Interrupts a command when these words are on its stderr. Returns its exit code and answer.
 fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) {
     let mut child = sim
         .command(&[&["--json"], words].concat())
@@ -223,7 +223,7 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     let mut err = BufReader::new(child.stderr.take().unwrap());
     until(&mut err, at);
     cli_kit::trial::signal(&child, "-INT");
-    // No reader is left: a full pipe must not block the command either.
+    // The test reads the remaining output, so that a full pipe does not block the command.
     let mut out = String::new();
     child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
     let code = child.wait().unwrap().code().unwrap_or(-1);
@@ -236,7 +236,7 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     let sim = Sim::start(&[]);
     let file = sim.file("motion.csv", &slow_motion(200));
     let run = ["traj", "run", &file];
-    // Parameters first: the drives need some seconds from here.
+    // The parameters are set first. From then on the drives need some seconds.
     sim.jtc(&["params", "use-defaults"]).ends(0);
     let waits = [("waiting until", "wait for the drives"), ("uploading", "upload")];
     for (at, during) in waits {
@@ -253,7 +253,7 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     }
 }
 
-/// Ctrl-C while a jog waits for the drives: no jog was sent, which differs from a jog by 0.
+/// Ctrl-C while a jog waits for the drives: the command reports that no jog was sent. This differs from a jog by 0.
 #[test]
 fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     let sim = Sim::start(&[]);
@@ -272,7 +272,7 @@ fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     assert!(message.contains("during the wait for the drives"), "{value}");
 }
 
-/// Ctrl-C on the approach stops there, and the motion does not begin.
+/// Ctrl-C during the approach stops the arm on its path, and the motion does not begin.
 #[test]
 fn j33_an_interrupt_on_the_approach_stops_on_it() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -302,24 +302,25 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
     assert!(status["joints"][0]["position_rad"].as_f64().unwrap() < 0.7, "{status}");
 }
 
-/// Ctrl-C in the waits of recover: the command sends no more, but stops a motion; and its output in each state.
+/// Ctrl-C in the waits of `recover`: the command sends no further requests, but stops a motion. Also tests its output
+/// in each state.
 #[test]
 fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     let cancelled = |sim: &Sim, words: &[&str], at: &str| {
         let (code, value) = interrupted(sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
     };
-    // After a start the command waits for the drives, and one does not come.
+    // After a start of the controller, the command waits for the drives, and one is never enabled.
     let fault = "format = 2\n[[fault]]\nkind = \"ignores-state\"\njoint = 1\nat_s = 0\n";
     cancelled(
         &Sim::with_faults(&["--no-throttle"], fault),
         &["recover", "--defaults"],
         "waiting for joint 1",
     );
-    // The emergency stop is pressed while the arm is taught, after `teach on` has seen Teaching.
+    // The emergency stop is pressed during teaching, after `teach on` has received a status with Teaching.
     let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 5\n";
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
-    // In motion, without any program that supervises it.
+    // The arm is in motion, and no program follows it.
     let file = sim.file("motion.csv", &slow_motion(600));
     let (_person, slave) = terminal();
     let mut run = sim

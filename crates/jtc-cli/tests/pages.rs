@@ -1,5 +1,5 @@
-//! The commands of README.md and of the pages of docs/ are typed as written, against `jtc sim`, and print the shown
-//! output.
+//! The commands of README.md and of the pages of docs/ are run as written, against `jtc sim`, and must print the output
+//! on the page.
 #![cfg(target_os = "linux")]
 
 #[test]

@@ -17,8 +17,9 @@ fn mass(value: &Value) -> f64 {
     value["mass_kg"].as_f64().unwrap()
 }
 
-/// Returns the magnitude of the torque that the control law adds to the model at joint 2 (N·m): before the model of the
-/// held arm changed by more than 2 N·m, and at the end of a recording of the simulator.
+/// Returns two magnitudes of the torque that the control law adds to the model at joint 2 (N·m), from a recording of
+/// the simulator. The first is taken before the model torque of the held arm changes by more than 2 N·m, the second at
+/// the end.
 fn missing(recording: &str) -> (f64, f64) {
     let mut lines = recording.lines().filter(|line| !line.starts_with('#'));
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -38,7 +39,7 @@ fn missing(recording: &str) -> (f64, f64) {
     ((rows[changed - 300][2] - rows[changed - 300][1]).abs(), (last[2] - last[1]).abs())
 }
 
-/// The integral holds 3 kg that the controller does not know; the model holds them once they are set.
+/// The integral part holds 3 kg that the controller does not know. When the payload is set, the model holds them.
 #[test]
 fn j60_a_payload_that_is_given_is_carried() {
     let dir = tempfile::tempdir().unwrap();
@@ -61,7 +62,7 @@ fn j60_a_payload_that_is_given_is_carried() {
     assert!(before > 8.0 && after < 0.5 * before, "{before} N·m became {after} N·m");
 }
 
-/// A refusal names the joint and its torque, and changes no setting.
+/// A refusal reports the joint and its torque, and no setting changes.
 #[test]
 fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
@@ -93,12 +94,12 @@ fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
         let refused = set(words, 2);
         assert!(refused.contains(what), "{words:?}: {refused}");
     }
-    // Without a port no search starts.
+    // The payload is invalid, so the command does not even search for a port.
     let none = jtc(&["payload", "set", "--mass", "-2", "--com", "0,0,0", "--port", "/nowhere/tty"]).ends(2);
     assert!(none.err.contains("nothing was sent"), "{}", none.err);
 }
 
-/// A path that the arm cannot run with its payload is refused before any frame is sent.
+/// A path that the arm cannot follow with its payload is refused before any frame is sent.
 #[test]
 fn j60_a_run_is_checked_with_the_payload() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
@@ -123,8 +124,8 @@ fn j60_a_run_is_checked_with_the_payload() {
     sim.json(&["traj", "run", &far, "--approach"], 0);
 }
 
-/// The remainder of a paused motion is checked with a new payload; an unknown motion is not checked, and that is
-/// reported.
+/// The remainder of a paused motion is checked with a new payload. An unknown motion is not checked, and the command
+/// reports this.
 #[cfg(unix)]
 #[test]
 fn j60_a_paused_motion_goes_on_with_another_payload_only_if_it_can() {

@@ -22,7 +22,7 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
     );
     lines
         .map(|line| {
-            // 17 significant digits: one before the point and 16 after it.
+            // Values have 17 significant digits: one before the point and 16 after it.
             for cell in line.split(',').skip(1) {
                 let digits = cell.trim_start_matches('-').split_once('e').expect("an exponent").0;
                 assert_eq!(digits.len(), 18, "{cell}");
@@ -32,7 +32,7 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// `--deg` converts the blend as well as the positions, and a waypoint that a rounded corner misses is named.
+/// `--deg` converts the blend as well as the positions. A waypoint that a rounded corner misses is reported.
 #[test]
 fn a_blend_is_in_the_unit_of_the_positions() {
     let dir = Dir::new();
@@ -56,7 +56,7 @@ fn a_blend_is_in_the_unit_of_the_positions() {
 }
 
 /// `plan` keeps the margin and prints it, and both `plan` and `traj check` warn below 10 %. A margin out of range is
-/// refused, and the range is named.
+/// refused, and the error contains the range.
 #[test]
 fn a_plan_leaves_the_margin_that_is_asked_for() {
     let dir = Dir::new();
@@ -97,8 +97,8 @@ fn a_plan_leaves_the_margin_that_is_asked_for() {
     }
 }
 
-/// The trajectory passes the check of a run, rests at its ends, passes the waypoints as the blend allows, and is at
-/// least as fast without a limit; the output matches the file.
+/// The trajectory passes the check of a run, is at rest at its ends, and passes the waypoints within the blend
+/// distance. Without a speed limit it is at least as fast. The output matches the file.
 #[test]
 fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     let dir = Dir::new();
@@ -132,7 +132,7 @@ fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
             let q: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
             let away = |row: &Vec<f64>| (0..6).map(|j| (row[1 + j] - q[j]).abs()).fold(0.0, f64::max);
             let nearest = rows.iter().map(away).fold(f64::INFINITY, f64::min);
-            // Between two points at 1.5 rad/s and 10 ms the distance is at most 7.5 mrad.
+            // At 1.5 rad/s and 10 ms per point, the nearest point is at most 7.5 mrad away from the waypoint.
             assert!(nearest <= blend + 8e-3, "{name}: {nearest} rad from {line}");
         }
         for end in [&rows[0], rows.last().unwrap()] {
@@ -171,7 +171,7 @@ fn the_forms_of_waypoints_are_the_same_motion() {
     assert!(durations.iter().all(|d| (d - durations[0]).abs() < 1e-9), "{durations:?}");
 }
 
-/// Times of the file are kept to the millisecond; without a time the motion is as fast as possible.
+/// Times of the file are kept exactly to the millisecond. Without a time the motion is as fast as possible.
 #[test]
 fn given_times_are_kept() {
     let dir = Dir::new();
@@ -241,10 +241,10 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         assert!(output.err.contains(message), "{words:?}: {}", output.err);
         assert!(!dir.has("out.csv"), "{words:?} leaves an output");
     }
-    // Suggestions, in the hint.
+    // The hint contains suggestions.
     let output = jtc(&["plan", &pose, "--arm", &arm, "-o", &out]).ends(2);
     assert!(output.err.contains("is \"above-table\" meant?"), "{}", output.err);
-    // Outputs that exist, or are the input.
+    // An output file that exists, or that is the input, is refused.
     jtc(&["plan", &good, "-o", &out]).ends(0);
     let output = jtc(&["plan", &good, "-o", &out]).ends(4);
     assert!(
@@ -256,7 +256,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     jtc(&["plan", &good, "-o", &good, "--overwrite"]).ends(4);
 }
 
-/// Many waypoints are a normal motion; a motion that no trajectory can carry is refused.
+/// Many waypoints are a normal motion; a motion that does not fit in a trajectory is refused.
 #[test]
 fn ten_thousand_waypoints_are_planned_or_too_long() {
     let dir = Dir::new();
@@ -290,7 +290,7 @@ fn the_report_names_what_binds_when() {
     assert!(text.contains(&format!("\"plan\":[{bound}")), "{bound}");
     assert!(text.contains("What binds for how long") && text.contains("[\"joint 6\","));
     assert!(!text.contains("src=\"http") && text.contains("set_position_rad"));
-    // The page already exists: no file is written.
+    // The page already exists, so no file is written.
     let other = dir.path("other.csv");
     jtc(&["plan", &file, "-o", &other, "--report", &page]).ends(4);
     assert!(!dir.has("other.csv"));

@@ -1,4 +1,5 @@
-//! Recordings of a run, of the simulator and of the demo after a killed program, a full disk and a second run.
+//! Recordings of a run, of the simulator and of the demo: after the program was killed, with a full disk, and after a
+//! second run.
 #![cfg(unix)]
 
 use crate::common;
@@ -16,14 +17,14 @@ fn json(words: &[&str]) -> serde_json::Value {
     jtc(&[&["--json"], words].concat()).ends(0).json()
 }
 
-/// Each millisecond of a motion over the serial port: readable while the simulator runs, after `kill -9`, and run
-/// again.
+/// The simulator records each millisecond of a motion that is commanded over the serial port. The recording can be read
+/// while the simulator runs and after `kill -9`, and the motion can be run again.
 #[test]
 fn the_simulator_records_each_millisecond() {
     for name in ["sim.mcap", "sim.csv"] {
         let dir = tempfile::tempdir().unwrap();
         let record = dir.path().join(name).to_str().unwrap().to_owned();
-        // In real time, or the file would grow by many megabytes a second.
+        // The simulator runs in real time. Otherwise the file would grow by many megabytes per second.
         let sim = ready(&["--no-throttle", "--record", &record]);
         let file = sim.file("motion.csv", &motion(0.2));
         sim.jtc(&["traj", "run", &file]).ends(0);
@@ -64,7 +65,7 @@ fn a_simulator_that_is_ended_completes_its_recording() {
     assert!(!info["notes"].to_string().contains("completed"), "{info}");
 }
 
-/// A recorder that is killed during a motion keeps all but the last moments of it.
+/// If the recorder is killed during a motion, the recording lacks only the last moments.
 #[test]
 fn a_run_that_is_killed_leaves_its_recording() {
     for name in ["run.mcap", "run.csv"] {
@@ -83,7 +84,7 @@ fn a_run_that_is_killed_leaves_its_recording() {
         run.wait().unwrap();
         let info = json(&["traj", "info", &record]);
         let seen = info["duration_s"].as_f64().unwrap();
-        // An MCAP file holds the whole trajectory, 6 s at 20 %, even if only a part of it was run.
+        // An MCAP file contains the whole trajectory, 6 s at 20 %, even if only a part of it was run.
         assert!(
             if name == "run.mcap" { (seen - 30.0).abs() < 0.1 } else { (1.0..30.0).contains(&seen) },
             "{info}"
@@ -132,7 +133,7 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
     std::fs::write(&file, motion(0.2)).unwrap();
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
-    // The reader takes only the header.
+    // The reader reads only the header.
     let reader = std::thread::spawn({
         let pipe = pipe.clone();
         move || {
@@ -149,6 +150,6 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
         (Some("finished"), Some("output-lost"))
     );
     assert!(output.err.contains("nothing more is recorded, the motion goes on"), "{}", output.err);
-    // The other output is not affected.
+    // The other output file is not affected.
     assert_eq!(value["files"], serde_json::json!([page]));
 }

@@ -90,7 +90,7 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
     run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
 }
 
-/// The journal of the system, or a file, can be read by others, and is kept.
+/// The token is not printed into a log file, because other users may read the journal of the system or a file.
 #[test]
 fn the_operators_token_is_printed_on_a_terminal_alone() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -104,7 +104,7 @@ fn the_operators_token_is_printed_on_a_terminal_alone() {
         "--token-file",
         tokens.to_str().expect("a name"),
     ];
-    // The first start creates the token, the second one is asked for the link.
+    // The first start creates the token. The second start is asked for the link.
     for begun in 0..2 {
         let mut command = command_in(&dir);
         let mut child =
@@ -163,7 +163,7 @@ fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     ]
 }
 
-/// Both simulators take an arm in the same way: the controller has stored it, and an arm that it could not have stored
+/// Both simulators use a given arm in the same way: the controller has it stored. An arm that a controller cannot store
 /// is refused.
 #[test]
 fn an_arm_is_simulated_as_by_jtc_sim() {
@@ -185,7 +185,7 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
     }
 }
 
-/// Modbus has no tokens: it is off by default, and refuses other computers unless their addresses are named.
+/// Modbus has no tokens. It is off by default, and refuses other computers unless their addresses are allowed.
 #[test]
 fn modbus_is_there_for_those_who_are_named() {
     let dir = tempfile::tempdir().expect("a directory");

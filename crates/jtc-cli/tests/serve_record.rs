@@ -1,4 +1,4 @@
-//! `jtc serve --record`: a recording of each motion, for all clients.
+//! `jtc serve --record`: the agent records each motion of any client.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,7 @@ use jtc_host::recording::Recording;
 use serde_json::Value;
 use test_kit::patience::{Patience, until};
 
-/// Starts a recording agent of a simulated controller.
+/// Starts an agent that records the motions of a simulated controller.
 fn recording() -> Agent {
     recording_in(tempfile::tempdir().expect("a directory"))
 }
@@ -53,7 +53,7 @@ fn read(path: &Path) -> Recording {
     Recording::read(path).expect("a recording")
 }
 
-/// Checks that `jtc report` makes its page of the recording.
+/// Checks that `jtc report` can make a page from the recording.
 fn is_reported(dir: &tempfile::TempDir, path: &Path) -> Value {
     let words = ["--json", "report", path.to_str().expect("a name"), "--overwrite"];
     run(command_in(dir), &words, "").ends(0).json()
@@ -78,7 +78,8 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
     assert_eq!((&info.description, &info.device), (&info_of_run.description, &info_of_run.device));
     assert!(!info.commanded_by.is_empty() && info_of_run.commanded_by.is_empty(), "{}", info.commanded_by);
     assert!(info.device.is_some() && info.hash.is_some() && info.start_unix_ns > 0);
-    // Both have the same commanded values at a point; the agent has all samples of the run, and those before it.
+    // Both recordings have the same commanded values at a point. The agent's recording has all samples of the run, and
+    // samples from before it.
     let at = |recording: &Recording, point: u32| {
         let found = recording.samples.iter().find(|s| s.is_operating() && s.point == point);
         found.map(|s| {
@@ -94,7 +95,7 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
     assert!(of_agent.samples.is_sorted_by(|a, b| a.time_s <= b.time_s));
     let report = is_reported(&agent.dir, &file);
     assert!(report["joints"][0]["rms_error_mrad"].is_number() && report["failure"].is_null(), "{report}");
-    // A jog and teaching, too.
+    // A jog and teaching are also recorded.
     agent.jtc(&["jog", "1", "0.1", "--duration", "1"]).ends(0);
     agent.jtc(&["teach", "on"]).ends(0);
     agent.jtc(&["teach", "off"]).ends(0);
@@ -148,7 +149,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
     assert!(String::from_utf8_lossy(&second.stderr).contains("another agent"), "{second:?}");
 }
 
-/// The arm in a recording is that of the controller, even after a new arm was given.
+/// The arm in a recording is the controller's arm, even after a new arm was sent to the controller.
 #[test]
 fn the_arm_in_a_recording_is_that_of_the_controller() {
     let agent = recording();

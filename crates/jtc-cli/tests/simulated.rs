@@ -41,7 +41,7 @@ fn a_port_that_is_served_is_not_taken_over() {
     );
     assert_eq!(std::fs::read_link(&sim.port).unwrap(), to);
     sim.jtc(&["status"]).ends(0);
-    // A terminal of another program got the number of a killed simulator's terminal.
+    // The terminal of another program now has the number of a killed simulator's terminal.
     let shell =
         rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR | rustix::pty::OpenptFlags::NOCTTY).unwrap();
     rustix::pty::grantpt(&shell).unwrap();
@@ -59,7 +59,7 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(status["joints"].as_array().unwrap().len(), 6);
     assert!(status["missing_parameters"].as_array().unwrap().len() == 3, "{status}");
 
-    // No motion can run yet, and the output names the next step.
+    // No motion can run yet, and the output suggests the next step.
     let file = sim.file("motion.csv", &motion(0.25));
     let output = sim.jtc(&["--json", "traj", "run", &file]).ends(1);
     assert!(output.json()["error"]["hint"].as_str().unwrap().contains("params"), "{}", output.out);
@@ -104,7 +104,7 @@ fn from_power_up_to_a_recorded_motion() {
     let output = sim.jtc(&["traj", "resume"]).ends(4);
     assert!(output.err.contains("trajectory Stop") && output.err.contains("jtc traj run"), "{}", output.err);
     sim.jtc(&["traj", "pause"]).ends(1);
-    // Held: a reset needs a confirmation, and in teaching no joint is reset at all.
+    // While the arm is held, a reset needs a confirmation. In teaching no joint is reset at all.
     let output = sim.jtc(&["reset", "--joints", "2"]).ends(4);
     assert!(output.err.contains("joint 2") && output.err.contains("--yes"), "{}", output.err);
     sim.jtc(&["gripper", "on"]).ends(0);
@@ -119,7 +119,7 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(output.json()["reset"], serde_json::json!(["joint 2"]));
 }
 
-/// A stream whose reader has disconnected ends, and that is not an error.
+/// A stream ends without an error when its reader has closed it.
 #[test]
 fn monitor_ends_with_its_reader() {
     use std::io::BufRead;
@@ -131,7 +131,7 @@ fn monitor_ends_with_its_reader() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
-/// J-55: defaults only on request.
+/// J-55: the defaults are used only on request.
 #[test]
 fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -176,15 +176,15 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     let output = sim.jtc(&["--json", "traj", "run", &file, "--record", &record, "--report", &page]).ends(5);
     let value = output.json();
     assert_eq!(value["outcome"], "fault");
-    // The first failure leads, with its joint and the values around it.
+    // The first failure is reported first, with its joint and the values around it.
     assert_eq!(value["failure"]["joint"], 3, "{}", value["failure"]);
     assert!(value["failure"]["causes"][0].as_str().unwrap().starts_with("joint 3: "), "{}", value["failure"]);
-    // The fault is at 500 ms; statuses come every 40 ms, and after it their times are arrival times.
+    // The fault occurs at 500 ms. Statuses come every 40 ms, and after the fault their times are arrival times.
     let at_ms = value["failure"]["at_ms"].as_f64().unwrap();
     assert!((440.0..700.0).contains(&at_ms), "{}", value["failure"]);
     let text = std::fs::read_to_string(&page).unwrap();
     assert!(text.contains("<title>FAILED: ") && text.contains("ms into the run: joint 3: "));
-    // From the recording, too.
+    // The report from the recording shows the same failure.
     let again = sim.path("again.html");
     let output = jtc(&["report", &record, "--out", &again]).ends(0);
     assert!(
@@ -197,7 +197,8 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     assert_eq!(output.json()["status"]["state"], "HoldPos", "{}", output.out);
 }
 
-/// A fault on the approach is recorded and reported like any other, and named.
+/// A fault during the approach is recorded and reported like any other. The report says that it occurred in the
+/// approach.
 #[test]
 fn a_fault_on_the_approach_is_recorded_and_named() {
     let sim = Sim::with_faults(&["--speed", "max"], &FAULT.replace("at_point = 500", "at_point = 200"))
@@ -261,7 +262,8 @@ fn typed_events_happen_and_mistakes_are_named() {
 #[test]
 fn the_arm_can_be_taught_by_hand() {
     let mut sim = Sim::start(&["--speed", "max"]).with_parameters();
-    // To 0.3 rad in 2 s. Joint 1 turns about the vertical: when released, it stays.
+    // Moves to 0.3 rad in 2 s. Joint 1 rotates about the vertical axis, so it stays at its position when it is
+    // released.
     let rows = (0..=200).map(|i| {
         let q = 0.15 - 0.15 * (std::f64::consts::PI * f64::from(i) / 200.0).cos();
         format!("{:.2},{q},0,0,0,0,0\n", f64::from(i) * 0.01)
@@ -317,14 +319,15 @@ fn the_examples_run_in_the_simulator() {
     let output = sim.jtc(&["traj", "run", motion]).ends(5);
     assert!(output.err.contains("joint 2"), "{}", output.err);
     let point = output.err.split("point ").nth(1).and_then(|t| t.split(|c: char| !c.is_ascii_digit()).next());
-    // The last status is from up to 40 ms before.
+    // The last status before the fault is up to 40 ms old.
     assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", output.err);
 }
 
-/// A recording runs again, and is the same motion.
+/// The motion of a recording can run again, and is the same motion.
 #[test]
 fn a_recording_is_looked_at_checked_and_run_again() {
-    // In real time: at full speed, a loaded computer sees too few places of the motion to lead back to its start.
+    // The simulator runs in real time. At full speed, a loaded computer receives too few positions of the motion for
+    // the way back to its start.
     let sim = Sim::start(&["--no-throttle"]).held();
     jtc(&["example", "motion", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
     let motion = sim.path("motion.csv");
@@ -343,7 +346,7 @@ fn a_recording_is_looked_at_checked_and_run_again() {
 /// A host whose frame comes byte by byte does not delay the arm: statuses continue meanwhile.
 #[test]
 fn time_goes_on_while_a_frame_arrives() {
-    // In real time a status comes every 25 ms, so at least 12; one tick per piece would give 6.
+    // One tick per byte would give too few statuses.
     for (options, least) in [(&["--no-throttle"][..], 8), (&["--speed", "max", "--no-throttle"], 50)] {
         let sim = Sim::start(options);
         let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&sim.port).unwrap();
@@ -355,8 +358,8 @@ fn time_goes_on_while_a_frame_arrives() {
                 && send.send(count).is_ok()
             {}
         });
-        // The start of a trajectory segment of 1000 bytes again and again: even after a gap that ended a frame, a new
-        // one is in progress.
+        // The start of a trajectory segment of 1000 bytes is sent repeatedly. So even after a gap that ends a frame, a
+        // new frame is incomplete.
         let start = [0x9B, 0x0A, 0x03, 0xE8];
         port.write_all(&start).unwrap();
         std::thread::sleep(std::time::Duration::from_millis(1));
@@ -372,7 +375,8 @@ fn time_goes_on_while_a_frame_arrives() {
     }
 }
 
-/// The support carries the arm until its drives are enabled, and after an error; the first line names it.
+/// The support carries the arm until its drives are enabled, and after an error. The first line of the output mentions
+/// the support.
 #[test]
 fn the_support_of_the_arm_is_chosen() {
     for (options, note, falls_first, falls_later) in [
@@ -381,14 +385,14 @@ fn the_support_of_the_arm_is_chosen() {
         (&["--support", "stand"], "note: a stand carries the simulated arm until", false, true),
         (&["--support", "none"], "note: nothing carries the simulated arm", true, true),
     ] {
-        // Upright, its friction would hold it.
+        // The payload is needed, because friction alone would hold the upright arm.
         let options = [&["--speed", "max", "--payload", "3,0.2,0.2,0.2"], options].concat();
         let error = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"hold\"\nafter_s = 8\n";
         let mut sim = Sim::with_faults(&options, error);
         let line = sim.error_line();
         assert!(line.starts_with(note), "{options:?}: {line}");
         let sim = sim.with_parameters();
-        // Largest observed position of each joint, before the drives are enabled and after the error.
+        // Largest position of any joint, before the drives are enabled and after the error.
         let (mut first, mut later) = (0.0f64, 0.0f64);
         for _ in 0..600 {
             let status = sim.json(&["status"], 0);
@@ -412,7 +416,8 @@ fn the_support_of_the_arm_is_chosen() {
     }
 }
 
-/// Elastic gears, and drives that trip at their own speed: at 0.05 rad/s an ordinary motion trips them.
+/// Simulates elastic gears, and drives with their own speed limit. With a limit of 0.05 rad/s, the drives trip during
+/// an ordinary motion.
 #[test]
 fn gears_and_drives_of_the_simulated_arm_are_chosen() {
     let sim = Sim::start(&["--speed", "max", "--gear-stiffness", "20000"]).held();

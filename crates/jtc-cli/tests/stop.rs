@@ -1,5 +1,5 @@
-//! `jtc stop` from a second terminal: the arm stops in every phase of the program that has the port, and that program
-//! moves it no more.
+//! `jtc stop` from a second terminal: the arm stops whatever the program that has the port is doing, and that program
+//! does not move the arm again.
 #![cfg(unix)]
 
 use crate::common;
@@ -34,7 +34,7 @@ impl Cell {
         run(self.command(words), &[], "")
     }
 
-    /// Starts a command, and waits for a matching line of its stderr.
+    /// Starts a command, and waits until a line of its stderr matches `fits`.
     fn start(&self, words: &[&str], fits: impl Fn(&str) -> bool) -> Child {
         Self::started(self.command(&[&["--json"], words].concat()), words, fits)
     }
@@ -51,8 +51,8 @@ impl Cell {
         child
     }
 
-    /// Like `start`; the line is an event of a motion that has run for `seconds` of its path, after a line with this
-    /// text.
+    /// Like `start`, but waits first for a line with this text, and then for an event of a motion that has run for
+    /// `seconds` of its path.
     fn moving(&self, words: &[&str], text: &str, seconds: f64) -> Child {
         let behind = std::cell::Cell::new(text.is_empty());
         self.start(words, |line| {
@@ -62,8 +62,8 @@ impl Cell {
         })
     }
 
-    /// Stops the arm; the stopped program is this one, and it ends with exit code 5. Returns its JSON, and that of the
-    /// Stop.
+    /// Stops the arm. Checks that the Stop has stopped this program, and that the program ends with exit code 5.
+    /// Returns the JSON of the program and of the Stop.
     fn stops(&self, child: Child) -> (Value, Value) {
         let stopped = self.jtc(&["--json", "stop"]).ends(0).json();
         let pid = child.id();
@@ -106,7 +106,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     );
     let holder = &stopped["arms"][0]["holder"]["program"];
     assert_eq!(holder, "jtc traj run", "{stopped}");
-    // As text, under another name of the port, by another command with the same effect.
+    // The same with text output, with another name of the port, and with another command that has the same effect.
     let child = cell.moving(&["run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     let real = std::fs::canonicalize(&cell.0.port).unwrap();
     let mut other = command();
@@ -114,7 +114,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm stands; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
-    // The message names what the program may still do.
+    // The message tells what the program may still do.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
@@ -145,7 +145,7 @@ fn a_move_is_stopped() {
     assert_eq!(ended["outcome"], "stopped", "{ended}");
 }
 
-/// On a line as slow as a real one: the upload takes many seconds, and has no effect.
+/// On a line that is as slow as a real line, the upload takes many seconds. After the Stop it has no effect.
 #[test]
 fn an_upload_does_not_go_on_after_a_stop() {
     let cell = Cell(Sim::start(&[]).held());
@@ -165,7 +165,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
         );
         cell.stands();
     }
-    // A new command is a new request.
+    // A new command is a new request, so it may move the arm.
     let short = cell.0.file("short.csv", &motion(0.1));
     cell.jtc(&["traj", "run", &short]).ends(0);
 }
@@ -174,7 +174,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
 fn a_jog_is_stopped_and_does_not_start_again() {
     let cell = Cell::held();
     let before = place(&cell.0)[0];
-    // The program does not report its start.
+    // The program does not report when its upload starts, so the test tries several times.
     let (child, stopped) = (1..6)
         .map(|seconds| {
             let mut jog = cell.command(&["jog", "1", "0.2"]);
@@ -202,7 +202,7 @@ fn teaching_is_ended_and_the_arm_is_held() {
     assert!(stopped.out.contains("stopped: the arm stands; jtc teach record"), "{}", stopped.out);
     ends(child, 5);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
-    // A direct Stop ends teaching, too.
+    // A direct Stop also ends teaching.
     cell.jtc(&["teach", "on"]).ends(0);
     cell.jtc(&["stop"]).ends(0);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
@@ -215,7 +215,7 @@ fn a_pause_reaches_the_program_too() {
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let paused = cell.jtc(&["traj", "pause"]).ends(0);
     assert!(paused.out.contains("pausing on the path; jtc traj run"), "{}", paused.out);
-    // Once the arm is at rest no motion is executed any more.
+    // After the arm has come to rest, no motion is executed any more.
     let mut tries = (0..100).map(|_| cell.jtc(&["traj", "pause"]));
     let refused = tries.find(|again| again.code != 0).expect("the arm comes to rest").ends(1);
     assert!(refused.err.contains("trajectory Pause"), "{}", refused.err);
@@ -224,7 +224,8 @@ fn a_pause_reaches_the_program_too() {
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
-/// As in Python: the program has the port for longer than one motion, and may be busy otherwise while the arm moves.
+/// Like a Python program, the program has the port for longer than one motion, and may be busy with other work while
+/// the arm moves.
 #[test]
 fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let cell = Cell::held();
@@ -237,7 +238,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let checked = CheckedTrajectory::check(&loaded.trajectory, &arm, &status.positions(), &options).unwrap();
     session.upload(&checked, |_| Flow::Continue).unwrap();
     session.execute(&checked).unwrap();
-    // The program no longer reads.
+    // Meanwhile the program does not read.
     std::thread::sleep(Duration::from_millis(1500));
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!(stopped["arms"][0]["moved"], true, "{stopped}");
@@ -246,14 +247,14 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     assert!(!status.is_executing());
     let halted =
         |error: Error| matches!(error, Error::Link(LinkError::Port(PortError::Halted { by: Some(_) })));
-    // The next requests of the same program were made before the Stop, or too soon after it.
+    // The next requests of the same program are refused, because they were made before the Stop or too soon after it.
     assert!(session.execute(&checked).is_err_and(halted));
     assert!(session.upload(&checked, |_| Flow::Continue).is_err_and(halted));
     session.ask_to_move().unwrap();
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     assert!(session.teach(true).is_err_and(halted));
     session.jog(&[0.0; 6]).unwrap();
-    // Three seconds later a new request is accepted.
+    // A new request three seconds later is accepted.
     std::thread::sleep(Duration::from_millis(3100));
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     session.ask_to_move().unwrap();
@@ -270,7 +271,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
         assert_eq!(direct.out.trim_end(), words);
         let value = cell.jtc(&["--json", "traj", "stop"]).ends(0).json();
         assert_eq!((&value["command"], &value["arms"][0]["moved"]), (&"stop".into(), &false.into()));
-        // Through a program that only watches.
+        // The Stop goes through a program that only watches.
         let mut monitor = cell.command(&["--json", "monitor"]).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         let mut out = BufReader::new(monitor.stdout.take().unwrap());
@@ -298,7 +299,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
 }
 
-/// A Stop cannot hold an arm without brakes and torque: while the arm falls, the Stop fails.
+/// A Stop cannot hold an arm that has neither brakes nor torque. While the arm falls, the Stop fails.
 #[test]
 fn an_arm_that_falls_without_torque_does_not_stand() {
     let stops = |cell: &Cell, state: &str| {
@@ -343,7 +344,7 @@ fn the_socket_of_a_program_that_was_killed_is_passed_over() {
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!((&stopped["arms"][0]["moved"], &stopped["arms"][0]["holder"]), (&true.into(), &Value::Null));
     cell.stands();
-    // And the next program listens there.
+    // The next program listens at the same socket.
     let child = cell.moving(&["traj", "run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     cell.stops(child);
 }
@@ -398,7 +399,7 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     cell.stands();
 }
 
-/// Without a port, a Stop goes to the arms whose ports are open in programs of this user.
+/// Without a given port, a Stop goes to all arms whose ports are open in programs of this user.
 #[test]
 fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     let cell = Cell::held();
@@ -411,7 +412,7 @@ fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
-/// Two arms whose programs share a folder for sockets; the output of `jtc stop` without a port.
+/// Two moving arms whose programs share a folder for sockets.
 struct Two(Cell, Child, Cell, Child);
 
 impl Two {
@@ -437,7 +438,7 @@ impl Two {
     }
 }
 
-/// The controller continues the motion of a killed program: the remaining socket names the arm.
+/// The controller continues the motion of a killed program. The socket that the program has left identifies the arm.
 #[test]
 fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     let mut two = Two::moving();
@@ -453,7 +454,7 @@ fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     other.stands();
 }
 
-/// A hanging program delays no other arm's Stop, and one JSON object reports all arms.
+/// A hanging program does not delay the Stop of another arm. One JSON object reports all arms.
 #[test]
 fn a_program_that_hangs_delays_no_other_stop() {
     let two = Two::moving();

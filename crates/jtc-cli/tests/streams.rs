@@ -52,7 +52,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert!(places.is_sorted(), "{places:?} {}", output.err);
     let full = events.iter().rfind(|e| name(e) == "uploading").unwrap();
     assert_eq!((full["fraction"].as_f64(), &full["phase"]), (Some(1.0), &Value::from("motion")));
-    // 2.4 s of motion: more than one sample, but not one per status.
+    // A motion of 2.4 s gives more than one sample, but not one sample per status.
     let samples: Vec<&Value> = events.iter().filter(|e| name(e) == "sample").collect();
     assert!((3..=20).contains(&samples.len()), "{}", samples.len());
     assert_eq!(samples[0]["position_rad"].as_array().unwrap().len(), 6);
@@ -88,7 +88,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert_eq!(result["outcome"], "refused");
 }
 
-/// A failure in motion is reported at once, the first cause first.
+/// A failure during a motion is reported at once. The first cause is reported first.
 #[test]
 fn what_breaks_in_motion_is_reported_at_once() {
     let fault =
@@ -124,7 +124,7 @@ fn j33_a_reader_that_does_not_read_holds_no_run() {
     let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // Capacity of a pipe.
+    // Fills the pipe to its capacity.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();

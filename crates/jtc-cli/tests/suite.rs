@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, to link only once: each file here is a module of it.
+//! All tests of the crate in one program, with each file as a module. So only one program must be linked.
 mod again;
 mod arms;
 mod bench;

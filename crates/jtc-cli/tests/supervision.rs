@@ -1,5 +1,5 @@
-//! Host supervision (J-59) as in docs/arm.md: motions of `jtc` run to their end, and a motion whose program was killed
-//! is paused.
+//! Host supervision (J-59) as described in docs/arm.md: motions of `jtc` run to their end, and if the program is
+//! killed, the motion is paused.
 #![cfg(unix)]
 
 use crate::common;
@@ -7,7 +7,7 @@ use crate::common;
 use common::{Sim, agent::Agent, moving_while};
 use test_kit::patience::Patience;
 
-/// Returns an arm that is held by a controller with host supervision.
+/// Returns an arm that a controller with host supervision holds.
 fn supervised(host_timeout_ms: u32) -> Sim {
     let sim = Sim::start(&[]);
     let arm = include_str!("../../../arms/avena.toml");
@@ -22,7 +22,7 @@ const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n8,0.4,0,0,0,0,0\n";
 
 #[test]
 fn j59_a_motion_longer_than_the_timeout_comes_to_its_end() {
-    // Longest wait of a program for its turn on a busy computer.
+    // The timeout allows for the longest time that a program may wait on a busy computer.
     let sim = supervised(4000);
     let file = sim.file("motion.csv", MOTION);
     assert_eq!(sim.json(&["traj", "run", &file], 0)["outcome"], "finished");
@@ -50,7 +50,7 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     }
 }
 
-/// The previous agent has read the timeout, the new one has not: it reads the timeout before it forwards requests.
+/// Only the previous agent knows the timeout. A new agent reads it before it forwards requests.
 #[test]
 fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let sim = supervised(3000);
@@ -61,7 +61,7 @@ fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let agent = Agent::start(&["--port", sim.port.to_str().unwrap()]);
     let mut patience = Patience::begin();
     loop {
-        // Each command sends a frame, if the agent passes it on.
+        // Each command sends a frame, if the agent forwards it.
         agent.jtc(&["info"]);
         let status = agent.jtc(&["--json", "status"]).ends(0).json();
         if status["trajectory"] == "Pause" {

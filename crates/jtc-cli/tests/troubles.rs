@@ -1,5 +1,5 @@
 //! The part of docs/troubles.md about `jtc`: the real program runs each case, mostly against `jtc sim`. `UPDATE_DOCS=1`
-//! writes it again.
+//! updates it.
 #![cfg(target_os = "linux")]
 
 mod files;
@@ -137,7 +137,7 @@ fn moving(page: &mut Page) {
     let pushed = ready(&["--speed", "max", "--faults", fault.to_str().unwrap()]);
     pushed.run(run);
     let mut doctor = pushed.run("jtc doctor").blurred();
-    // The simulated time runs at full speed: the age may be seconds or hours.
+    // The simulated time runs at full speed, so the age may be seconds or hours.
     for unit in ["s", "min", "h", "days"] {
         doctor.text = doctor.text.replace(&format!("… {unit} ago"), "… s ago");
     }

@@ -1,5 +1,5 @@
-//! Environment variables: no variable moves, resets, programs, answers a question or overrides a check; variables in
-//! effect are shown.
+//! Environment variables: no variable can cause a motion, a reset or flashing, answer a question, or override a check.
+//! Variables in effect are shown.
 #![cfg(target_os = "linux")]
 
 use crate::common;
@@ -14,8 +14,9 @@ fn with((name, value): (&str, &str), words: &[&str]) -> CommandOutput {
     run(command, words, "")
 }
 
-/// A variable that changed a motion or a result is refused before a port is opened (that would be exit code 3): without
-/// it the arm would move elsewhere, faster or longer.
+/// In older versions some variables changed a motion or a result. Such a variable is refused before a port is opened
+/// (which would give exit code 3). If it were only ignored, the arm would move elsewhere, faster or longer than the
+/// user expects.
 #[test]
 fn a_variable_that_shaped_a_motion_refuses_the_command() {
     let dir = Dir::new();
@@ -49,7 +50,7 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
         with((variable, value), &["plan", &file, "-o", &out]).ends(2);
         assert!(!dir.has("out.csv"), "{variable}");
     }
-    // Off, empty or typed, the variable is not refused; and a stop is never refused.
+    // The variable is not refused if it is off or empty, or if the option is typed. A Stop is never refused.
     let plan = ["plan", &file, "-o", &out, "--overwrite", "--speed", "50"];
     for (variable, value) in [("JTC_DEG", "off"), ("JTC_LINE", ""), ("JTC_SPEED_PERCENT", "5")] {
         with((variable, value), &plan).ends(0);
@@ -59,7 +60,8 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
     }
 }
 
-/// A variable that moved, reset, answered a question or overrode a check has no effect, and one line reports that.
+/// In older versions some variables caused a motion or a reset, answered a question or overrode a check. Such a
+/// variable has no effect, and one line reports this.
 #[test]
 fn no_variable_acts() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -73,7 +75,7 @@ fn no_variable_acts() {
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
         output
     };
-    // Parameters are missing: only a typed option gives them.
+    // Parameters are missing, and only a typed option supplies them.
     ignored("JTC_DEFAULTS", "1", &["recover", "--port", &port], 4);
     ignored("JTC_ARM", &arm, &["recover", "--port", &port], 4);
     assert_eq!(sim.json(&["status"], 0)["state"], "Init");
@@ -94,7 +96,7 @@ fn no_variable_acts() {
     assert_eq!(sim.json(&["status"], 0)["state"], "HoldPos");
 }
 
-/// On and off are eight words in any letter case.
+/// Eight words mean on and off, in upper or lower case.
 #[test]
 fn on_off_variables_take_eight_words_and_nothing_else() {
     for (variable, words) in [
@@ -117,7 +119,7 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// A variable in effect is shown in one line of stderr, unless the option is typed before or after the command.
+/// A variable in effect is reported in one line on stderr, unless the option is typed before or after the command.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -131,12 +133,12 @@ fn a_variable_in_effect_is_shown() {
     let programs = with(("JTC_PORT", &port), &["--json", "status"]).ends(0);
     assert_eq!(programs.events()[0]["text"], line.trim_end(), "{}", programs.err);
     assert!(programs.json()["state"].is_string());
-    // An error in the value of a variable names the variable.
+    // The error about an invalid value of a variable contains the name of the variable.
     let wrong = with(("JTC_BAUD", "fast"), &["status"]).ends(2);
     assert!(wrong.err.contains("--baud is set by the variable JTC_BAUD=fast"), "{}", wrong.err);
 }
 
-/// `--force` of older scripts is `--overwrite`; no help shows it.
+/// `--force` of older scripts means `--overwrite`. The help does not show it.
 #[test]
 fn force_is_taken_for_overwrite() {
     let dir = Dir::new();

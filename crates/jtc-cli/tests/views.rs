@@ -9,7 +9,7 @@ use std::process::Stdio;
 use cli_kit::trial::{Terminal, signal};
 use common::{Sim, motion, slow_motion};
 
-/// Moves the arm slowly, after the end of the command that started the motion.
+/// Starts a slow motion that continues after its command has ended.
 fn moving(sim: &Sim) {
     let file = sim.file("slow.csv", &slow_motion(300));
     let mut run = sim.command(&["--json", "traj", "run", &file]);
@@ -20,7 +20,7 @@ fn moving(sim: &Sim) {
     run.wait().unwrap();
 }
 
-/// The view stops a motion whose command has ended, shows it, and restores the terminal.
+/// The view stops a motion whose command has ended, shows the Stop, and restores the terminal.
 #[test]
 fn j33_the_stop_key_of_the_view_stops() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -37,7 +37,7 @@ fn j33_the_stop_key_of_the_view_stops() {
     assert!(terminal.is_as_before());
 }
 
-/// After any cause the view ends at once, and restores the terminal.
+/// Whatever ends the view, it ends at once and restores the terminal.
 #[test]
 fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -51,7 +51,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         // The screen from before the view is shown again.
         assert!(String::from_utf8_lossy(&terminal.bytes).contains("\u{1B}[?1049l"), "{name}");
     }
-    // The window is closed, for its own session and for a session without that signal.
+    // The window is closed, once in a session that gets the signal and once in a session that ignores it.
     for nohup in [false, true] {
         let mut terminal = Terminal::new(60, 20);
         let mut monitor = sim.command(&["monitor"]);
@@ -68,7 +68,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         terminal.hang_up();
         assert_eq!(terminal.ends(&mut child), 0, "nohup: {nohup}");
     }
-    // Output in lines for a reader without a terminal, until it has read enough.
+    // Without a terminal the output is in lines. It ends when the reader has read enough.
     let mut child = sim.command(&["monitor"]);
     let mut child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut line = String::new();
@@ -92,8 +92,8 @@ fn a_small_terminal_says_so_and_its_keys_work() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// Text that is printed while a bar is drawn stands above it, and no piece of the bar is left; keys without effect
-/// report it.
+/// Text that is printed while a bar is drawn appears above the bar, and no part of the bar is left. A key without
+/// effect reports this.
 #[test]
 fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -101,7 +101,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let mut terminal = Terminal::new(40, 40);
     let mut child = terminal.start(&sim.command(&["traj", "run", &file, "--speed", "10"]));
     terminal.until("the bar", |p| p.text().contains("% of 12.0 s") && p.text().contains("space pauses"));
-    // Ctrl-S blocks no command whose stop key is active.
+    // Ctrl-S does not block a command whose stop key is active.
     terminal.press("\u{13} ");
     terminal.until_it_shows("paused; space goes on");
     terminal.press(" ");
@@ -113,7 +113,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let text = terminal.picture.text();
     assert!(!text.contains('━') && !text.contains('╸') && !text.contains("keys:"), "{text}");
     assert!(text.contains("stopping on the path") && text.contains("stopped"), "{text}");
-    // No word of the result is cut at the edge of the terminal either.
+    // No word of the result is cut at the edge of the terminal.
     let words: Vec<&str> = text.split_whitespace().collect();
     for whole in ["statuses,", "frames", "damaged"] {
         assert!(words.contains(&whole), "{whole}: {text}");

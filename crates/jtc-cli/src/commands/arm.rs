@@ -56,7 +56,8 @@ fn check(file: &Path, out: &Output) -> Result<(), Failure> {
     if refused { Err(Failure::shown(ErrorKind::Refused)) } else { Ok(()) }
 }
 
-/// Formats a line for each finding; findings with the same next step are followed by it once.
+/// Formats a line for each finding. A next step that several findings have in common is printed once, after the last of
+/// them.
 fn as_text(findings: &[ArmFinding]) -> String {
     let mut text = String::new();
     for (i, f) in findings.iter().enumerate() {

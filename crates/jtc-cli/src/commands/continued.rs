@@ -72,7 +72,7 @@ impl Left {
         }
     }
 
-    /// Gives a job the remainder and the runs after it.
+    /// Sets the remainder, and the runs after it, as the motion of a job.
     fn make(&self, job: &mut Job, status: &Status, out: &Output) -> Result<(), Failure> {
         let rest = match &self.current {
             None => None,
@@ -91,7 +91,7 @@ impl Left {
                 Some(_) => format!("then the whole trajectory is run {times}, as was asked for"),
                 None => format!("the run that was broken off came to its end; the whole trajectory is run {times}, as was asked for"),
             });
-            // Before the arm moves.
+            // The runs after the remainder are checked before the arm moves.
             let verdict = job.verdict(&self.then, None, UploadOptions::default());
             if !verdict.is_ok() {
                 return Err(job.refuse(&verdict, out));
@@ -119,7 +119,7 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
     })
 }
 
-/// Returns the path time of the resume point, ms, with the reason on stderr.
+/// Returns the path time of the resume point, ms. Prints the reason for it on stderr.
 fn place(
     job: &Job,
     whole: &Trajectory,

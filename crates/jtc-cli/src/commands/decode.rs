@@ -72,8 +72,8 @@ fn hex(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
-/// Returns the byte streams of an input with their names; a single one without a name, unless the input marks
-/// directions.
+/// Returns the byte streams of an input with their names. If the input does not mark directions, it is one stream
+/// without a name.
 fn streams(input: &[u8]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let Some(text) =
         std::str::from_utf8(input).ok().filter(|t| t.chars().all(|c| !c.is_control() || c.is_whitespace()))
@@ -94,7 +94,7 @@ fn streams(input: &[u8]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     Ok(vec![(String::new(), from_hex(text)?)])
 }
 
-/// Bytes as hex digits, with or without spaces, commas, colons, `0x`.
+/// Parses bytes in hex digits, with or without spaces, commas, colons and `0x`.
 fn from_hex(text: &str) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     for (number, line) in text.lines().enumerate() {

@@ -1,4 +1,4 @@
-//! `jtc demo`: the main job from parameters to report, on the simulator in this process.
+//! `jtc demo`: a complete run from parameters to report, on a simulator in this process.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -21,7 +21,7 @@ use crate::failure::output_lost;
 use crate::progress::Progress;
 use crate::tape::Tape;
 
-/// Seed of the demo: every demo gives the same figures.
+/// Random seed of the demo. It is constant, so that every demo gives the same figures.
 const SEED: u64 = 1;
 /// Recorded time before and after the motion.
 const MARGIN: Duration = Duration::from_millis(400);

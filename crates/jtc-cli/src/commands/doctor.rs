@@ -1,4 +1,4 @@
-//! `jtc doctor`: faults of link, bus and set-up, with the next command.
+//! `jtc doctor`: finds faults of link, bus and set-up, and suggests the next command.
 
 use std::time::Duration;
 
@@ -17,13 +17,13 @@ const LISTEN: Duration = Duration::from_secs(2);
 /// Listening time at each other rate.
 const TRY: Duration = Duration::from_millis(300);
 
-/// Checks everything; ends with 0 without a problem, 3 without a link, else 1.
+/// Checks link, bus and set-up. The exit code is 0 without a problem, 3 without a link, and else 1.
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));
     let mut session = link.session()?;
     let mut seen = session.examine(LISTEN)?;
-    // A drive that answers although its joint is set absent has no separate bit (J-53).
+    // The status has no separate bit for a drive that answers although its joint is declared absent (J-53).
     let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);
     seen.absent = match &seen.status {
         Some(_) if external => absent(session.absent().unwrap_or_default()),
@@ -75,7 +75,7 @@ fn no_link(seen: &Observation) -> bool {
 fn other_rate(name: &str, own: u32, out: &Output) -> Option<u32> {
     RATES.into_iter().filter(|r| *r != own).find(|rate| {
         out.note(format!("no frame in what comes; trying {rate} Bd"));
-        // A Stop at a wrong rate would not reach the controller.
+        // The port gets no socket for Stops, because a Stop at a wrong rate would not reach the controller.
         let port = SerialPort::open_without_door(name, *rate).ok();
         port.and_then(|p| Session::new(p).examine(TRY).ok()).is_some_and(|seen| seen.statuses > 0)
     })

@@ -1,4 +1,4 @@
-//! `jtc dynamics`: the controller's own dynamics as a filter of numbers.
+//! `jtc dynamics`: the dynamics code of the controller, as a filter from numbers to numbers.
 
 use std::io::{BufRead, Write};
 
@@ -34,7 +34,7 @@ pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
         let written = if out.is_json() {
             writeln!(stdout, "{}", json!({ key(args.what): result }))
         } else {
-            // 17 significant digits, one before the point and sixteen after it: enough to reproduce the same f64.
+            // 17 significant digits, one before the point and sixteen after it, reproduce exactly the same f64.
             let words: Vec<String> = result.iter().map(|v| format!("{v:.16e}")).collect();
             writeln!(stdout, "{}", words.join(" "))
         };
@@ -68,7 +68,7 @@ fn numbers(line: &str, what: DynamicsKind) -> Result<Vec<f64>, String> {
                 .ok_or_else(|| format!("\"{w}\" is not a finite number"))
         })
         .collect::<Result<Vec<f64>, String>>()?;
-    // A mass matrix needs positions only, but takes lines of the other kinds, too.
+    // A mass matrix needs only positions, but lines in the format of the other kinds are accepted as well.
     if values.len() == need || (what == DynamicsKind::Mass && values.len() == 3 * JOINTS) {
         Ok(values)
     } else {

@@ -75,7 +75,7 @@ fn drive_json(drive: &Drive) -> Value {
     })
 }
 
-/// Returns the named image, or the installed image for `board` if none was named.
+/// Returns the image that the user has given, or else the installed image for `board`.
 fn image(
     args: &ImageArgs,
     board: impl FnOnce(&Catalogue) -> Result<String, Failure>,
@@ -115,8 +115,9 @@ fn the_drive(places: &Places, named: Option<&PathBuf>) -> Result<Drive, Failure>
     }
 }
 
-/// Returns the port that is queried in addition to those of the drive's own USB device: the named one, or the only one
-/// if the board must prove its firmware and the system does not say which port is its own.
+/// Returns the port that is asked in addition to the ports of the drive's own USB device. This is the port that the
+/// user has given. Without it, the only port of the computer is used, if the board must report its firmware and the
+/// system does not tell which port belongs to the board.
 fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<String>, Failure> {
     match &link.port {
         Some(url) if url.contains("://") => {
@@ -134,8 +135,8 @@ fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<Str
     }
 }
 
-/// Returns the only port of the computer. A port that another program has open counts: the board may be connected to
-/// it.
+/// Returns the only port of the computer. A port that another program has open is included, because the board may be
+/// connected to it.
 fn only_port() -> Result<String, Failure> {
     let there = |port: &PortInfo| matches!(port.problem, None | Some(PortError::Busy { .. }));
     let mut paths: Vec<String> = ports()?.into_iter().filter(there).map(|port| port.path).collect();
@@ -146,7 +147,7 @@ fn only_port() -> Result<String, Failure> {
     }
 }
 
-/// Opens a port for this program alone.
+/// Opens a port for the exclusive use of this program.
 fn open(port: &str, baud: u32) -> Result<Box<dyn Port>, PortError> {
     if owner_of(port).is_some() {
         return Err(PortError::Busy { path: port.to_owned() });
@@ -179,7 +180,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let permissions = Permissions { assume_board: args.assume_board, accept_supply: args.accept_supply };
     may_flash(&image, &drive, &before, permissions)?;
     let line = lines.proving().map(|(port, same_device)| (port.to_owned(), same_device));
-    // Another board that runs the image proves nothing about this board.
+    // Only the board's own ports are considered, because another board may already run the image.
     if let Some(program) =
         before.own_info().find_map(|info| compare(&image, info).ok()).filter(|_| !args.again)
     {
@@ -192,7 +193,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     if let Some(question) = &question {
         confirm(question, "--yes")?;
     }
-    // The user may have thought about the question for minutes.
+    // The state is read again, because the user may have taken minutes to answer the question.
     let now = lines.look()?;
     may_flash(&image, &drive, &now, permissions)?;
     if let Some(other) = now.to_confirm(&image).filter(|now| !args.yes && question.as_ref() != Some(now)) {
@@ -206,8 +207,8 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let bar = out.bytes_bar(image.bytes().len() as u64, "copying");
     let mut lines = Some(lines);
     let written = put(&drive, &image, &mut |bytes| {
-        // Closed as soon as copying has begun: with its drive the ST-LINK may take its serial port from USB. An open
-        // port would then come back under another name.
+        // The ports are closed as soon as copying has begun, because the ST-LINK may remove its serial port from USB
+        // together with its drive. If the port were still open then, it would come back under another name.
         drop(lines.take());
         bar.set_position(bytes as u64);
     });
@@ -223,7 +224,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         return Ok(());
     };
     out.note("copied; the ST-LINK writes it into the flash, and the board starts");
-    // The board may come back under another name.
+    // The port of the board may come back under another name.
     let mut again = || {
         let own = places.ports_of(&drive).into_iter().next();
         open(own.as_ref().unwrap_or(&port), record.baud)
@@ -268,7 +269,7 @@ fn program_json(program: Program) -> Value {
     json!({ "bytes": program.bytes, "crc32": format!("{:08x}", program.crc32) })
 }
 
-/// Names what happened to the arm in the board's memory.
+/// Describes the effect of flashing on the arm that is stored in the board.
 fn stored_arm(before: Option<bool>, after: bool) -> &'static str {
     match (before, after) {
         (Some(true), false) => "lost",

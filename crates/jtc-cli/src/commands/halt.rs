@@ -1,4 +1,5 @@
-//! `jtc stop` and `jtc traj pause`: directly, through an agent, or through the program of this user that has the port.
+//! `jtc stop` and `jtc traj pause`. The command goes directly to the controller, through an agent, or through the
+//! program of this user that has the port.
 
 use std::cell::Cell;
 use std::panic::resume_unwind;
@@ -19,18 +20,19 @@ use crate::args::LinkArgs;
 use crate::link::{LinkPort, who};
 use crate::progress::Progress;
 
-/// A program that has just opened the port, or is about to close it, does not listen for this time.
+/// Longest time for which a program does not listen after it has opened the port, or before it closes the port.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
-/// Like [`CHANGES_HANDS`], if a program of this user has listened: it may be waiting for the end of another Stop.
+/// Like [`CHANGES_HANDS`], for a port at which a program of this user has listened. It may be waiting for the end of
+/// another Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Largest number of programs that may have the port in turn during one Stop.
 const OWNERS: usize = 16;
-/// Time after which a Stop, or the end of teaching, is sent again while statuses do not show it.
+/// Time after which a Stop, or the end of teaching, is sent again if the statuses do not show it.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Longest time until a stopped arm is at rest.
 const REST: Duration = Duration::from_secs(5);
 
-/// The arm does not come to rest after a confirmed Stop.
+/// Error code if the arm does not come to rest after a confirmed Stop.
 const STILL_MOVING: &str = "still-moving";
 
 /// Stops the arm, and waits until it is at rest.
@@ -38,7 +40,7 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arms = arms(link);
     let not_asked = if link.port.is_some() { Vec::new() } else { not_asked(&arms) };
     out.stream()?;
-    // Each arm's Stop runs in parallel, without waiting for another.
+    // The Stops of all arms run in parallel, so that none waits for another.
     let ends: Vec<Result<Stopped, Failure>> = std::thread::scope(|scope| {
         let stops: Vec<_> =
             arms.iter().map(|arm| scope.spawn(|| stop_one(arm, &Progress::begin(out)?))).collect();
@@ -64,7 +66,7 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         ends.iter().map(|end| end.as_ref().map_or_else(failed_json, Stopped::json)).collect();
     let accepted = ends.iter().flatten().any(|one| one.accepted);
     let mut value = json!({ "command": "stop", "accepted": accepted, "arms": arms, "not_asked": not_asked });
-    // The most urgent failure: an arm still moves.
+    // An arm that still moves is the most urgent failure and comes first.
     failed.sort_by_key(|failure| failure.code != STILL_MOVING);
     if let Some(failure) = failed.first() {
         value["error"] = error_object(failure);
@@ -79,11 +81,11 @@ fn failed_json(failure: &Failure) -> Value {
     json!({ "error": error_object(failure) })
 }
 
-/// Lists the ports on USB that get no Stop.
+/// Lists the USB ports that get no Stop.
 fn not_asked(arms: &[Arm]) -> Vec<String> {
     let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
     if asked.is_empty() {
-        // The only port.
+        // The arm is at the only port, so no port is left out.
         return Vec::new();
     }
     let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
@@ -98,7 +100,7 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             let mut session = *session;
             progress.watch(&mut session);
             session.pause().map_err(|error| match error {
-                // There is no motion to pause.
+                // The controller refuses the Pause if there is no motion to pause.
                 Error::Link(LinkError::Refused { .. }) => error.into(),
                 error => unconfirmed(error).told(Halt::Pause),
             })?;
@@ -125,8 +127,8 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the arms to stop: that of the named port; else those of all agents and programs of this user, or that of the
-/// only port.
+/// Returns the arms to stop. If the user has given a port, this is the arm at that port. Otherwise these are the arms
+/// of all agents and programs of this user, or, if there are none, the arm at the only port.
 fn arms(link: &LinkArgs) -> Vec<Arm> {
     if link.port.is_some() {
         return vec![Arm::Of { link: link.clone(), port: None }];
@@ -147,7 +149,8 @@ fn arms(link: &LinkArgs) -> Vec<Arm> {
     arms
 }
 
-/// Returns the arms of programs with a socket. The socket of a killed program counts too: its arm may still be moving.
+/// Returns the arms of programs with a socket. The socket of a killed program is included, because its arm may still be
+/// moving.
 #[cfg(unix)]
 fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
     let (alive, stale): (Vec<_>, Vec<_>) =
@@ -173,7 +176,7 @@ fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
 enum Arm {
     /// An arm at a port, or of an agent that has this port.
     Of { link: LinkArgs, port: Option<String> },
-    /// Arm of the program that listens, or listened, at this socket; with its port, if it exists.
+    /// Arm of the program that listens, or has listened, at this socket.
     #[cfg(unix)]
     Behind { socket: PathBuf, link: LinkArgs },
 }
@@ -244,9 +247,9 @@ fn holder_json(answer: &Answer) -> Value {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Sent {
     Nothing,
-    /// The controller may have received it.
+    /// The controller may have received the command.
     Unconfirmed,
-    /// The controller has received it.
+    /// The controller has received the command.
     Confirmed,
 }
 
@@ -268,13 +271,12 @@ impl NotHalted {
         Self { sent, failure: failure.into() }
     }
 
-    /// Returns the result after an earlier program has got a Stop to `sent`.
+    /// Returns the result with at least the progress that an earlier program has reached with the Stop.
     fn at_least(self, sent: Sent) -> Self {
         Self { sent: self.sent.max(sent), ..self }
     }
 
-    /// Turns the failure into one that tells the operator how far the Stop or Pause got, and what stops the arm in any
-    /// case.
+    /// Adds to the failure how far the Stop or Pause got, and how the operator can stop the arm in any case.
     fn told(self, halt: Halt) -> Failure {
         let name = if halt == Halt::Stop { "Stop" } else { "Pause" };
         if self.failure.code == STILL_MOVING {
@@ -294,7 +296,7 @@ impl NotHalted {
             ),
         };
         let next = self.failure.next.to_string();
-        // The text of an error may name only the emergency stop.
+        // The hint of an error may already mention the emergency stop.
         let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
         Failure { next: hint.trim_end_matches([' ', '.']).to_owned().into(), ..self.failure }
     }
@@ -303,9 +305,9 @@ impl NotHalted {
 /// Link to an arm.
 #[expect(clippy::large_enum_variant, reason = "there is one for each arm, for a moment")]
 enum Reached {
-    /// Own line.
+    /// Separate connection to the line.
     Line(Box<Session<LinkPort>>),
-    /// The program that has the port; it has executed the request.
+    /// Answer of the program that has the port. It has executed the request.
     Holder(Answer, Option<End>),
 }
 
@@ -330,7 +332,7 @@ fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalte
     }
 }
 
-/// Returns `true` if a program of this user listens for this port, or did.
+/// Returns `true` if a program of this user listens for this port, or has listened for it.
 #[cfg(unix)]
 fn is_own(path: &str) -> bool {
     !halt::sockets_of(path).is_empty()
@@ -363,8 +365,8 @@ fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     Ok(None)
 }
 
-/// Stops one arm. The stopped program may end before the arm is at rest: then the port is free, or another program has
-/// it.
+/// Stops one arm. The stopped program may end before the arm is at rest. Then the port is free, or another program has
+/// opened it.
 fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
@@ -375,7 +377,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
             }
             Reached::Holder(answer, end) => (answer, end),
         };
-        // The rate at which the controller answered.
+        // The port and the rate at which the controller has answered.
         let link = LinkArgs { port: Some(answer.port.clone()), baud: answer.baud, ..arm.link().clone() };
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
@@ -404,7 +406,8 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
                     return Ok(Reached::Holder(answer, end));
                 }
-                // The program has ended, or answers other clients: the port is free, or the next program has it.
+                // The program has ended, so the port is free or the next program has opened it. Or the program is busy
+                // with other clients.
                 if link.port.is_some() {
                     return reach(link, Halt::Stop, true);
                 }
@@ -426,7 +429,7 @@ fn directly(
     holder: Option<Answer>,
 ) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
-    // Statuses received before the Stop is confirmed count, too.
+    // A motion in the statuses before the confirmation of the Stop is noted as well.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
     let seen = Rc::clone(&moved);
     session.observe(move |_, status| {
@@ -439,7 +442,7 @@ fn directly(
         Err(error) => return Err(unconfirmed(error)),
     };
     let confirmed = |error: Error| NotHalted::after(Sent::Confirmed, error);
-    // A taught arm is compliant, and a Stop holds it.
+    // An arm in teaching is compliant. After a Stop it holds its position.
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::args::LinkArgs;
 use crate::ask::confirm;
 
-/// Drives change their state within this time.
+/// Time within which the drives change their state.
 const DISABLED: Duration = Duration::from_secs(5);
 
 /// Prints the identity of the controller.
@@ -39,7 +39,7 @@ pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Formats the hash as in all outputs.
+/// Formats a hash in the form that all outputs use.
 pub fn hash(hash: u64) -> String {
     format!("{hash:016x}")
 }
@@ -108,7 +108,7 @@ fn recorder(state: LogState) -> String {
     }
 }
 
-/// Describes the last held stop and current reactions: a line each, with a line break before it.
+/// Describes the last held stop and the current reactions. Each line begins with a line break.
 fn reacting_words(reacting: &Reacting) -> String {
     let mut lines = Vec::new();
     let joints = |joints: &[u8]| {

@@ -16,10 +16,10 @@ use serde_json::json;
 use super::named_arm;
 use crate::args::CheckArgs;
 
-/// Number of speeds tried between one that passes and one that does not.
+/// Number of speeds that are tried between a speed that passes the check and one that fails.
 const TRIES: usize = 4;
 
-/// Formats a path for a shell.
+/// Formats a path as the user can type it in a shell.
 pub fn typed(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
@@ -35,7 +35,7 @@ pub fn stem(path: &Path) -> String {
     path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Returns the named arm, or the built-in one; its warnings go to stderr.
+/// Returns the arm that the user has given, or the built-in arm. Prints its warnings on stderr.
 fn arm_of(args: &CheckArgs, out: &Output) -> Result<Arm, Failure> {
     let arm = named_arm::load(args.arm.as_deref())?;
     named_arm::note_warnings(&arm, out);
@@ -48,26 +48,26 @@ pub struct Job {
     pub loaded: Loaded,
     /// Trajectory at the requested speed.
     pub trajectory: Trajectory,
-    /// Masses, friction, names.
+    /// Arm with masses, friction and names.
     pub arm: Arm,
     /// Limits and settings in use.
     pub config: Config,
-    /// Configuration of the controller, after it was read.
+    /// Configuration of the controller, if it was read.
     pub device: Config,
     /// Identity of the controller and hash of its arm, if it was read and the controller has them.
     pub identity: Option<(DeviceIdentity, u64)>,
-    /// File and arm, as typed.
+    /// File and arm, as the user typed them.
     pub words: String,
-    /// Trajectory to run after it, and the number of runs.
+    /// Trajectory to run after this one, and the number of runs.
     pub later: Option<(Trajectory, u32)>,
-    /// Percent of the file's own speed.
+    /// Speed in percent of the file's own speed.
     speed: f64,
     /// `true` if no file was read: the motion is planned once the arm's position is known.
     made: bool,
 }
 
 impl Job {
-    /// Reads the files; notes and warnings go to stderr.
+    /// Reads the files. Prints notes and warnings on stderr.
     pub fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         let arm = arm_of(args, out)?;
         let loaded = Loaded::load(file, Some(&arm.joint_names))?;
@@ -108,7 +108,7 @@ impl Job {
         })
     }
 
-    /// Creates a job without a file: the motion comes from [`Job::take`]. `words` is the command as typed.
+    /// Creates a job without a file. [`Job::take`] sets its motion later. `words` is the command as the user typed it.
     pub fn made(arm: Arm, words: String, out: &Output) -> Self {
         named_arm::note_warnings(&arm, out);
         let loaded = Loaded {
@@ -199,13 +199,14 @@ impl Job {
         at_speed.is_some_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
     }
 
-    /// Returns the highest whole percentage that passes; `None` if no speed does, or if speed is not the problem.
+    /// Returns the highest speed in whole percent that passes the check. `None`: no speed passes, or the speed is not
+    /// the problem.
     pub fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
         let passes = |percent: f64| {
             let slower = plan::at_speed(&self.loaded.trajectory, percent);
             slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
         };
-        // The estimate may be too high if the torque is exceeded, or too low.
+        // The estimate can be too low. If the torque is exceeded, it can also be too high.
         let mut good = verdict.slower(self.speed)?;
         let mut bad = self.speed;
         while !passes(good) {
@@ -225,7 +226,7 @@ impl Job {
         Some(good)
     }
 
-    /// Prints a verdict that refuses, and ends with exit code 4.
+    /// Prints the verdict of a failed check, and returns the failure with exit code 4.
     pub fn refuse(&self, verdict: &Verdict, out: &Output) -> Failure {
         let passing_speed = self.passing_speed(verdict);
         let hint = self.hint(verdict, passing_speed);
@@ -243,7 +244,7 @@ impl Job {
         Failure::shown(ErrorKind::Refused)
     }
 
-    /// Adds the file's name to a failure of this job whose hint leaves it open.
+    /// Adds the name of the file to a failure of this job, if its hint does not contain it.
     pub fn named(&self, failure: Failure) -> Failure {
         let again =
             if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };
@@ -260,7 +261,7 @@ impl Job {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the parts that are missing in the torques, and how to give them; `None` if none is missing.
+    /// Returns the parts that are missing in the torques, and how the user can add them. `None`: no part is missing.
     pub fn without(&self) -> Option<String> {
         let parts = self.left_out();
         (!parts.is_empty()).then(|| {
@@ -280,12 +281,13 @@ impl Job {
         }
     }
 
-    /// Returns a planner for the arm of this job, within the limits in use; `friction` is the arm's.
+    /// Returns a planner for the arm of this job, with the limits in use. `friction` is the friction of this arm.
     pub fn planner<'a>(&'a self, friction: Option<&'a Friction>) -> Planner<'a> {
         Planner { model: Some(&self.arm.model), friction, ..Planner::new(&self.config) }
     }
 
-    /// Checks the limits at every point and between points, the torque by the arm model, and the start pose, if given.
+    /// Checks the limits at every point and between points, the torque from the arm model, and the start pose, if there
+    /// is one.
     pub fn verdict(
         &self,
         trajectory: &Trajectory,

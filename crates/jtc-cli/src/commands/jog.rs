@@ -14,14 +14,15 @@ use crate::args::JogArgs;
 use crate::link::LinkPort;
 use jtc_host::session::BRING_UP;
 
-/// Time for which a key counts. A terminal repeats a held key after half a second, and then faster than this.
+/// Time for which a key press moves the joint. A terminal repeats a held key after half a second, and then at a shorter
+/// interval than this.
 const HELD: Duration = Duration::from_millis(150);
 /// Rates of the keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 /// Index of the highest initial rate of the keys.
 const FIRST_MAX: usize = 2;
 
-/// Jogs until the keys, the time or a signal ends it; then the arm rests.
+/// Jogs until a key, the time or a signal ends the jog. The arm is then at rest.
 pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let rate = args.rate.map(|rate| if args.deg { rate.to_radians() } else { rate });
     if let Some(rate) = rate
@@ -58,9 +59,10 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
         (Some(joint), Some(rate)) => one(&mut session, joint, rate, over),
         _ => with_keys(&mut session, out, over),
     };
-    // After any end: stop the arm now, without waiting for the controller's timeout.
+    // However the jog has ended, the arm is stopped now, without waiting for the controller's timeout.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // An error that has released the arm is the cause of all other failures, and may be the only failure.
+    // An error that has released the arm is the cause of all other failures, so it is reported first. It may also be
+    // the only failure.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
         // A held stop is the reason why a jog was refused.
@@ -97,7 +99,8 @@ fn one(
     session.jog_while(&velocity, over).map_err(refused)
 }
 
-/// Returns the index of the initial rate: for the slowest joint at most a move's default share of its limit.
+/// Returns the index of the initial rate. For the slowest joint it is at most the share of the velocity limit that a
+/// move uses by default.
 fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     let share = 1e-2 * session.move_speed(None)?.percent;
     let arm = if session.has_extensions() { session.device_arm()? } else { Arm::avena() };
@@ -110,11 +113,11 @@ fn rate_within(most: f64) -> usize {
     RATES[..=FIRST_MAX].iter().rposition(|rate| *rate <= most).unwrap_or(0)
 }
 
-/// Joint that the keys move, its rate, and its end.
+/// Joint that the keys move, its rate, and the end time of its motion.
 struct Held {
     joint: Joint,
     rate: usize,
-    /// Direction, and the last time of its key.
+    /// Direction, and the time of the last press of its key.
     moving: Option<(f64, Duration)>,
 }
 
@@ -239,7 +242,7 @@ mod tests {
         assert_eq!(held.velocity(ms(20)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
         assert_eq!(held.velocity(ms(159)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
         assert_eq!(held.velocity(ms(160)), [0.0; JOINTS]);
-        // Another key stops, and so does another joint's key.
+        // Any other key stops the joint, even the key of another joint.
         for key in [Key::Char('x'), Key::Char('4'), Key::Home] {
             held.press(Key::Left, ms(200));
             assert_ne!(held.velocity(ms(201)), [0.0; JOINTS]);

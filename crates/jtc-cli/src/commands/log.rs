@@ -53,7 +53,7 @@ impl Files {
     }
 }
 
-/// A log and its account.
+/// A log, with the report about it.
 struct Read(Account);
 
 impl Read {
@@ -95,7 +95,7 @@ impl Read {
         })
     }
 
-    /// Describes the replayed part: a line, and a line for each reason why a part is missing.
+    /// Describes the replayed part in one line. A further line follows for each reason why a part is missing.
     fn extent(&self) -> Vec<String> {
         let replayed = &self.0.replayed;
         let verdict = match &replayed.difference {

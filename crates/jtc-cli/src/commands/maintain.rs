@@ -52,7 +52,7 @@ pub fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Leads the controller back to HoldPos.
+/// Brings the controller back to HoldPos.
 pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
@@ -109,11 +109,12 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Builds the failure of a recovery. Repeating the command does not help: the cause of the error must be found.
+/// Returns the failure of a recovery. Its hint does not suggest `jtc recover` again, because the user must find the
+/// cause of the error first.
 fn not_itself(e: Error) -> Failure {
     let failure = Failure::of(&e);
     let recovers = [Action::Recover, Action::RecoverWithArm, Action::RecoverWithDefaults];
-    // Without parameters for the arm the command with an option helps.
+    // If the controller lacks arm parameters, the same command with an option helps.
     if matches!(e, Error::Parameters(ParametersError::NoSource { .. }))
         || !recovers.iter().any(|action| failure.next.names(*action))
     {

@@ -1,4 +1,4 @@
-//! The commands, one file each or one file a family.
+//! The commands. Each command, or each family of commands, has its own file.
 
 mod arm;
 mod bench;

@@ -1,4 +1,4 @@
-//! `jtc monitor`: live view of the controller. A full view on a terminal, else one line per status.
+//! `jtc monitor`: live view of the controller. On a terminal it is a full view, otherwise one line per status.
 
 mod joints;
 mod view;
@@ -15,9 +15,9 @@ use crate::args::MonitorArgs;
 use crate::link::LinkPort;
 use view::View;
 
-/// Shortest period of views: 25 a second are enough at any rate of statuses.
+/// Shortest interval between two drawings of the view. 25 per second are enough at any rate of statuses.
 const PICTURE: Duration = Duration::from_millis(40);
-/// Time without a status after which the last values count as outdated.
+/// Time without a status after which the last values are shown as outdated.
 const SILENT: Duration = Duration::from_secs(1);
 
 /// Shows statuses until `q`, Ctrl-C, or the requested number of them.

@@ -46,7 +46,7 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         let temperature = coldest(status);
         let (speed_pct, margin_pct) = (speed.percent, args.margin.percent);
         let planner = Planner { speed_pct, margin_pct, temperature, ..job.planner(friction.as_ref()) };
-        // The start is the position of the arm, the end the requested target.
+        // The move begins at the position of the arm and ends at the requested target.
         let planned = planner.to_target(&job.arm.model, &status.positions(), &target, args.line);
         let planned = planned.map_err(|e| refused(&e, &name))?;
         for note in &planned.notes {
@@ -78,7 +78,7 @@ fn target(args: &MoveArgs, arm: &Arm) -> Result<kinematics::Target, Failure> {
     Ok(kinematics::Target::Joints(joints))
 }
 
-/// Returns the lowest measured bearing temperature, °C, but at most that of a cold hall.
+/// Returns the lowest measured bearing temperature in °C, limited to the temperature of a cold hall.
 fn coldest(status: &jtc_wire::Status) -> f64 {
     let measured = status.joints.iter().map(|joint| f64::from(joint.temperature));
     measured.fold(COLD, f64::min)

@@ -1,4 +1,4 @@
-//! Arm of a command: the named one, or the built-in one.
+//! Arm of a command: the arm file that the user has given, or the built-in arm.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use jtc_host::file::FileError;
 
 use super::job::typed;
 
-/// Loads the named arm, or the built-in one.
+/// Loads the given arm file, or the built-in arm.
 pub fn load(path: Option<&Path>) -> Result<Arm, FileError> {
     path.map_or_else(|| Ok(Arm::avena()), Arm::load)
 }
@@ -20,7 +20,7 @@ pub fn note_warnings(arm: &Arm, out: &Output) {
     }
 }
 
-/// Returns the option that names the arm, as typed after other words; empty without a named arm.
+/// Returns the option for the arm file, as the user can type it after other words. Empty for the built-in arm.
 pub fn typed_option(path: Option<&Path>) -> String {
     path.map_or(String::new(), |path| format!(" --arm {}", typed(path)))
 }

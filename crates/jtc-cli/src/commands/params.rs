@@ -64,7 +64,8 @@ fn push(
     let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
     let missing = words::missing_parameters(status.jtc_init);
-    // Parameters that were neither sent nor are missing: the controller had them before, from an unknown source.
+    // These parameters were not sent, but are not missing either. The controller had them before, from an unknown
+    // source.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
@@ -98,12 +99,12 @@ fn push(
     Ok(())
 }
 
-/// Waits for the result of gains given to an arm under torque. Returns `true` if they were tried.
+/// Waits for the result of the trial of new gains on an arm under torque. Returns `true` if the gains were tried.
 pub(super) fn await_trial(session: &mut Session<LinkPort>, out: &Output) -> Result<bool, Failure> {
     Ok(session.await_trial(|| out.note("the gains are on trial for two seconds"))?)
 }
 
-/// Refuses gains that do not keep the arm stable: the arm of the files, or that of the controller.
+/// Refuses gains that do not keep the arm stable. The check uses the arm of the files, or else the controller's arm.
 fn check_gains(
     read: &ParameterFile,
     set: &ParameterSet,
@@ -112,7 +113,7 @@ fn check_gains(
     let Some(pid) = set.pid else { return Ok(()) };
     let arm = match &read.arm {
         Some(arm) => Some(arm.clone()),
-        // An arm that cannot be read yet has no torque yet.
+        // If the arm cannot be read yet, it is not under torque yet.
         None if session.info()?.is_some() => session.device_arm().ok(),
         None => None,
     };
@@ -212,7 +213,7 @@ fn as_text(set: &ParameterSet) -> String {
     text
 }
 
-/// Loads the files; later ones override earlier ones. Warnings go to stderr.
+/// Loads the files. Values of later files override those of earlier files. Prints warnings on stderr.
 fn load(files: &[PathBuf], out: &Output) -> Result<ParameterFile, Failure> {
     let read = ParameterFile::load_all(files)?;
     for warning in &read.warnings {

@@ -20,7 +20,7 @@ pub fn payload(command: &PayloadCommand, out: &Output) -> Result<(), Failure> {
 }
 
 fn set(payload: &Payload, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    // Before the search for a port.
+    // The payload is checked before the search for a port.
     payload.check().map_err(|e| Failure::usage(format!("{e}; nothing was sent")))?;
     let mut session = link.session()?;
     let before = session.payload()?;
@@ -36,7 +36,7 @@ fn set(payload: &Payload, link: &LinkArgs, out: &Output) -> Result<(), Failure> 
     Ok(())
 }
 
-/// A payload in a few words.
+/// Describes a payload in a few words.
 pub fn words(payload: &Payload) -> String {
     let [x, y, z] = payload.com;
     if payload.is_there() { format!("{} kg at ({x}, {y}, {z}) m", payload.mass) } else { "none".into() }
@@ -52,7 +52,7 @@ fn as_text(payload: &Payload) -> String {
     format!("payload: {}{inertia}", words(payload))
 }
 
-/// A payload for programs.
+/// Returns a payload as JSON.
 pub fn as_json(payload: &Payload) -> Value {
     let [xx, xy, xz, yy, yz, zz] = payload.inertia;
     json!({

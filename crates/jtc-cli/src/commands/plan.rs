@@ -19,7 +19,7 @@ use crate::args::PlanArgs;
 /// Message for a blend without corners to round.
 const NO_LINES: &str = "--blend-m rounds the corners between lines and arcs, and this motion has none: give --line, or a column `leg`";
 
-/// Plans, checks and writes.
+/// Plans a trajectory, checks it, and writes it.
 pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     if !(-40.0..=120.0).contains(&args.temperature) {
         return Err(Failure::usage(format!("--temperature {} °C is outside -40..120", args.temperature)));
@@ -29,7 +29,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     named_arm::note_warnings(&arm, out);
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
-    // Before any file is opened: an impossible line leaves no file.
+    // The motion is planned before any file is opened, so that an impossible line leaves no file.
     let blend = if args.deg { args.blend.to_radians() } else { args.blend };
     let options = WayOptions { line: args.line, blend, blend_m: args.blend_m };
     let way = Way::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
@@ -84,7 +84,7 @@ fn off_the_line(aside: Aside) -> String {
     )
 }
 
-/// Checks that the output has an ending for CSV: under the ending of another format hardly any command would read it.
+/// Checks that the output has an ending for CSV. With the ending of another format, hardly any command would read it.
 fn readable(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if ["mcap", "yaml", "yml", "json", "toml", "urdf", "xml", "html"].contains(&ending.as_str()) {
@@ -102,12 +102,12 @@ fn readable(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Adds the lines of the file to the waypoints in an error.
+/// Adds the line numbers of the file to the waypoints in an error.
 fn located(error: &PlanError, file: &WaypointFile) -> Failure {
     Failure { message: file.located(error), ..Failure::of(error) }
 }
 
-/// Like [`located`], also for waypoints without a possible path.
+/// Like [`located`], but also for waypoints for which no path exists.
 fn unplanned(error: &WaypointError, file: &WaypointFile) -> Failure {
     match error {
         WaypointError::Route(e) => located(e, file),
@@ -158,7 +158,7 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
     });
 }
 
-/// Returns how long each limit of a joint binds; a dash if none does.
+/// Returns for how long each limit of a joint is the limiting constraint. Returns a dash if no limit is.
 fn binds(binding: &[Bound], joint: Joint) -> String {
     let mut limits: Vec<(&str, f64)> = Vec::new();
     for bound in binding.iter().filter(|bound| bound.joint == joint) {
@@ -173,7 +173,7 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
     if words.is_empty() { "-".into() } else { words.join(", ") }
 }
 
-/// Returns the smallest torque margin of a motion as a line; empty if none was computed.
+/// Returns the smallest torque margin of a motion as a line. Empty if no margin was computed.
 pub fn margin_line(margin: Option<TorqueMargin>) -> String {
     margin.map_or(String::new(), |margin| format!("{margin}\n"))
 }
@@ -196,7 +196,7 @@ fn margin_words(planned: &Planned, percent: f64) -> String {
     }
 }
 
-/// Returns the page of a motion, with the commanded values only, and its limiting constraints.
+/// Returns the page of a motion, with only the commanded values, and with the limiting constraints.
 fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> String {
     let info = run_report::info(arm, "planned, not run", &stem(&args.out), 0);
     let trajectory = &planned.trajectory;

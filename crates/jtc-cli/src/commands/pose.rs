@@ -25,7 +25,8 @@ pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
 }
 
 fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output) -> Result<(), Failure> {
-    // Before the controller is asked: an error in name or file does not depend on it.
+    // Name and file are checked before the controller is asked, because an error in them does not depend on the
+    // controller.
     let arm = Arm::load(file)?;
     if arm.poses.contains_key(name) && !overwrite {
         let path = file.to_owned();
@@ -35,7 +36,7 @@ fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output)
     save_pose(file, name, &position, overwrite)?;
     let arm = Arm::load(file)?;
     let saved = arm.poses.get(name).copied().unwrap_or(position);
-    // Still saved: the limits may be wrong.
+    // A pose outside the limits is still saved, because the limits may be wrong.
     if let Err(outside) = arm.pose(name) {
         out.note(format!("warning: {outside}: no motion leads there"));
     }

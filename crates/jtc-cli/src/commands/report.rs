@@ -36,7 +36,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let info = match (arm, recording.info) {
         (Some(arm), _) => run_report::info(&arm, &args.file.display().to_string(), &name, 0),
         (None, Some(info)) => info,
-        // A CSV file holds no limits.
+        // A CSV file does not contain limits.
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
     let failure = digest.failure(&info, &recording.ending);

@@ -1,4 +1,4 @@
-//! `jtc reset`: restarts nodes of the joint bus, with the user's numbering.
+//! `jtc reset`: restarts nodes of the joint bus. The user counts the joints from 1.
 
 use cli_kit::{Failure, Output};
 use jtc_host::session::reset_takes_torque;
@@ -13,7 +13,7 @@ use crate::ask::confirm;
 const ALL: u8 = 0x7F;
 /// The gripper's bit.
 const GRIPPER: u8 = 1 << 6;
-/// Resets the named nodes. If the arm is held, only after the user has agreed; if it moves, no joint is reset.
+/// Resets the given nodes. If the arm is held, this needs the user's agreement. While the arm moves, no joint is reset.
 pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let nodes = nodes(args)?;
     let reset = words::node_names(nodes);
@@ -32,7 +32,7 @@ pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns bits 0..5 for joints 1..6 and bit 6 for the gripper, for the named nodes.
+/// Returns the bit mask of the given nodes: bits 0..5 for joints 1..6, and bit 6 for the gripper.
 fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
     if let Some(mask) = &args.mask {
         return Err(of_mask(mask));
@@ -46,7 +46,7 @@ fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
     Ok(nodes)
 }
 
-/// Returns the failure for a bit mask of older versions, in which 3 meant joints 1 and 2.
+/// Returns the failure for a bit mask. In older versions the argument was a bit mask, in which 3 meant joints 1 and 2.
 fn of_mask(text: &str) -> Failure {
     let value = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
         Some(hex) => u8::from_str_radix(hex, 16).ok(),

@@ -12,7 +12,7 @@ use crate::args::ResumeArgs;
 use crate::link::LinkPort;
 use crate::progress::Progress;
 
-/// Resumes, unless the remainder of the named trajectory no longer passes the check (J-36, J-60).
+/// Resumes the motion, unless the remainder of the given trajectory no longer passes the check (J-36, J-60).
 pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let job = args.trajectory.as_deref().map(|file| Job::load(file, &args.check, out)).transpose();
@@ -20,7 +20,7 @@ pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     progress.watch(&mut session);
     let status = session.fresh_status()?;
-    // Otherwise the session reports the error.
+    // In any other state, the session reports the error.
     if status.trajectory == TrajectoryState::Pause {
         match &mut job {
             Some(job) => check_rest(job, args.check.arm.is_none(), &mut session, &status)?,
@@ -33,7 +33,7 @@ pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Checks the remainder of the trajectory, from the place of the pause, against the limits of the controller with its
+/// Checks the remainder of the trajectory, from the place of the pause, against the controller's limits and with its
 /// payload.
 fn check_rest(
     job: &mut Job,
@@ -66,7 +66,8 @@ fn check_rest(
     })
 }
 
-/// Notes that the remainder is not checked: this program did not load the motion, and a controller does not return it.
+/// Prints that the remainder is not checked: this program did not load the motion, and a controller cannot return its
+/// trajectory.
 fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Result<(), Failure> {
     let payload = session.payload()?;
     if session.has_extensions() {

@@ -28,19 +28,19 @@ use terminal::{Terminal, cancelled};
 /// Settings of a motion, for all commands that run one.
 #[derive(Clone, Debug)]
 pub struct Course {
-    /// Link, files that the motion writes, accepted risks.
+    /// Link, files that the command writes, and accepted risks.
     pub execute: ExecuteArgs,
     /// Name in recordings.
     pub name: String,
-    /// Name of the trajectory that an approach leads to, as typed.
+    /// Name of the trajectory that an approach leads to, as the user typed it.
     pub words: String,
     /// Files that the command reads, which must not be outputs.
     pub inputs: Vec<PathBuf>,
-    /// `true` if the arm was named, and must be that of the controller.
+    /// `true` if the user has given an arm file. It must then match the controller's arm.
     pub arm_named: bool,
-    /// `true` if the arm is moved to the first point when it stands elsewhere.
+    /// `true`: if the arm is not at the first point, it is moved there first.
     pub approach: bool,
-    /// Speed of a move or an approach, %, if it was named.
+    /// Speed of a move or an approach in %, if the user has given it.
     pub speed: Option<f64>,
     /// Option for the speed; empty if the command has none.
     pub speed_option: &'static str,
@@ -49,7 +49,8 @@ pub struct Course {
     pub repeat: u32,
 }
 
-/// Creates the trajectory of a job once the position of the arm, and the speed of a move on this controller, are known.
+/// Function that creates the trajectory of a job, when the position of the arm and the speed of a move on this
+/// controller are known.
 pub type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
 
 impl Course {
@@ -84,7 +85,7 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, |out| Job::load(&args.file, &args.check, out), None, out)
 }
 
-/// Runs a job: a file unchanged, or a motion that is planned once the position of the arm is known.
+/// Runs a job: the unchanged trajectory of a file, or a motion that is planned when the position of the arm is known.
 pub fn perform(
     course: &Course,
     load: impl FnOnce(&Output) -> Result<Job, Failure>,
@@ -99,8 +100,8 @@ pub fn perform(
     drive(course, &mut job, make, &progress, out).map_err(|failure| job.named(failure))
 }
 
-/// Checks that the arm of the controller is that of the job (J-55). Without a named arm the controller's own arm is
-/// used, else a difference is refused. From then on the controller's settings count.
+/// Checks that the controller's arm matches the arm of the job (J-55). If the user has given an arm file, a difference
+/// is refused. Otherwise the controller's own arm is used. From then on the job uses the controller's settings.
 fn match_device(
     session: &mut Session<LinkPort>,
     job: &mut Job,
@@ -125,7 +126,8 @@ fn match_device(
             }
         }
     }
-    // Without differences these are the arm's own settings, with the rotors that a file may have left open.
+    // Without differences these are the arm's own settings. Rotor values that the file does not contain come from the
+    // controller.
     job.config = job.arm.config_on_device(&job.device);
     if job.device.payload.is_there() {
         out.note(format!(
@@ -137,7 +139,7 @@ fn match_device(
     Ok(())
 }
 
-/// Checks a motion that is known before the arm is asked; a repeated motion must end at its start.
+/// Checks a motion that is known before the controller is asked. A repeated motion must end at its start.
 fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failure> {
     let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {

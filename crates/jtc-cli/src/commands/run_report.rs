@@ -17,7 +17,7 @@ pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> Re
     }
 }
 
-/// Returns the first failure, if there was one, and then the figures.
+/// Returns the text of the first failure, if there was one, followed by the figures.
 pub fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
     let Some(failure) = failure else { return figures(summary) };
     let rows: Vec<Vec<String>> = failure.rows().into_iter().map(|row| row.to_vec()).collect();

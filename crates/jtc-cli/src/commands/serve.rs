@@ -31,7 +31,7 @@ use crate::args::ServeArgs;
 /// Longest wait for a motion to stop at the end of the agent.
 const STOPPING: Duration = Duration::from_secs(5);
 
-/// Owns the port until SIGINT or SIGTERM; a motion is stopped on its path first.
+/// Serves the port until SIGINT or SIGTERM. Then stops a motion on its path before it ends.
 pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let token_file = args.link.token_file.clone().or_else(default_token_file).ok_or_else(|| {
         Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
@@ -45,7 +45,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     })?;
     let store = args.trajectories.as_deref().map_or_else(|| Ok(Store::in_memory()), Store::open)?;
     if args.sim && args.arm.is_none() && args.trajectories.is_none() {
-        // A motion to try, because a new user has none.
+        // A simulated arm gets an example motion, because a new user has no trajectory yet.
         store.put(1, "example motion", &demo_motion().to_exact_csv(), false)?;
     }
     let tls = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
@@ -64,7 +64,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let (url, name) = (format!("{}://{listen}", if tls.is_some() { "https" } else { "http" }), port.name());
     let log = Arc::new(Mutex::new(log));
     let left = if args.sim { None } else { keep_policies(&name, &log, out)? };
-    // A relative name would name another port in another directory.
+    // A relative name would mean another port in another directory.
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
     let witness = recordings.as_mut().and_then(Prepared::witness);
@@ -122,7 +122,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let gone = line.lost();
     let rests = gone.is_none() && come_to_rest(&line, out);
     drop(recorder);
-    // The recorder's disk may have taken seconds.
+    // The status is read again, because the end of the recording may have taken seconds.
     let rests = rests && line.with(|line, _| line.status().is_some_and(|(_, status)| !moves(status)));
     owner.end();
     if let Some(keeper) = keeper.filter(|_| rests) {
@@ -152,13 +152,13 @@ fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
     Ok(Some(listener))
 }
 
-/// Returns `true` if the arm moves by this status, or can be led by hand.
+/// Returns `true` if the arm moves according to this status, or can be led by hand.
 fn moves(status: &Status) -> bool {
     status.is_executing() || status.state == ControllerState::Teaching
 }
 
-/// Stops a motion first, because no client can stop it any more, and ends teaching: the arm is held. Returns `true` if
-/// the controller reports that.
+/// Stops a motion, because no client can stop it after the end of the agent. Also ends teaching, so that the arm is
+/// held. Returns `true` if the controller reports this.
 fn come_to_rest(line: &Line, out: &Output) -> bool {
     let began = line.now();
     line.with(|line, now| line.end(now));
@@ -179,15 +179,15 @@ fn come_to_rest(line: &Line, out: &Output) -> bool {
     rests
 }
 
-/// Opens the directory for recordings, before any other step.
+/// Opens the directory for recordings. This is done before any other step.
 fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     Prepared::open(dir, limit).map_err(|error| {
         Failure::usage(format!("{}: {error}", dir.display())).next("name another directory with --record DIR")
     })
 }
 
-/// Stores which client's policy applies to a motion, for the next agent if this one is killed; also applies what the
-/// previous agent stored.
+/// Stores which client's policy applies to a motion, for the next agent in case this agent is killed. First applies the
+/// policy that a killed agent has stored.
 fn keep_policies(
     port: &str,
     log: &Arc<Mutex<CommandLog>>,
@@ -197,7 +197,7 @@ fn keep_policies(
         out.note("warning: neither XDG_STATE_HOME nor HOME is set: if this agent is killed, nobody's policy acts on what moves");
         return Ok(None);
     };
-    // By its given name: a device gets another number when it comes again.
+    // The port is stored under its given name, because a device may get another number when it is connected again.
     let port = std::path::absolute(port).map_or(port.to_owned(), |path| path.display().to_string());
     Ok(Some(Keeper::begin(&state.join("openjtc"), &port, notices(log, out, "warning"))?))
 }

@@ -4,7 +4,8 @@ use cli_kit::{Failure, Output};
 
 use crate::args::SimArgs;
 
-/// Notice about the brakes that carry the arm while no drive does.
+/// Notice about the simulated brakes. The constants after it are the notices about a stand, and about an arm without
+/// support.
 #[cfg(unix)]
 const BRAKES: &str =
     "note: simulated holding brakes keep the arm up after an error; the known drives have none";
@@ -87,7 +88,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the image in the file that keeps a stored arm, if there is one.
+/// Returns the image in the file with the stored arm, if the file exists.
 #[cfg(unix)]
 fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
     let unreadable = |what: String| {
@@ -106,13 +107,13 @@ fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
 fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
     let text =
         std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-    // Files of hand motions are in the same directory as the file that names them.
+    // Files of hand motions are in the same directory as the fault file that refers to them.
     let load = |file: &str| crate::serve::hand(&path.with_file_name(file));
     jtc_sim::FaultPlan::from_toml_with(&text, load)
         .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
 }
 
-/// The joint bus on a bus that others can join.
+/// Joint bus that is connected to a CAN bus, so that other programs can join it.
 #[cfg(unix)]
 fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
     let parsed: can_link::CanUrl = url.parse().map_err(Failure::usage)?;
@@ -122,12 +123,12 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
         return Err(Failure::usage(what)
             .next("use --bus multicast:239.74.163.2:43113, which python-can joins as udp_multicast"));
     }
-    // The error names the bus.
+    // The error already contains the name of the bus.
     let bus = can_link::open_url(&parsed).map_err(Failure::usage)?;
     Ok(jtc_sim::BusTap::new(bus))
 }
 
-/// Refuses: pseudo-terminals exist on Unix only.
+/// Returns an error, because pseudo-terminals exist only on Unix.
 #[cfg(not(unix))]
 pub fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
     Err(Failure::usage("jtc sim needs pseudo-terminals, which this system does not have")

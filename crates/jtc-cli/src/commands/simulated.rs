@@ -8,8 +8,9 @@ use jtc_sim::SimConfig;
 
 use super::named_arm;
 
-/// Returns the named arm, or the built-in one, and its world; missing parameters of the arm's file go to stderr. The
-/// controller has stored the image `kept`, else the named arm if its file is complete.
+/// Returns the given arm, or the built-in arm, and its simulated world. Prints missing parameters of the arm file on
+/// stderr. The controller has stored the image `kept`. Without it, the controller has stored the given arm, if its file
+/// is complete.
 pub fn simulated(
     path: Option<&Path>,
     kept: Option<Vec<u8>>,
@@ -29,7 +30,7 @@ pub fn simulated(
     };
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored.is_some() {
-        // The controller gets its arm as on a board: from its memory, and from frames.
+        // The controller gets its arm in the same way as a board: from its memory, and from frames.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
     }
     Ok((arm, config))

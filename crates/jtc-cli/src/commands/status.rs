@@ -25,7 +25,7 @@ pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A status as JSON, units in the keys.
+/// Returns a status as JSON. The keys contain the units.
 pub fn as_json(s: &Status) -> Value {
     let joints: Vec<Value> = Joint::ALL
         .into_iter()
@@ -83,10 +83,10 @@ pub fn as_json(s: &Status) -> Value {
     })
 }
 
-/// Returns the state of joint `j` (from 0): the last one it sent, unless the joint is silent.
+/// Returns the state of joint `j` (from 0). This is the last state that the joint has sent, unless the joint is silent.
 pub fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
-    // A joint that is not ready may answer; an enabled joint that is not measured does not.
+    // A joint that is not ready may still answer. An enabled joint that is not measured does not answer.
     let silent = !is_measured(s, j) && (words::is_silent(s, j) || state == NodeState::ENABLED);
     if words::is_absent(s, j) {
         "absent"
@@ -97,12 +97,12 @@ pub fn joint_state(s: &Status, j: usize) -> &'static str {
     }
 }
 
-/// Returns `true` if pump and vacuum of the status come from the gripper.
+/// Returns `true` if the gripper has sent the pump and vacuum values of the status.
 pub fn gripper_answers(s: &Status) -> bool {
     !words::is_silent(s, GRIPPER)
 }
 
-/// Returns the state of the gripper: the last one it sent, unless the gripper is silent.
+/// Returns the state of the gripper. This is the last state that the gripper has sent, unless the gripper is silent.
 pub fn gripper_state(s: &Status) -> &'static str {
     match s.gripper {
         Some(g) if gripper_answers(s) => g.state.name(),
@@ -188,7 +188,7 @@ mod tests {
         assert!(told.contains("next: remove what pushes the joint"), "{told}");
         let untold = text(&s, None);
         assert!(untold.contains("errors: held stop: joint 2: torque over limit\n"), "{untold}");
-        // A cleared stop is not shown.
+        // A held stop whose errors were cleared is not shown.
         assert!(!text(&Status { errors: 0, ..s }, Some(&reactions)).contains("held stop"));
     }
 

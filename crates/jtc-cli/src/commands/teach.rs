@@ -18,13 +18,13 @@ use crate::operator::ended_at_once;
 use crate::progress::Progress;
 use taught_file::TaughtFile;
 
-/// Largest deviation of waypoints from the motion, rad, unless the user names another.
+/// Default for the largest deviation of waypoints from the motion, rad.
 const TOLERANCE: f64 = 0.01;
 
 /// Runs a command of the family.
 pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
-        // Notes about a file that cannot be opened are events, too.
+        // The events begin here, so that a note about a file that cannot be opened is an event as well.
         out.stream()?;
     }
     match command {
@@ -62,7 +62,7 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Records until the user or the time ends it; with a tolerance (rad) as waypoints.
+/// Records until the user or the time ends the recording. With a tolerance (rad), the result is a file of waypoints.
 fn record(
     file: OutputFile,
     link: &LinkArgs,
@@ -82,7 +82,8 @@ fn record(
         return Err(Failure { message, ..Failure::of(&jtc_host::Error::Cancelled) });
     }
     let was_on = status.state == ControllerState::Teaching;
-    // Set before the request: even without a confirmation the controller may have accepted it.
+    // The flag is set before the request, because the controller may accept the request even if its confirmation is
+    // lost.
     teaching.store(true, Ordering::Relaxed);
     if !was_on {
         session.teach(true)?;
@@ -97,14 +98,15 @@ fn record(
             Ok(s) if s.state == ControllerState::Teaching => {
                 match taught.take((session.now() - start).as_secs_f64(), s.positions()) {
                     Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
-                    // A user need not guide the arm for a lost file: the arm is held, as at Ctrl-C.
+                    // If the file is lost, the user does not need to guide the arm any longer. The arm is held, as
+                    // after Ctrl-C.
                     Err(e) => {
                         lost = Some(e);
                         break;
                     }
                 }
             }
-            // A Stop of another program holds the arm: the user has let go of it, or is about to.
+            // After a Stop of another program the arm is held, and the user can let go of it.
             Ok(s) => {
                 teaching.store(false, Ordering::Relaxed);
                 failed = Some(taught_no_more(&s));
@@ -125,13 +127,14 @@ fn record(
     failed.map_or(written, Err)
 }
 
-/// Returns the failure if teaching was not ended by this command.
+/// Returns the failure if another program, or an error, has ended teaching.
 fn taught_no_more(status: &Status) -> Failure {
     let message = format!("another program ended teaching: state {}; the recording ends there", status.state);
     Failure::new(ErrorKind::Fault, "not-teaching", message).next("`jtc teach record FILE` starts a new one")
 }
 
-/// Handles Ctrl-C: the first one is a request, the second one ends the command with the state at that moment.
+/// Handles Ctrl-C. The first one requests the end. The second one ends the command at once and reports the state at
+/// that moment.
 fn stop_at_once_with(
     out: Output,
     teaching: Arc<AtomicBool>,

@@ -1,5 +1,5 @@
-//! Splits the controller's bytes into complete statuses, so that a host that connects in between never sees half of
-//! one.
+//! Splits the controller's bytes into complete statuses, so that a host that connects later never receives a part of a
+//! status.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -11,12 +11,12 @@ const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8]
 
 /// Silence that ends a frame (J-03).
 pub const GAP: Duration = Duration::from_millis(5);
-/// Systems pass a write to a terminal in pieces, the first of at least this many bytes.
+/// Smallest size of the first piece when the operating system passes a long write to a terminal in pieces, bytes.
 const PIECE: usize = 2048;
 /// Time of a byte on a serial line of 115,200 baud.
 const BYTE: Duration = Duration::from_micros(87);
 
-/// Received bytes, and the complete pieces.
+/// Received bytes, and the complete frames.
 #[derive(Default)]
 pub struct Frames {
     partial: Vec<u8>,
@@ -24,7 +24,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Takes bytes in. Bytes that are not a status (a damaged line) are passed on unchanged.
+    /// Takes bytes. Bytes that are not a status (from a disturbed line) are passed on unchanged.
     pub fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let n = self.partial.len();
@@ -55,35 +55,34 @@ impl Frames {
         self.whole.is_empty()
     }
 
-    /// Returns the oldest piece.
+    /// Takes the oldest frame.
     pub fn pop(&mut self) -> Option<Vec<u8>> {
         self.whole.pop_front()
     }
 }
 
-/// Follows the host's bytes just enough to know whether a frame is in progress, and since when its next byte is
-/// missing.
+/// Follows the host's bytes to determine if a frame is incomplete, and since when its next byte is missing.
 ///
-/// Virtual time may pass faster than the host's: with `--speed max`, and while the simulator makes up for a delay. A
-/// gap between two pieces of a frame must then not be longer than it was for the host.
+/// With `--speed max`, and while the simulator makes up for a delay, virtual time passes faster than the host's time. A
+/// gap between two pieces of a frame must then not become longer than it was for the host.
 ///
-/// A busy system can suspend a host between two pieces of one write for longer than a frame may be silent. The adapter
-/// of a real line still sends its buffer then. So a long frame counts as silent only after a line would have sent its
-/// received bytes.
+/// A busy system can suspend a host between two pieces of one write for longer than the gap that ends a frame. On a
+/// real line the adapter would still be sending the bytes in its buffer. So in a long frame, the silence begins only
+/// after a real line would have sent the received bytes.
 pub struct Incoming {
     head: Vec<u8>,
-    /// Received bytes of the current frame.
+    /// Number of received bytes of the current frame.
     come: usize,
-    /// Missing bytes of the current frame.
+    /// Number of missing bytes of the current frame.
     missing: usize,
     /// `true` if bytes have arrived that continue a frame.
     continued: bool,
-    /// Time when the line carried the last byte; for a long frame, the time on a serial line.
+    /// Time at which the line carried the last byte. For a long frame, this is the time on a real serial line.
     heard: Instant,
 }
 
 impl Incoming {
-    /// Creates the state without any byte.
+    /// Creates the state before the first byte.
     pub fn new(now: Instant) -> Self {
         Self { head: Vec::new(), come: 0, missing: 0, continued: false, heard: now }
     }
@@ -128,8 +127,8 @@ impl Incoming {
         self.missing > 0 || !self.head.is_empty()
     }
 
-    /// Returns how long the host has been silent within a frame, also at the moment that ends the silence. Returns
-    /// `None` outside a frame, or after a silence that means that the frame will not be completed.
+    /// Returns how long the host has been silent within a frame, also at the moment when the silence ends. Returns
+    /// `None` outside a frame, or after a silence so long that the frame will not be completed.
     pub fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);
@@ -207,7 +206,7 @@ mod tests {
         let mut incoming = Incoming::new(start);
         let mut frame = vec![0; 9006];
         frame[..4].copy_from_slice(&[HEADER, 0x04, 0x23, 0x2E]);
-        // The host is suspended after 2,048 bytes, which take 178 ms on a line.
+        // The host is suspended after it has sent 2,048 bytes, which take 178 ms on a line.
         incoming.push(&frame[..2048], start);
         assert_eq!(incoming.silence(start), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
@@ -218,7 +217,7 @@ mod tests {
         incoming.carries(later(171));
         assert_eq!(incoming.silence(later(171)), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(176)), None, "the credit ends with the frame");
-        // If the host died there, the time counts as silence afterwards; the simulator does not wait for a short frame.
+        // If the host ends there, the later time is silence. For a short frame, the simulator does not wait.
         incoming.push(&frame[..2048], later(170));
         assert!(incoming.silence(later(300)).is_some() && incoming.silence(later(400)).is_none());
         incoming.push(&frame[..2047], later(600));

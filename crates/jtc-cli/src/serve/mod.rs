@@ -18,16 +18,18 @@ use frames::{Frames, Incoming};
 pub use pty::{Pty, PtyError};
 pub use typed::{Typed, hand};
 
-/// Largest number of host bytes that wait for the line, as in an adapter's buffer; beyond that the host's writes block.
+/// Largest number of host bytes that wait for the line, like the buffer of an adapter. When it is full, the host's
+/// writes block.
 const WAITING_MAX: usize = 4096;
-/// Longest wait for a host to read before statuses are lost, when virtual time runs free.
+/// With free-running virtual time: longest wait for a host to read before statuses are lost.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay that is made up for; after a longer one (a suspended computer) time continues from here.
+/// Largest delay that the simulator makes up for, µs. After a longer delay (a suspended computer), the missed time is
+/// skipped.
 const CATCH_UP_US: u64 = 2_000_000;
 /// A tick, µs.
 const TICK_US: u64 = 1000;
 
-/// The joint bus on a bus that others can join.
+/// Joint bus that is connected to a CAN bus, so that other programs can join it.
 pub type Tap = BusTap<Box<dyn CanBus + Send>>;
 
 /// The loop's state.
@@ -38,21 +40,22 @@ pub struct Server {
     typed: Typed,
     frames: Frames,
     incoming: Incoming,
-    /// Bytes of a frame that the terminal did not take at once.
+    /// Bytes of a frame that the terminal did not accept at once.
     rest: Vec<u8>,
     connected: bool,
-    /// `true` if the host has not read for long: statuses are lost until it does.
+    /// `true` if the host has not read for a long time. Statuses are lost until it reads again.
     stalled: bool,
     /// `true` after the first status of the controller.
     answers: bool,
     /// Sink for every tick.
     sink: Option<SampleSink>,
-    /// File of the stored arm, and the number of the one in it.
+    /// File of the stored arm, and the number of the arm that it contains.
     keeps: Option<(PathBuf, u32)>,
 }
 
 impl Server {
-    /// Creates a world on a terminal, with its joint bus on `tap` and the typed events.
+    /// Creates a server for a world on a terminal. `tap` is its joint bus, and `typed` are the events that the user
+    /// types.
     pub fn new(world: World, pty: Pty, tap: Option<Tap>, typed: Typed) -> Self {
         Self {
             world,
@@ -96,7 +99,7 @@ impl Server {
         }
     }
 
-    /// Runs until `stop`; calls `ready` when the first status has left the controller. Returns the virtual time, s.
+    /// Runs until `stop`. Calls `ready` when the controller has sent its first status. Returns the virtual time, s.
     pub fn run(&mut self, speed: SimSpeed, stop: &Stop, ready: impl FnOnce()) -> Result<f64, PtyError> {
         let mut ready = Some(ready);
         let mut start = Instant::now();
@@ -131,7 +134,7 @@ impl Server {
             if let Some(tap) = &mut self.tap
                 && let Err(e) = tap.exchange(&mut self.world)
             {
-                // Other devices on the bus are optional: without them the arm continues.
+                // Other devices on the bus are optional, so the arm continues without them.
                 eprintln!("jtc: CAN: {e}; the joint bus is no longer shared");
                 self.tap = None;
             }
@@ -145,7 +148,7 @@ impl Server {
         Ok(self.world.now_us() as f64 * 1e-6)
     }
 
-    /// Passes the host's bytes to the line, as many as an adapter would hold.
+    /// Passes as many of the host's bytes to the line as the buffer of an adapter would hold.
     fn take_input(&mut self) -> Result<(), PtyError> {
         let mut buffer = [0; WAITING_MAX];
         loop {
@@ -172,7 +175,7 @@ impl Server {
         self.world.limit_host_silence(silence.map(|silence| silence.as_micros() as u64));
     }
 
-    /// Passes statuses to the host; without a host they are lost, as on an open line.
+    /// Passes statuses to the host. Without a host they are lost, as on a line with an open end.
     fn give_output(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let mut buffer = [0; 1024];
         loop {
@@ -209,7 +212,7 @@ impl Server {
     }
 
     /// Writes the rest of a frame. A host that does not read must not delay the arm: in real time the simulator does
-    /// not wait, and with free-running time only for a while.
+    /// not wait. With free-running time it waits only for a limited time.
     fn write_rest(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

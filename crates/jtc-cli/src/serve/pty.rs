@@ -16,7 +16,7 @@ use rustix::termios::{LocalModes, OptionalActions, OutputModes, QueueSelector};
 /// Reason why the terminal cannot be used.
 #[derive(Debug)]
 pub enum PtyError {
-    /// The path is taken by a file that must not be replaced.
+    /// A file that must not be replaced already exists at the path.
     Taken {
         /// The requested path.
         path: PathBuf,
@@ -57,8 +57,8 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// Creates a pseudo-terminal in raw mode; `link` becomes a symbolic link to it. A link left by an earlier run is
-    /// replaced, any other file is not.
+    /// Creates a pseudo-terminal in raw mode, with `link` as a symbolic link to it. Replaces a link that an earlier run
+    /// has left, but no other file.
     pub fn open(link: Option<&Path>) -> Result<Self, PtyError> {
         if let Some(link) = link {
             check_free(link)?;
@@ -76,7 +76,7 @@ impl Pty {
 
     fn put_link(&self) -> Result<(), PtyError> {
         let Some(link) = &self.link else { return Ok(()) };
-        // A new link is moved over the old one, so that the link always exists.
+        // The new link is renamed over the old one, so that the link always exists.
         let name = link.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let new = link.with_file_name(format!(".{name}.{}", std::process::id()));
         let _ = fs::remove_file(&new);
@@ -85,7 +85,7 @@ impl Pty {
             .map_err(|source| PtyError::Io { what: "symbolic link", source })
     }
 
-    /// Reads the available bytes; 0 without bytes, or if no host has the port open.
+    /// Reads the available bytes. Returns 0 if there are no bytes, or if no host has the port open.
     pub fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         match rustix::io::read(&self.master, buffer) {
             Ok(n) => Ok(n),
@@ -114,7 +114,7 @@ impl Pty {
         self.wait(PollFlags::IN, timeout)
     }
 
-    /// Waits for space for bytes to the host.
+    /// Waits until bytes to the host can be written.
     pub fn wait_room(&self, timeout: Duration) -> Result<(), PtyError> {
         self.wait(PollFlags::OUT, timeout)
     }
@@ -122,7 +122,7 @@ impl Pty {
     fn wait(&self, flags: PollFlags, timeout: Duration) -> Result<(), PtyError> {
         let found = self.poll(flags, timeout)?;
         if found.contains(PollFlags::HUP) && !found.contains(PollFlags::IN) {
-            // Without a host, polling returns at once: sleep instead.
+            // Without a host, `poll` returns at once, so the thread sleeps instead.
             std::thread::sleep(timeout);
         }
         Ok(())
@@ -138,8 +138,8 @@ impl Pty {
         }
     }
 
-    /// Discards the bytes that a disconnected host did not read. A killed host may have left the port locked; then a
-    /// new pseudo-terminal replaces the old one under the same link.
+    /// Discards the bytes that a disconnected host did not read. If a killed host has left the port locked, a new
+    /// pseudo-terminal replaces the old one under the same link.
     pub fn renew(&mut self) -> Result<(), PtyError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
         match rustix::fs::open(&self.slave, flags, Mode::empty()) {
@@ -178,7 +178,8 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     rustix::pty::unlockpt(&master).map_err(fails("unlock the pseudo-terminal"))?;
     let name = rustix::pty::ptsname(&master, Vec::new()).map_err(fails("name of the pseudo-terminal"))?;
     let slave = PathBuf::from(name.to_string_lossy().into_owned());
-    // Opened once, so that it is raw before any host connects, and so that a missing host is seen as a hang-up.
+    // The host's end is opened once, so that it is in raw mode before a host connects. After that, a missing host is
+    // reported as a hang-up.
     let open = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let first = rustix::fs::open(&slave, open, Mode::empty()).map_err(fails("open the host's end"))?;
     raw(&first).map_err(fails("raw mode"))?;
@@ -187,8 +188,8 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     Ok((master, slave))
 }
 
-/// Checks that a path is free, or a link left by a simulator: a dangling link, or a link to a pseudo-terminal that
-/// another program uses by now.
+/// Checks that a path is free, or contains a link that an earlier simulator has left. Such a link is dangling, or leads
+/// to a pseudo-terminal that another program uses by now.
 fn check_free(path: &Path) -> Result<(), PtyError> {
     let taken = |what| Err(PtyError::Taken { path: path.to_owned(), what });
     match fs::symlink_metadata(path) {
@@ -204,7 +205,7 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
 }
 
 /// Returns `true` if a program uses this pseudo-terminal as a serial port: it is open and raw, unlike the terminal of a
-/// shell. A terminal that a host has locked is in use, too.
+/// shell. A terminal that a host has locked is also in use.
 fn serves(terminal: &Path) -> bool {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
     match rustix::fs::open(terminal, flags, Mode::empty()) {

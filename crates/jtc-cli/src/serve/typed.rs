@@ -8,7 +8,7 @@ use jtc_host::trajectory::Loaded;
 use jtc_sim::{HandPath, TypedEvent, World};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-/// Period of checks whether the program is in the foreground of its terminal.
+/// Interval of the checks if the program is in the foreground of its terminal.
 const LOOK: Duration = Duration::from_millis(200);
 /// Longest line.
 const LINE_MAX: usize = 4096;
@@ -26,8 +26,8 @@ impl Typed {
         Self { lines }
     }
 
-    /// Applies the lines typed since the last call to `world`; invalid lines are reported on stderr, and the arm
-    /// continues.
+    /// Applies the lines typed since the last call to `world`. Invalid lines are reported on stderr and have no effect
+    /// on the arm.
     pub fn act(&self, world: &mut World) {
         while let Ok(line) = self.lines.try_recv() {
             match TypedEvent::parse(&line).map_err(|e| e.to_string()) {
@@ -52,7 +52,7 @@ fn happen(event: &TypedEvent, world: &mut World) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns the joint positions of a trajectory file as the path of a hand.
+/// Returns the joint positions of a trajectory file as the path of a hand that leads the arm.
 pub fn hand(path: &Path) -> Result<HandPath, String> {
     let trajectory = Loaded::load(path, None).map_err(|e| format!("hand: {e}"))?.trajectory;
     let points = trajectory.points.iter().map(|point| point.position).collect();
@@ -60,7 +60,7 @@ pub fn hand(path: &Path) -> Result<HandPath, String> {
     HandPath::new(points, step_s).ok_or_else(|| format!("hand: {}: the file has no points", path.display()))
 }
 
-/// Gives the lines of the standard input to `take` until it returns `false` or the input ends.
+/// Passes the lines of the standard input to `take` until it returns `false` or the input ends.
 ///
 /// The system stops a program in the background that reads from its terminal (SIGTTIN). So the thread reads only when
 /// input is available, and not while another program is in the foreground.
@@ -100,7 +100,7 @@ fn text(line: &mut Vec<u8>) -> String {
     String::from_utf8_lossy(&std::mem::take(line)).into_owned()
 }
 
-/// Returns `true` if the standard input is a terminal, and another program is in its foreground.
+/// Returns `true` if the standard input is a terminal and another program is in the foreground.
 fn in_background() -> bool {
     let stdin = rustix::stdio::stdin();
     rustix::termios::isatty(stdin)

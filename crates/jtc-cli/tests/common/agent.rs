@@ -8,14 +8,15 @@ use serde_json::Value;
 
 use super::{command, slow_motion};
 
-/// `jtc` with its state and sockets in this directory.
+/// Returns a `jtc` command that keeps its state and sockets in this directory.
 pub fn command_in(dir: &tempfile::TempDir) -> Command {
     let mut command = command();
     command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
     command
 }
 
-/// Starts an agent with these options at a free port of this computer; returns it with its output when it is ready.
+/// Starts an agent with these options at a free port of this computer. When it is ready, returns the process and its
+/// output.
 pub fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child, Value) {
     let mut child = command_in(dir)
         .args(["--json", "serve", "--listen", "127.0.0.1:0"])
@@ -31,7 +32,7 @@ pub fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child,
     (child, ready)
 }
 
-/// Running agent; it ends with the test.
+/// Running agent, which ends with the test.
 pub struct Agent {
     pub child: Child,
     pub url: String,
@@ -50,14 +51,14 @@ impl Agent {
         Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
     }
 
-    /// `jtc` at this port, or at the agent's address.
+    /// Returns a `jtc` command for this port, or for the agent's address.
     pub fn command(&self, words: &[&str], port: &str) -> Command {
         let mut command = command_in(&self.dir);
         command.args(words).args(["--port", port]);
         command
     }
 
-    /// Runs `jtc` through it.
+    /// Runs `jtc` through the agent.
     pub fn jtc(&self, words: &[&str]) -> CommandOutput {
         run(self.command(words, &self.url), &[], "")
     }
@@ -69,7 +70,7 @@ impl Agent {
         file.to_str().expect("a name").to_owned()
     }
 
-    /// Ends the agent with this signal; returns its exit code and its directory.
+    /// Ends the agent with this signal. Returns its exit code and its directory.
     pub fn end(mut self, signal: &str) -> (Option<i32>, tempfile::TempDir) {
         Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
         let code = self.child.wait().expect("it ends").code();

@@ -1,4 +1,4 @@
-//! Runs the `jtc` command as a user does, and a simulated controller for it to talk to.
+//! Runs the `jtc` command like a user, and a simulated controller that it can connect to.
 
 pub mod agent;
 
@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use cli_kit::trial::{CommandOutput, program, run};
 use serde_json::Value;
 
-/// `jtc`, without environment variables.
+/// Returns a `jtc` command without environment variables.
 pub fn command() -> Command {
     program(env!("CARGO_BIN_EXE_jtc"), "JTC_")
 }
@@ -32,7 +32,7 @@ impl Dir {
         Self(tempfile::tempdir().expect("a directory"))
     }
 
-    /// Returns a path in it.
+    /// Returns a path in the directory.
     pub fn path(&self, name: &str) -> String {
         self.0.path().join(name).to_str().unwrap().to_owned()
     }
@@ -49,7 +49,7 @@ impl Dir {
     }
 }
 
-/// Simulated controller on a pseudo-terminal; it ends with the test.
+/// Simulated controller on a pseudo-terminal, which ends with the test.
 pub struct Sim {
     child: Child,
     stderr: BufReader<std::process::ChildStderr>,
@@ -63,7 +63,7 @@ impl Sim {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
 
-    /// Like `start`, at `jtc` in a directory that may already hold files.
+    /// Like `start`, in a directory that may already contain files.
     pub fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let port = dir.path().join("jtc");
         let mut child = command()
@@ -93,31 +93,31 @@ impl Sim {
         Self::start_in(dir, &[options, &["--faults", file.to_str().unwrap()]].concat())
     }
 
-    /// Gives the controller its parameters.
+    /// Sends the controller its parameters.
     pub fn with_parameters(self) -> Self {
         self.jtc(&["params", "use-defaults"]).ends(0);
         self
     }
 
-    /// Gives the controller its parameters and waits until it holds the arm.
+    /// Sends the controller its parameters and waits until it holds the arm.
     pub fn held(self) -> Self {
         self.jtc(&["recover", "--defaults"]).ends(0);
         self
     }
 
-    /// `jtc` at its port.
+    /// Returns a `jtc` command for the simulator's port.
     pub fn command(&self, words: &[&str]) -> Command {
         let mut command = command();
         command.args(words).args(["--port", self.port.to_str().unwrap()]);
         command
     }
 
-    /// Runs `jtc` at its port.
+    /// Runs `jtc` at the simulator's port.
     pub fn jtc(&self, words: &[&str]) -> CommandOutput {
         run(self.command(words), &[], "")
     }
 
-    /// Returns the answer of `jtc --json` with these words; panics if the command ends with another code.
+    /// Returns the answer of `jtc --json` with these words. Panics if the exit code is not `code`.
     pub fn json(&self, words: &[&str], code: i32) -> Value {
         self.jtc(&[&["--json"], words].concat()).ends(code).json()
     }
@@ -210,7 +210,7 @@ pub fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std:
     child
 }
 
-/// Returns a smooth trajectory file from the zero pose and back: `amplitude` rad in 1.2 s.
+/// Returns a smooth trajectory file that moves `amplitude` rad from the zero pose and back in 1.2 s.
 pub fn motion(amplitude: f64) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=120 {

@@ -20,7 +20,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 /// Bytes of the program in an image of [`super::image`].
 const PROGRAM: usize = 0x1000;
 
-/// Returns the program that a board with this image in flash reports; computed bit by bit, as in the definition.
+/// Returns the program data that a board with this image in flash reports. Computed bit by bit, as in the definition.
 pub fn program_of(image: &[u8]) -> Program {
     let mut register = u32::MAX;
     for byte in &image[..PROGRAM] {
@@ -32,7 +32,7 @@ pub fn program_of(image: &[u8]) -> Program {
     Program { bytes: PROGRAM as u32, crc32: !register }
 }
 
-/// Processor and ST-LINK of a board; both end with it.
+/// Processor and ST-LINK of a board. Both end when this is dropped.
 pub struct Board {
     /// Its serial port.
     pub port: String,
@@ -51,7 +51,7 @@ struct Flashed {
 }
 
 impl Board {
-    /// Creates a board with an arm without torque, and a drive at this folder, which takes an image of this length.
+    /// Creates a board with an arm without torque, and a drive at this folder that accepts an image of this length.
     pub fn new(board: &str, drive: &Path, length: usize) -> Self {
         let (master, port) = pseudo_terminal();
         let mut status = Status { state: ControllerState::Init.into(), ..Status::default() };
@@ -104,7 +104,7 @@ impl Running {
         let few_ms = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
         let _ = poll(&mut ends, Some(&few_ms));
         if ends[0].revents().contains(PollFlags::HUP) {
-            // The port is not open.
+            // No program has the port open.
             thread::sleep(Duration::from_millis(5));
         } else {
             self.serve();
@@ -140,11 +140,11 @@ impl Running {
         }
     }
 
-    /// The ST-LINK writes the image into the flash and resets the processor.
+    /// Simulates the ST-LINK, which writes the image into the flash and resets the processor.
     fn take(&self, file: &Path) {
         let bytes = fs::read(file).unwrap();
         fs::remove_dir_all(&self.drive).unwrap();
-        // Longer than the command waits for a status before it looks at the drive again.
+        // This is longer than the command waits for a status before it checks the drive again.
         thread::sleep(Duration::from_millis(1_800));
         let mut flashed = self.flashed.lock().unwrap();
         (flashed.program, flashed.started, flashed.before_ms) = (Some(program_of(&bytes)), Instant::now(), 0);

@@ -1,4 +1,4 @@
-//! Agent of a simulated controller on a serial port, each in its own process.
+//! Simulated controller on a serial port, and its agent, each in its own process.
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, Stdio};
@@ -22,7 +22,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// `tenths`: duration of its motion, 0.1 s.
+    /// Starts the processes. `tenths`: duration of the motion in tenths of a second.
     pub fn new(baud: &str, tenths: i32) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let sim = Sim::start(&["--baud", baud]).with_parameters();
@@ -43,7 +43,7 @@ impl Cell {
         cell
     }
 
-    /// Starts a run through the agent, with a policy for the loss of its program.
+    /// Starts a run through the agent. The policy applies when the program of the run is lost.
     pub fn run(&self, policy: &str) -> Child {
         self.jtc(&["--json", "traj", "run", &self.motion, "--when-gone", policy, "--port", &self.url])
             .stdout(Stdio::piped())
@@ -123,7 +123,7 @@ impl Cell {
     /// Returns the log lines of agents about the policy of a killed agent.
     pub fn found(&self) -> Vec<Value> {
         let text = std::fs::read_to_string(self.dir.path().join("commands.jsonl")).expect("a log");
-        // The last line may not be on the disk yet.
+        // The last line may not be complete on the disk yet, so invalid lines are skipped.
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         lines.filter(|line| line["what"].as_str().is_some_and(|what| what.starts_with("policy-"))).collect()
     }
@@ -135,7 +135,7 @@ impl Cell {
         paths.find(|path| path.extension().is_some_and(|kind| kind == "json"))
     }
 
-    /// Checks that the arm rests for this time, and that no motion begins.
+    /// Checks that the arm stays at rest for this time, and that no motion begins.
     pub fn rests(&self, time: Duration) -> Value {
         let (seen, mut patience) = (Instant::now(), Patience::begin());
         loop {
@@ -198,7 +198,7 @@ impl Program {
     }
 }
 
-/// Returns `false` for a message without a status, as on a computer so busy that none comes in time.
+/// Returns `false` for a message without a status. On a very busy computer, a status may not arrive in time.
 fn is_status(value: &Value) -> bool {
     value["state"].is_string()
 }

@@ -1,15 +1,16 @@
-//! The other phases than upload and motion, and programs that use only HTTP.
+//! Phases other than upload and motion, and programs that use only HTTP.
 use std::time::Duration;
 
 use serde_json::{Value, json};
 
 use super::cell::{Cell, trajectory};
 
-/// Time after the check at which the upload of the long motion, which takes five seconds, is in progress.
+/// Time after the check at which the upload of the long motion is in progress. The upload takes five seconds.
 pub const IN_UPLOAD: Duration = Duration::from_millis(700);
-/// Hold-off after a client's or a policy's Pause, in which no other client begins a motion.
+/// Slightly more than the hold-off after a Pause of a client or a policy. During the hold-off no other client can begin
+/// a motion.
 const CALM: Duration = Duration::from_millis(3100);
-/// Observation time in which the arm must rest.
+/// Observation time during which the arm must stay at rest.
 pub const REST: Duration = Duration::from_millis(500);
 
 pub fn state(status: &Value) -> &str {
@@ -20,13 +21,13 @@ pub fn is_taught(status: &Value) -> bool {
     state(status) == "Teaching"
 }
 
-/// Returns `true` once all drives are enabled, some seconds after the start.
+/// Returns `true` if all drives are enabled, which takes some seconds after the start.
 pub fn is_held(status: &Value) -> bool {
     let enabled = |joint: &Value| joint["state"] == "OperationEnable";
     state(status) == "HoldPos" && status["joints"].as_array().is_some_and(|joints| joints.iter().all(enabled))
 }
 
-/// A motion of 1600 points.
+/// Returns a motion of 1600 points.
 pub fn long_motion(cell: &Cell) -> String {
     let text: String = (0..1600)
         .map(|i| {
@@ -47,13 +48,13 @@ pub fn pause(cell: &Cell) {
     cell.until("Pause", |status| trajectory(status) == "Pause" && is_held(status));
 }
 
-/// Removes torque and parameters: from there `recover` runs all its steps.
+/// Removes torque and parameters, so that `recover` must run all its steps.
 fn disable(cell: &Cell) {
     cell.done(&["disable", "--yes"]);
     cell.until("Init", |status| state(status) == "Init");
 }
 
-/// Recovers from any state, as after every fault.
+/// Recovers the arm from any state, like a user after a fault.
 fn recover(cell: &Cell) {
     cell.done(&["recover", "--defaults"]);
     cell.until("a held arm", is_held);
@@ -124,7 +125,7 @@ fn a_command_that_is_killed_leaves_what_it_has_begun_to_its_policy_or_as_it_is()
     recover(&cell);
 }
 
-/// Duration of its lease without a request.
+/// Time without a request after which the lease lapses.
 const LASTS: Duration = Duration::from_millis(1500);
 
 /// A program that uses only HTTP, and is silent after its last request.
@@ -190,8 +191,8 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
         assert_eq!(kept.0, 200, "{}", kept.1);
     }
 
-    // A check or an upload, whose start the client has seen: the choice depends on the speed of this
-    // machine.
+    // The client has seen the start of the check or of the upload. Which of the two it is depends on the speed of this
+    // computer.
     let job = Silent::come(&cell, "pause").begins("POST /api/runs", json!({ "trajectory": 7 }));
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");

@@ -1,5 +1,5 @@
-//! First action of a new agent after the previous one was killed: the policy of the lease holder applies to an arm that
-//! still moves.
+//! First action of a new agent after the previous agent was killed: it applies the policy of the lease holder to an arm
+//! that still moves.
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -8,7 +8,8 @@ use test_kit::patience::{Patience, until};
 use super::cell::{Cell, moves, trajectory};
 use super::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
-/// Checks the file before the agent is killed: it names the moving job, and a separate thread writes it.
+/// Checks the file before the agent is killed: it contains the policy and the cause of the motion. A separate thread
+/// writes it.
 fn is_left(cell: &Cell, policy: &str, what: &str) {
     let mut patience = Patience::begin();
     loop {
@@ -31,7 +32,7 @@ fn next(cell: &mut Cell) -> Value {
     follow(cell)
 }
 
-/// Like [`next`], after an agent was killed.
+/// Like [`next`], after the previous agent was killed.
 fn follow(cell: &mut Cell) -> Value {
     let before = cell.found().len();
     cell.next_agent();
@@ -77,7 +78,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
         if policy == "pause" {
-            // The motion can be resumed: this is left to the next agent, too.
+            // The motion can be resumed, so the policy is also stored for the agent after this one.
             is_left(&cell, policy, "motion");
             let found = next(&mut cell);
             assert_eq!(done(&found), "it stays paused");
@@ -86,7 +87,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             cell.until("Finish", |status| trajectory(status) == "Finish");
         }
         is_gone(&cell);
-        // Without a motion the report is empty.
+        // Without a motion the agent has nothing to report.
         let before = cell.found().len();
         cell.kill_agent();
         cell.next_agent();

@@ -15,7 +15,7 @@ use crate::args::{AcceptArgs, LinkArgs, OverwriteArgs};
 use crate::limits;
 use crate::link::LinkPort;
 
-/// Gives the controller the whole arm.
+/// Sends all parameters of the arm to the controller.
 pub(super) fn push(
     file: &Path,
     store: bool,
@@ -72,7 +72,7 @@ fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }
 
-/// Returns the failure: settings are refused outside Init and Error.
+/// Returns the failure of a refused setting, with a hint that the controller accepts settings only in Init and Error.
 fn refused(error: Error, arm: &Arm) -> Failure {
     let failure = Failure::of(&error);
     match error {
@@ -87,7 +87,7 @@ fn refused(error: Error, arm: &Arm) -> Failure {
     }
 }
 
-/// Gives parameters to a controller that accepts friction, gains and model only.
+/// Sends the parameters to a controller without extensions, which accepts only friction, gains and model.
 fn without_extensions(
     session: &mut Session<LinkPort>,
     arm: &Arm,
@@ -128,7 +128,7 @@ pub(super) fn pull(
     Ok(())
 }
 
-/// Lists the differences.
+/// Lists the differences between the arm file and the controller's arm.
 pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arm = Arm::load(file)?;
     let mut session = link.session()?;

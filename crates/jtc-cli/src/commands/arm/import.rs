@@ -40,7 +40,7 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Lists the changes by kind; the same change of several joints is one line.
+/// Lists the changes by kind. The same change of several joints is listed in one line.
 fn changes(warnings: &[Warning]) -> String {
     let mut kinds: BTreeMap<Change, Vec<(&str, Vec<&str>)>> = BTreeMap::new();
     for w in warnings {
@@ -54,7 +54,7 @@ fn changes(warnings: &[Warning]) -> String {
     for (change, lines) in kinds {
         text += &format!("{}\n", change.heading());
         for (problem, places) in lines {
-            // "joint a, b, c": the kind of place once.
+            // The word "joint" is printed only once, as in "joint a, b, c".
             let rest = |place: &&str| place.strip_prefix("joint ").unwrap_or(place).to_owned();
             let more: Vec<String> = places[1..].iter().map(rest).collect();
             let all = [vec![places[0].to_owned()], more].concat();

@@ -8,7 +8,7 @@ use serde_json::json;
 /// Degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// Shows the arm; `name` is its file, or its owner.
+/// Shows the arm. `name` is its file, or the controller that it was read from.
 pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(), Failure> {
     let mut values = arm.values();
     if deg {
@@ -60,7 +60,7 @@ fn in_degrees(v: &mut ArmValue) {
 
 /// Formats a number with five significant digits, without trailing zeros.
 pub(super) fn number(value: f64) -> String {
-    // Rounding errors of rotated frames count as 0.
+    // Rounding errors of rotated frames are shown as 0.
     if value.abs() < 1e-11 {
         return "0".into();
     }

@@ -21,7 +21,7 @@ pub const COLOURS: [Color; 6] = [
     Color::Rgb(227, 200, 76),
 ];
 
-/// A column: head, width, and the least width of the view that has it.
+/// A column: head, width, and the smallest width of the view at which it is shown.
 type Column = (&'static str, u16, u16);
 
 const COLUMNS: [Column; 7] = [
@@ -47,7 +47,7 @@ fn is_broken(s: &Status, j: usize) -> bool {
     joint.state.is_fault() || joint.errors != 0 || joint.internal != 0 || joint.mc_current != 0
 }
 
-/// Returns as many words as fit, and the number of the others; the head of the view has them all.
+/// Returns as many words as fit, and the number of words left out. The head of the view shows all of them.
 fn fitting(words: &[&str], width: usize) -> String {
     for count in (1..=words.len()).rev() {
         let more = words.len() - count;
@@ -59,8 +59,8 @@ fn fitting(words: &[&str], width: usize) -> String {
     if words.is_empty() { String::new() } else { format!("{} above", words.len()) }
 }
 
-/// Returns all rows, unknown joints first, then those with an error: the last values of a silent joint are outdated.
-/// Without statuses all joints are unknown.
+/// Returns all rows: first the joints whose values are unknown, then those with an error. The values of a silent joint
+/// are unknown, because the last ones are outdated. Without statuses all joints are unknown.
 fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     let room = usize::from(width.saturating_sub(WITH_WORDS));
     let known = |j: usize| !silent && is_measured(s, j);
@@ -136,7 +136,7 @@ pub fn table(s: &Status, silent: bool, width: u16, framed: bool, first: usize) -
     }
     let head = Row::new(COLUMNS.iter().filter(shown).map(|c| {
         let width = usize::from(c.1);
-        // Heads of figures stand over their last digit.
+        // The head of a column of figures is aligned to the right, like the figures.
         if c.0 == "state" { c.0.to_owned() } else { format!("{:>width$}", c.0) }
     }));
     let table = Table::new(rows(s, silent, width).into_iter().skip(first), widths).header(head.dark_gray());

@@ -1,6 +1,6 @@
-//! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first, and
-//! unmeasured joints lead the table. Text without space scrolls, the keys are always visible, and curves fill the
-//! remaining space.
+//! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first. In the
+//! table, unmeasured joints come first. Text that does not fit can be scrolled, and the keys are always visible. The
+//! curves fill the remaining space.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -18,15 +18,15 @@ use ratatui::widgets::{Paragraph, Sparkline};
 
 use super::joints::{self, COLOURS};
 
-/// Values that the curves show: 8 s of statuses.
+/// Number of values that the curves show: 8 s of statuses.
 const HISTORY: usize = 200;
-/// Least number of rows with a row for a good link.
+/// Smallest height of the view, in rows, with a row for a good link.
 const LINK: u16 = 16;
-/// Least height of the curves.
+/// Smallest height of the curves.
 const CURVES: u16 = 6;
-/// Least number of joint rows with their head, for any number of errors.
+/// Smallest number of joint rows with their head, for any number of errors.
 const LEAST_ROWS: u16 = 3;
-/// Keys; terminals that are too small show only the first.
+/// Key help. A terminal that is too small shows only the first key.
 const KEYS: &str = "s stops   q ends";
 
 /// State of the view.
@@ -39,17 +39,17 @@ pub struct View {
     pub rate: f64,
     /// Bytes outside of frames.
     pub bad_bytes: u64,
-    /// Result of the last key, until the next one.
+    /// Result of the last key, shown until the next key is pressed.
     pub reply: String,
     /// Scroll positions of causes and joints.
     pub scroll: Scroll,
-    /// NaN if a joint was not measured.
+    /// Last positions of each joint. NaN: the joint was not measured.
     position: [VecDeque<f64>; 6],
     torque: [VecDeque<f64>; 6],
 }
 
 impl View {
-    /// Creates the view of a controller at this port, without any status yet.
+    /// Creates the view of a controller at this port, before the first status.
     pub fn new(port: String) -> Self {
         Self {
             port,
@@ -64,7 +64,7 @@ impl View {
         }
     }
 
-    /// Takes a status in.
+    /// Takes a status.
     pub fn push(&mut self, s: Status) {
         for (j, joint) in s.joints.iter().enumerate() {
             let known = |value: f32| if is_measured(&s, j) { f64::from(value) } else { f64::NAN };
@@ -97,7 +97,7 @@ impl View {
         let edge = if framed { 2 } else { 0 };
         let inner = area.width.saturating_sub(2 * edge);
         let head = self.head(inner, frame.area().height >= LINK);
-        // Joints always keep some rows; with enough space they get all of theirs.
+        // The joints always have some rows. With enough space they have all their rows.
         let rows = if framed { 8 } else { LEAST_ROWS };
         let most = area.height.saturating_sub(head.len() as u16 + rows + 3 * edge);
         let (trouble, rest) = self.trouble().lines(inner, most.into());
@@ -124,7 +124,7 @@ impl View {
         frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
     }
 
-    /// Draws the causes that do not fit above, and the joints; rows without space scroll.
+    /// Draws the causes that do not fit above, and the joints. Rows that do not fit can be scrolled.
     fn rows(&mut self, frame: &mut Frame<'_>, area: Rect, rest: Vec<Line<'static>>, framed: bool) {
         let Some(s) = &self.last else { return };
         let (edge, heads) = (if framed { 2 } else { 0 }, 1);
@@ -142,7 +142,7 @@ impl View {
         }
     }
 
-    /// State, place on the trajectory, and the link.
+    /// Returns the lines with the state, the place on the trajectory, and the link.
     fn head(&self, width: u16, link: bool) -> Vec<Line<'static>> {
         let Some(s) = &self.last else { return vec![Line::from(self.port.clone()).dark_gray()] };
         if self.silent.is_some() {
@@ -219,10 +219,10 @@ fn state_style(state: Code<ControllerState>) -> Style {
 fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16, silent: bool) -> Sparkline<'static> {
     let known = || history.iter().copied().filter(|v| v.is_finite());
     let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-    // Values at rest are not scaled up to full height.
+    // The range has a minimum, so that the curve of a joint at rest is not scaled up to full height.
     let span = (high - low).max(0.01);
     let height = |v: &f64| v.is_finite().then(|| ((v - low) / span * 100.0) as u64 + 1);
-    // The newest values that fit next to the frame.
+    // Only the newest values that fit next to the frame are drawn.
     let old = history.len().saturating_sub(usize::from(width.saturating_sub(4)));
     let heights: Vec<Option<u64>> = history.iter().skip(old).map(height).collect();
     let last = history.back().filter(|v| v.is_finite() && !silent);

@@ -8,7 +8,7 @@ use super::*;
 /// Sizes of terminals, from the smallest on.
 const SIZES: [(u16, u16); 6] = [(40, 12), (60, 20), (80, 24), (90, 28), (120, 40), (200, 60)];
 
-/// Joint 3 fell silent while the arm was held.
+/// Returns the status of a held arm whose joint 3 does not answer.
 fn silent() -> Status {
     let mut s = Status {
         state: ControllerState::Error.into(),
@@ -81,7 +81,8 @@ fn a_joint_without_measurement_has_no_number_and_is_named_first() {
     }
 }
 
-/// For any number of errors the first cause and the next command are complete, and the rest can be scrolled to.
+/// For any number of errors, the view shows the first cause and the next command completely, and the user can scroll to
+/// the rest.
 #[test]
 fn no_cause_is_cut_and_none_vanishes() {
     let mut s = Status {
@@ -116,7 +117,8 @@ fn no_cause_is_cut_and_none_vanishes() {
     }
 }
 
-/// A joint with a fault leads the table; words that fit are shown completely, and the others are counted.
+/// A joint with a fault is the first row of the table. Words that fit are shown completely, and a number tells how many
+/// others there are.
 #[test]
 fn a_joint_with_a_fault_leads_the_table() {
     let mut s = Status { state: ControllerState::Error.into(), errors: 0x98, ..Status::default() };
@@ -137,7 +139,7 @@ fn a_joint_with_a_fault_leads_the_table() {
     }
 }
 
-/// `jtc explain` has a page for each cause and each warning, as it is shown.
+/// `jtc explain` has a page for each cause and each warning that the view shows.
 #[test]
 fn every_cause_is_explained() {
     let mut s = Status {
@@ -196,7 +198,7 @@ fn a_terminal_that_is_too_small_says_the_size_that_is_needed() {
     }
 }
 
-/// A gripper that does not answer has no valid pump state.
+/// For a gripper that does not answer, no pump state is shown.
 #[test]
 fn a_silent_gripper_looks_so() {
     let mut s =

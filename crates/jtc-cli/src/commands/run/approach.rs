@@ -13,7 +13,7 @@ pub fn note(duration_s: f64, course: &Course, speed: MoveSpeed, out: &Output) {
     out.note(format!("approach: {duration_s:.1} s to the first point{of_speed}"));
 }
 
-/// Returns the failure of a run whose approach is not possible; with `--json` its verdict is printed.
+/// Returns the failure of a run whose approach is not possible. With `--json`, prints its verdict.
 pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Failure {
     let verdict = match error {
         ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
@@ -31,7 +31,7 @@ pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Fail
     Failure::shown(failure.kind)
 }
 
-/// Returns the failure of the path to the first point; the trajectory itself is valid.
+/// Returns the failure of the path to the first point. The trajectory itself is valid.
 fn refused(why: &str, file: &str) -> Failure {
     let message =
         format!("the straight way from where the arm stands to the first point of {file} is refused: {why}");
@@ -46,7 +46,7 @@ fn refused(why: &str, file: &str) -> Failure {
 mod tests {
     use super::*;
 
-    /// The typed file passed its check: the path to it is refused.
+    /// The file itself passes its check, but the path to its first point is refused.
     #[test]
     fn a_refused_approach_does_not_send_people_to_correct_their_file() {
         let failure = refused("joint 2: no stop in time", "'my motion.csv'");

@@ -16,7 +16,7 @@ use super::super::run_report;
 use super::terminal::{Reel, Taken};
 use crate::link::LinkPort;
 
-/// Number of motions whose figures are kept: many runs must not fill the memory of a PC.
+/// Largest number of motions whose figures are kept, so that many runs do not fill the memory of a PC.
 const KEPT: usize = 1000;
 
 /// A finished motion.
@@ -31,7 +31,7 @@ pub struct Finished {
     kept: VecDeque<Done>,
     /// Number of runs, without approaches.
     runs: usize,
-    /// Runs and approaches whose figures were dropped.
+    /// Number of runs and approaches whose figures were dropped.
     left_out: usize,
 }
 
@@ -46,7 +46,7 @@ impl Finished {
     }
 }
 
-/// Returns the end of a motion in a word.
+/// Returns the outcome of a motion in one word.
 fn word(outcome: &Result<Outcome, Error>) -> &'static str {
     match outcome {
         Ok(Outcome::Finished(_)) => "finished",
@@ -55,7 +55,7 @@ fn word(outcome: &Result<Outcome, Error>) -> &'static str {
     }
 }
 
-/// Writes the files of a run and prints its end.
+/// Writes the files of a run and prints its outcome.
 pub fn conclude(
     job: &Job,
     ended: Ended,
@@ -68,7 +68,7 @@ pub fn conclude(
     let Reel { mut info, tape, .. } = reel;
     let link = session.statistics();
     let facts = [Facts::of_link(&last.upload, &link, session.port().baud())];
-    // After a failed run the user wants to see the first failure.
+    // After a failed run, the report shows the first failure.
     let broken = last.outcome.as_ref().err().map(|error| RunFailure::of(error, &info, &samples));
     let word = if cut { "stopped" } else { word(&last.outcome) };
     let digest = Digest::of(&samples);
@@ -85,7 +85,7 @@ pub fn conclude(
     info.ending = Ending { outcome: word.into(), reason, ..Ending::default() };
     let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
-    // A lost file is reported even if the run failed, but the run comes first.
+    // A lost file is reported even if the run failed. The failure of the run comes first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }
@@ -136,7 +136,7 @@ pub fn conclude(
     }
 }
 
-/// Returns every motion of the run as JSON, approaches included; the last one ended it.
+/// Returns every motion of the run as JSON, including approaches. `last` is the motion that ended the run.
 fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     let before = done.kept.iter().map(|d| (d.phase, "finished", &d.summary));
     let mut number = done.runs - done.kept.iter().filter(|d| d.phase == Phase::Motion).count();
@@ -153,7 +153,7 @@ fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     before.chain([last]).map(value).collect()
 }
 
-/// Returns a line for each motion whose figures are kept: the worst of its joints.
+/// Returns a line for each motion whose figures are kept, with the values of its worst joint.
 fn each_run(runs: &[Value], left_out: usize) -> String {
     let row = |run: &Value| {
         let worst = |key: &str, scale: f64, digits: usize| {
@@ -184,7 +184,7 @@ mod tests {
 
     use super::*;
 
-    /// 100,000 runs use the memory of the last thousand, which have their numbers.
+    /// 100,000 runs use no more memory than the last thousand, and these keep their run numbers.
     #[test]
     fn figures_of_the_last_motions_are_kept() {
         let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);

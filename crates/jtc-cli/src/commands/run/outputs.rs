@@ -10,7 +10,7 @@ use super::Course;
 use crate::failure::output_lost;
 use crate::tape::Tape;
 
-/// Files of a run, opened before it.
+/// Files of a run. They are opened before the run.
 pub struct Outputs {
     record: Option<OutputFile>,
     report: Option<OutputFile>,
@@ -29,12 +29,13 @@ impl Outputs {
         Ok(Self { record, report })
     }
 
-    /// Begins the recording, again from its start if it was begun before.
+    /// Begins the recording. If it was begun before, it starts again with an empty file.
     pub fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
         self.record.as_mut().map(|file| Tape::begin(file, info, "the motion goes on", out)).transpose()
     }
 
-    /// Completes all files; the loss of one does not affect the other. Returns the names of the complete ones.
+    /// Completes all files. The loss of one file does not affect the other. Returns the names of the complete files,
+    /// and the failures.
     pub fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
         let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
         let report =

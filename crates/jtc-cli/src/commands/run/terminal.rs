@@ -32,8 +32,8 @@ pub struct Reel {
     pub tape: Option<Tape>,
     /// Start of its first motion, on the clock of the session.
     start: Duration,
-    /// Earliest time of the next sample, s: right after the last one. The controller's time may run ahead of ours, in a simulator that is
-    /// faster than real time.
+    /// Earliest time of the next sample, s: right after the last sample. The time of a simulator that is faster than real time runs ahead
+    /// of the computer's time.
     until_s: f64,
 }
 
@@ -62,12 +62,12 @@ pub struct Terminal<'a, 'o> {
     move_speed: MoveSpeed,
     outputs: Outputs,
     operator: &'a mut Operator<'o>,
-    /// Begun with the first motion.
+    /// Recording, which begins with the first motion.
     reel: Option<Reel>,
     done: Finished,
     /// Bar of the upload or of the motion.
     bar: Option<ProgressBar>,
-    /// Samples of the current motion, on its own clock, which starts `offset_s` after that of the run.
+    /// Samples of the current motion. Their clock starts `offset_s` after the clock of the run.
     samples: Rc<RefCell<Vec<Sample>>>,
     offset_s: f64,
     /// Samples of the motion that has ended.
@@ -133,13 +133,13 @@ impl<'a, 'o> Terminal<'a, 'o> {
         Ok(reel.tape.as_ref().map(Tape::sink))
     }
 
-    /// Stores the figures of the motion that has ended; its samples are in the recording.
+    /// Stores the figures of the motion that has ended. Its samples are already in the recording.
     fn keep_figures(&mut self, phase: Phase) {
         let Some(reel) = &self.reel else { return };
         self.done.push(Done { phase, summary: Summary::of(&reel.info, &self.last) });
     }
 
-    /// Returns the refusal of a check.
+    /// Returns the failure of a motion that did not pass the check.
     fn not_checked(&self, error: CheckError) -> Failure {
         match error {
             CheckError::Refused(verdict) => self.job.refuse(&verdict, self.operator.out),
@@ -247,7 +247,7 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
         }
         if leg.phase == Phase::Approach && leg.is_finished() {
             self.keep_figures(leg.phase);
-            // The recording covers only the motion: it is restarted before the first run.
+            // The recording must contain only the motion, so it is restarted before the first run.
             if self.runs == 0
                 && let Some(tape) = take(&mut self.reel).and_then(|reel| reel.tape)
             {
@@ -264,7 +264,7 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
     }
 }
 
-/// Returns the failure if the user ended the command before it moved the arm; `during` names the current step.
+/// Returns the failure if the user ended the command before it moved the arm. `during` is the current step.
 pub fn cancelled(during: &str) -> Failure {
     let message = format!("cancelled during the {during}; the motion was not started");
     Failure { message, ..Failure::of(&Error::Cancelled) }

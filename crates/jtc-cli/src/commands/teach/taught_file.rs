@@ -1,5 +1,5 @@
-//! Hand-guided motion as a trajectory file, which is written during teaching, so that it stays complete if the program
-//! ends.
+//! Trajectory file of a hand-guided motion. The file is written during teaching, so that it is complete even if the
+//! program ends suddenly.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -10,29 +10,30 @@ use jtc_host::waypoints::{self, thinned};
 
 use crate::failure::recording_broken_off;
 
-/// Movement below this counts as standing still, rad.
+/// Movement below which the arm is considered at rest, rad.
 const STILL: f64 = 0.002;
-/// The controller's own grid, s: the host's clock only shows which status was lost.
+/// Interval of the controller's statuses, s. The rows have this interval. The host's clock only shows which statuses
+/// were lost.
 const GRID_S: f64 = 0.04;
-/// Least number of rows of a motion.
+/// Smallest number of rows of a motion.
 const LEAST: usize = 3;
 const HEADER: &str = "t,q1,q2,q3,q4,q5,q6\n";
 
 /// Pose in the file.
 struct Row {
     position: [f64; 6],
-    /// Bytes of the file up to its end.
+    /// Length of the file up to the end of this row, bytes.
     end: usize,
 }
 
-/// Rows of the motion: without the rest before and after it, but with the last resting pose of each.
+/// File with the rows of the motion. Of the rest before and after the motion, it contains one pose each.
 pub struct TaughtFile {
     name: String,
     output: Option<OutputFile>,
     file: Option<File>,
     text: String,
     rows: Vec<Row>,
-    /// First resting pose, and the last slot at rest.
+    /// First pose of the present rest, and the number of its last row.
     rest: Option<([f64; 6], i64)>,
     start_slot: i64,
     last_slot: i64,
@@ -63,7 +64,7 @@ impl TaughtFile {
         self.file.is_some()
     }
 
-    /// Takes the pose at a time (s); if the arm has moved, the pose is in the file on return.
+    /// Takes the pose at a time (s). If the arm has moved, the pose is in the file when the function returns.
     pub fn take(&mut self, time_s: f64, position: [f64; 6]) -> Result<(), Failure> {
         let slot = (time_s / GRID_S).round() as i64;
         if slot <= self.last_slot {
@@ -110,8 +111,8 @@ impl TaughtFile {
         moving.map_or(0, |i| i + 2).min(self.rows.len())
     }
 
-    /// Removes the rest at the end, and describes the file's content; `None` if the arm was not moved and no row was
-    /// written. With a tolerance (rad) waypoints replace the motion.
+    /// Removes the rest at the end, and describes the content of the file. `None`: the arm was not moved, and no row
+    /// was written. With a tolerance (rad), waypoints replace the motion.
     pub fn finish(self, thin: Option<f64>) -> Result<Option<String>, Failure> {
         let kept = self.in_motion();
         let Self { name, file, mut text, mut rows, .. } = self;
@@ -151,7 +152,7 @@ mod tests {
     use cli_kit::ErrorKind;
     use jtc_host::trajectory::Loaded;
 
-    /// Rest for 0.4 s, to 0.5 rad in 1 s, rest for 0.4 s.
+    /// Pose of joint motions that rest for 0.4 s, move to 0.5 rad in 1 s, and rest for 0.4 s.
     fn pose(k: u32) -> [f64; 6] {
         let u = ((f64::from(k) - 10.0) / 25.0).clamp(0.0, 1.0);
         [0.0, 0.5 * u * u * (3.0 - 2.0 * u), 0.0, 0.0, 0.0, 0.0]
@@ -185,7 +186,7 @@ mod tests {
         );
     }
 
-    /// A straight path becomes its two ends, for every speed; the earlier motion in the file is removed.
+    /// At every speed, a straight path is reduced to its two ends. The old motion is removed from the file.
     #[test]
     fn a_motion_by_hand_becomes_waypoints() {
         let dir = tempfile::tempdir().unwrap();

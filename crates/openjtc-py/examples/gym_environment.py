@@ -16,7 +16,8 @@ from openjtc.sim import Plant
 
 
 class Reach(gym.Env):
-    """Observes positions, velocities and goal. The reward is minus the distance, and minus 100 if a drive trips."""
+    """The observation has positions, velocities and goal. The reward is minus the distance to the goal, and minus 100
+    if a drive trips."""
 
     def __init__(self, seconds=5.0):
         self.plant = Plant(Arm.avena())

@@ -2,8 +2,8 @@
 
     python own_controller.py
 
-Both move the same arm, whose masses and friction differ slightly from its file: openjtc's controller over the serial line, and a PD law
-with gravity compensation through the same drives. The program prints the errors of both.
+Both controllers move the same arm, whose masses and friction differ slightly from its file. openjtc's controller runs over the serial
+line. Your own controller is a PD law with gravity compensation that uses the same drives. The program prints the errors of both.
 """
 
 import numpy as np

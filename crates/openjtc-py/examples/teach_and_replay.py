@@ -1,4 +1,5 @@
-"""Teach by hand and replay: recorded positions become waypoints, and the waypoints become a motion within the limits.
+"""Teach by hand and replay: the recorded positions are reduced to waypoints, and a motion through them is planned
+within the limits.
 
     python teach_and_replay.py [sim: | /dev/ttyUSB0 | http://HOST:PORT]
 """

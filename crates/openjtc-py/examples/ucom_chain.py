@@ -1,4 +1,4 @@
-"""Chain of UCoM boards: number the boards, examine them, drive them by name, record a table.
+"""Chain of UCoM boards: numbers the boards, examines them, drives them by name, and records a table.
 
 Without an argument the chain is a simulated head; an argument names a bus, such as socketcan:can0. **Joints move.**
 """
@@ -23,7 +23,7 @@ def main(bus: str) -> None:
         for signal in chain.boards[1].signals.inputs:
             print(f"  input {signal.text}, {signal.minimum:g} to {signal.maximum:g}")
 
-        # Control loops run under supervision until the end of the context; one word step is 0.01 degrees here.
+        # Control loops run under supervision until the end of the context. One step of a value is 0.01 degrees here.
         report = chain.run([1, 2], active=True, inputs={"1.set_position": 0, "2.set_position": 0})
         print(f"boards {report.boards} run; {report.load_percent:.0f} % of the bus")
 

@@ -1,4 +1,4 @@
-"""From waypoints to a cycle: plan within all limits, print the plan, run it three times.
+"""From waypoints to a cycle: plans within all limits, prints the plan, and runs it three times.
 
     python waypoints.py [sim: | /dev/ttyUSB0 | http://HOST:PORT]
 """
@@ -15,7 +15,7 @@ ABOVE = np.radians([0, 10, -60, 0, 50, 0])
 
 def main(target: str = "sim:") -> None:
     with openjtc.connect(target) as robot:
-        # Corners are rounded by up to 0.1 rad, and the last waypoint is the first one.
+        # Corners are rounded by up to 0.1 rad. The last waypoint is the same as the first one.
         cycle = robot.plan([PICK, ABOVE, PLACE, ABOVE, PICK], blend=0.1, speed=80)
         print(f"{cycle.duration:.2f} s; the waypoints are passed at", np.round(cycle.waypoint_times, 2))
         for bound in cycle.binding[:4]:

@@ -27,7 +27,7 @@ impl Arm {
 
 #[pymethods]
 impl Arm {
-    /// Loads a TOML or URDF file, recognised by its content.
+    /// Loads a TOML or URDF file. The content of the file shows which of the two it is.
     #[staticmethod]
     fn load(path: PathBuf) -> Result<Self, Failure> {
         Ok(Self::of(HostArm::load(&path)?))
@@ -39,7 +39,7 @@ impl Arm {
         Ok(Self::of(HostArm::parse(text)?))
     }
 
-    /// Imports a robot description. Missing data is proposed and marked.
+    /// Imports a robot description. Values for missing data are proposed and marked.
     #[staticmethod]
     #[pyo3(signature = (path, joints=None, tip=None))]
     fn import_urdf(path: PathBuf, joints: Option<Vec<String>>, tip: Option<String>) -> Result<Self, Failure> {

@@ -1,4 +1,5 @@
-//! Converts numpy arrays to arrays of joints, and back: one row per state, one column per joint, base to wrist.
+//! Converts numpy arrays to arrays of joints, and back: An array has one row per state and one column per joint, base
+//! to wrist.
 
 use jtc_core::JOINTS;
 use jtc_host::error::Facts;
@@ -15,7 +16,7 @@ pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyAr
     let made = || -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let numpy = value.py().import("numpy")?;
         let array = numpy.call_method1("ascontiguousarray", (value, "float64"))?;
-        // `ascontiguousarray` gives scalars a dimension; no argument here is a scalar.
+        // `ascontiguousarray` would give a scalar a dimension, but no argument here is a scalar.
         Ok(array.cast_into::<PyArrayDyn<f64>>()?)
     };
     made().map(|array| array.readonly()).map_err(|error| {
@@ -24,7 +25,7 @@ pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyAr
     })
 }
 
-/// Reads six finite numbers, base to wrist; `what` names them in the error.
+/// Reads six finite numbers, base to wrist. `what` describes them in the error.
 pub fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Failure> {
     let array = floats(value, what)?;
     let numbers = array.as_slice().ok().and_then(|all| <[f64; JOINTS]>::try_from(all).ok());

@@ -28,11 +28,13 @@ pub fn to_python<'py>(py: Python<'py>, frame: &Frame) -> PyFrame<'py> {
     (frame.id, PyBytes::new(py, frame.data()))
 }
 
-/// Returns the settings of a controller for an arm, and the stored image of the arm. Without an arm, the controller is as new.
+/// Returns the settings of a controller for an arm, and the stored image of the arm. Without an arm, returns the settings of a
+/// new controller.
 pub fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failure> {
     let Some(arm) = arm else { return Ok((Config::avena(), None)) };
     let image = arm.image().map_err(|error| Failure::usage(error.to_string()))?;
-    // With an image, the controller reads all data from the image, as on a board. Otherwise it has the limits and waits for parameters.
+    // With an image, the controller reads all data from the image, like on a board. Without an image, it only has the limits and waits
+    // for parameters.
     Ok(if image.is_some() { (Config::avena(), image) } else { (arm.config(), None) })
 }
 
@@ -41,7 +43,7 @@ pub fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failur
 pub struct Controller {
     board: Board,
     now_us: u64,
-    /// Level of the safety output pin, which stays when a tick is missing.
+    /// Level of the safety output pin. A missing tick does not change it.
     safety_output: bool,
 }
 

@@ -69,7 +69,7 @@ impl Dynamics {
         Ok(array::as_given(py, &torques, states.one))
     }
 
-    /// Computes joint accelerations; `rotors`: with the rotor inertias of the arm.
+    /// Computes joint accelerations. `rotors`: include the rotor inertias of the arm.
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -136,7 +136,7 @@ impl Dynamics {
         shaped(py, jacobians.as_flattened().as_flattened(), states.one, states.count, &[6, JOINTS])
     }
 
-    /// Computes joint positions for poses of the flange, each the solution nearest to `near`.
+    /// Computes joint positions for poses of the flange. Each is the solution that is nearest to `near`.
     fn inverse_kinematics<'py>(
         &self,
         py: Python<'py>,
@@ -182,7 +182,7 @@ impl Dynamics {
         Ok(array::matrix(py, &all).into_any())
     }
 
-    /// Computes the friction of the joints at velocities, as the controller compensates it.
+    /// Computes the friction torques at these velocities that the controller compensates.
     fn friction<'py>(
         &self,
         py: Python<'py>,
@@ -269,7 +269,7 @@ fn common<const K: usize>(shapes: [(&'static str, usize, bool); K]) -> Result<us
     }
 }
 
-/// Makes an array of `count` values of the shape `inner`; without the first dimension if `one` is set.
+/// Makes an array of `count` values of the shape `inner`. If `one` is set, the array has no first dimension.
 fn shaped<'py>(
     py: Python<'py>,
     flat: &[f64],

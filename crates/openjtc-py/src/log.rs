@@ -35,7 +35,7 @@ impl FlightLog {
         (self.account.replayed.ticks.len(), self.account.replayed.same)
     }
 
-    /// State of the recorder: recording, or the reason of its stop.
+    /// State of the recorder: recording, or the reason why it has stopped.
     #[getter]
     fn state(&self) -> &'static str {
         self.account.log.state.name()

@@ -1,4 +1,5 @@
-//! Range checks of numbers from Python: a number out of range is an error with value and limit, and never changed silently.
+//! Range checks of numbers from Python: a number out of range gives an error with value and limit. It is never changed
+//! silently.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -25,7 +26,8 @@ pub fn seconds(value: f64, most: f64, what: &str) -> Result<Duration, Failure> {
     within(value, 0.0..=most, what, "s").map(Duration::from_secs_f64)
 }
 
-/// Returns a timeout, s: no wait if negative, and a wait without limit if the number is too large for the clock.
+/// Returns a timeout from seconds. A negative number means no wait. A number that is too large for the clock means a
+/// wait without limit.
 pub fn timeout(value: f64, what: &str) -> Result<Duration, Failure> {
     if value.is_nan() {
         return seconds(value, f64::INFINITY, what);

@@ -89,7 +89,7 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// Returns the given blend, or the planner's own.
+    /// Returns the blend of the call, or else the planner's blend.
     fn blend(&self, given: Option<f64>) -> Result<f64, Failure> {
         given.map_or(Ok(self.blend), |blend| distance("blend", blend))
     }
@@ -138,7 +138,7 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     Err(Failure::usage(format!("{what}: {value} is no distance")))
 }
 
-/// Returns the given torque margin (%), or the default.
+/// Returns the torque margin of the call (%), or the default.
 pub fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
     let percent = given.unwrap_or(MARGIN_PCT);
     margin_in_range(percent)?;
@@ -191,8 +191,8 @@ impl Planner {
         self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
     }
 
-    /// Plans through positions (N, 6), with a blend (rad) instead of the planner's own, and with times (s from the first position, NaN: as
-    /// soon as the limits allow).
+    /// Plans through positions (N, 6). `blend` (rad) replaces the planner's blend. `times` are in s from the first position; NaN: as soon
+    /// as the limits allow.
     #[pyo3(signature = (positions, blend=None, times=None))]
     fn through(
         &self,
@@ -236,7 +236,7 @@ impl Planner {
         self.waypoints(py, file, blend)
     }
 
-    /// Checks a trajectory, from `start` if given.
+    /// Checks a trajectory. If `start` is given, it is the start position of the arm.
     #[pyo3(signature = (trajectory, start=None))]
     fn check<'py>(
         &self,
@@ -270,7 +270,8 @@ fn example_text(name: &str) -> Result<String, Failure> {
     })
 }
 
-/// Thins positions (N, 6): every dropped position is within a tolerance (rad) of the legs between the kept ones.
+/// Reduces positions (N, 6) to waypoints. Every dropped position is within a tolerance (rad) of the straight lines
+/// between the waypoints.
 #[pyfunction]
 fn thinned<'py>(
     py: Python<'py>,

@@ -11,7 +11,7 @@ use crate::error::Failure;
 use crate::simulated::{SimulatedArm, pass};
 use crate::simulator::truth;
 
-/// Boot time of the drives, ms: long enough for the mean of their speed to be filled with samples.
+/// Boot time of the drives, ms. It is long enough to fill the averaging window of their speed with samples.
 const BOOT_MS: u32 = 12;
 /// Longest time until the drives are enabled, ms.
 const BRING_UP_MS: u64 = 2_000;
@@ -72,7 +72,7 @@ impl Plant {
         self.ticks
     }
 
-    /// Positions that the drives reported last; without drives the true positions.
+    /// Positions that the drives have reported last, or without drives the true positions.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.measured(|report| report.position, self.plant.truth().q))
@@ -143,7 +143,7 @@ impl Plant {
         }
     }
 
-    /// Configures and enables the drives, as the controller does it; brakes hold the arm until then.
+    /// Configures and enables the drives in the same way as the controller. Brakes hold the arm until then.
     fn bring_up(&mut self) -> Result<(), Failure> {
         if !self.drives {
             return Ok(());
@@ -156,12 +156,12 @@ impl Plant {
             let states = self.plant.node_states();
             let all = |state: NodeState| states[..JOINTS].iter().all(|each| *each == state);
             if all(NodeState::ENABLED) {
-                // The first step begins with the values that are read now.
+                // These values are the measurement from which the first step begins.
                 self.ask(&Request::zero_torque(false));
                 self.ticks = 0;
                 return Ok(());
             }
-            // Sends one frame per millisecond, as on the bus.
+            // At most one frame per millisecond is sent, like on the real bus.
             if all(NodeState::INIT) && !configured {
                 self.ask(&configure);
                 configured = true;

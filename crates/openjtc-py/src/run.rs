@@ -113,7 +113,7 @@ impl Samples {
         self.samples.len()
     }
 
-    /// Returns each column as an array: (N,), or (N, 6) for values of joints; an unknown value is NaN.
+    /// Returns each column as an array: (N,), or (N, 6) for values of joints. An unknown value is NaN.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         all.set_item("time", PyArray1::from_iter(py, self.samples.iter().map(|s| s.time_s)))?;
@@ -142,7 +142,7 @@ impl Samples {
         py.detach(|| html(&self.input(&Digest::of(&self.samples))))
     }
 
-    /// Writes a recording, MCAP or CSV by the file ending.
+    /// Writes a recording. The file ending selects MCAP or CSV.
     #[pyo3(signature = (path, overwrite=false))]
     fn write(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
         if path.exists() && !overwrite {

@@ -40,7 +40,7 @@ impl SimulatedArm<'_> {
         config.arm.payload = payload(self.payload)?;
         config.model_error = ModelError::NONE;
         if let Some((mass, friction, mass_factors, friction_factors)) = self.model_error {
-            // A share above 1 could draw negative masses.
+            // With a share above 1, random masses could be negative.
             if let Some(bad) = [mass, friction].iter().find(|share| !(0.0..=1.0).contains(*share)) {
                 return Err(Failure::usage(format!("model_error: a share of {bad} is not within 0..1")));
             }
@@ -77,7 +77,7 @@ impl SimulatedArm<'_> {
     }
 }
 
-/// Refuses the first number out of range, with its joint.
+/// Returns an error for the first number that is out of range, with its joint.
 fn in_range(what: &str, numbers: &[f64; JOINTS], (low, high): (f64, f64), unit: &str) -> Result<(), Failure> {
     match (1..).zip(numbers).find(|(_, number)| !(low..=high).contains(*number)) {
         None => Ok(()),
@@ -115,7 +115,7 @@ pub fn support(name: &str) -> Result<Support, Failure> {
     })
 }
 
-/// Parses faults from the text of a fault file; hand files are relative to the working directory of Python.
+/// Parses faults from the text of a fault file. Paths of hand files are relative to the working directory of Python.
 pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
     let load = |file: &str| {
         let trajectory = Loaded::load(file.as_ref(), None).map_err(|error| error.to_string())?.trajectory;
@@ -126,7 +126,7 @@ pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
         .map_err(|error| Failure::usage(error.to_string()).next("`jtc help faults` lists kinds and keys"))
 }
 
-/// Makes the path of a hand.
+/// Makes the path of a hand that leads the arm.
 pub fn hand(points: Vec<[f64; JOINTS]>, step_s: f64) -> Result<HandPath, Failure> {
     HandPath::new(points, step_s).ok_or_else(|| {
         Failure::usage(format!("hand: it needs points, and a step above 0 s; step_s is {step_s}"))

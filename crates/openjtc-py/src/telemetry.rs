@@ -30,7 +30,7 @@ impl Telemetry {
         bits.extend(errors.to_le_bytes());
         bits.extend(records_lost.to_le_bytes());
         for joint in joints {
-            // Every field is named, so that none is forgotten.
+            // Every field is listed, so that the compiler reports a new one that is missing here.
             let JointTelemetry {
                 set_position,
                 set_velocity,
@@ -95,7 +95,7 @@ impl Telemetry {
         self.of(py, |joint| joint.set_acceleration)
     }
 
-    /// Positions that were commanded for the time of the measurement, rad; the control law compares the measurement with them.
+    /// Positions that were commanded for the time of the measurement, rad. The control law compares the measurement with them.
     #[getter]
     fn due_position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.due_position)
@@ -149,7 +149,8 @@ impl Telemetry {
         self.of(py, |joint| joint.torque_friction)
     }
 
-    /// Torques that blend out a step at a change of state, and payload and braking torques of teaching, N·m.
+    /// Other torques, N·m: torques that smooth the transition after a change of state, and payload and braking torques
+    /// in teaching.
     #[getter]
     fn torque_other<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_other)
@@ -203,7 +204,8 @@ impl Telemetry {
         self.0.joints.iter().map(|joint| joint.internal).collect()
     }
 
-    /// True for joints whose position and velocity were measured for this tick; the others are predicted.
+    /// True for joints whose position and velocity were measured for this tick. The values of the other joints are
+    /// predicted.
     #[getter]
     fn fresh(&self) -> Vec<bool> {
         self.0.joints.iter().map(|joint| joint.fresh).collect()
@@ -221,7 +223,7 @@ impl Telemetry {
         self.of(py, JointTelemetry::position_error)
     }
 
-    /// Returns all values with all their bits; two equal ticks have equal bytes.
+    /// Returns the exact bits of all values. Two equal ticks have equal bytes.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.bits())
     }

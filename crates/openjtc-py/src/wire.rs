@@ -28,7 +28,7 @@ fn emitted(command: &Command<'_>) -> Result<Vec<u8>, Failure> {
     Ok(bytes)
 }
 
-/// Makes the frame of a command without numbers, by its name in `openjtc.control.encode`.
+/// Makes the frame of a command without arguments, by its name in `openjtc.control.encode`.
 #[pyfunction]
 fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes>, Failure> {
     let command = match name {
@@ -50,7 +50,8 @@ fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes
     Ok(PyBytes::new(py, &emitted(&command)?))
 }
 
-/// Makes the frames of an arm's parameters: friction, model, and last the gains, which the controller waits for.
+/// Makes the frames of an arm's parameters: friction, model and gains. The gains come last, because the controller
+/// waits for them.
 #[pyfunction]
 fn encode_parameters<'py>(py: Python<'py>, arm: &Arm) -> Result<Vec<Bound<'py, PyBytes>>, Failure> {
     let set = arm.inner.parameter_set();

@@ -12,7 +12,7 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def agent(folder: Path) -> Iterator[tuple[str, str]]:
-    """Starts ``jtc serve --sim``; yields its address and an operator's token."""
+    """Starts ``jtc serve --sim``, and yields its address and an operator's token."""
     token = folder / "tokens"
     env = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "XDG_STATE_HOME": str(folder), "HOME": str(folder)}
     serve = [os.environ["JTC"], "serve", "--sim", "--listen", "127.0.0.1:0", "--token-file", token, "--json"]

@@ -1,4 +1,5 @@
-"""Tests of the controller stepped from Python: equal bits to the simulator's controller, and drives written in Python."""
+"""Tests of the controller stepped from Python: its outputs are bit for bit equal to those of the simulator's controller,
+and it works with drives written in Python."""
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def stepped_beside(simulator, controller, until, limit_ms=60_000, spoil=None):
         inputs = simulator.inputs
         out = controller.tick(spoil(ms, inputs) if spoil else inputs)
         mine, its = out, simulator.outputs
-        # The exchange of a simulator has no reset.
+        # The reset is not compared, because the simulator's outputs do not contain it.
         if (mine.bus, mine.host, mine.telemetry, mine.safety_output) != (
             its.bus,
             its.host,
@@ -93,7 +94,7 @@ def test_another_input_has_another_output():
 
 
 class Drives:
-    """Seven nodes on their own bus; joints are masses on a table without friction: 2 kg·m² each."""
+    """Seven nodes on their own bus. Each joint is an inertia of 2 kg·m² without gravity and friction."""
 
     def __init__(self):
         self.state = [bus.INIT] * 7
@@ -123,7 +124,7 @@ def test_drives_in_python_are_brought_up_and_held_until_they_are_silent():
         out = controller.tick(Inputs(bus=answers, host=host))
         answers, host = drives.answers(out.bus), b""
         seen += statuses.feed(out.host)
-        # The controller compensates gravity, so gravity is subtracted for the joints of these drives.
+        # The controller compensates gravity, but these joints have none. So the gravity torque is subtracted.
         load = drives.torque - model.gravity(drives.position) if drives.state[0] == bus.ENABLED else np.zeros(6)
         drives.velocity = drives.velocity + load / 2.0 * 1e-3
         drives.position = drives.position + drives.velocity * 1e-3

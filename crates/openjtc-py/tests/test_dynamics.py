@@ -20,7 +20,8 @@ def arm():
 
 @pytest.fixture
 def states(request):
-    """Returns random positions, velocities, accelerations and torques; the seed is printed, and shown if the test fails."""
+    """Returns random positions, velocities, accelerations and torques. The seed is printed, so that it is shown if the test
+    fails."""
     seed = int(np.random.SeedSequence().entropy % 2**32)
     print("seed", seed)
     rng = np.random.default_rng(seed)
@@ -72,7 +73,7 @@ def test_the_jacobian_maps_velocities_and_forces(arm, states):
     here = dynamics.forward_kinematics(q)[:, :3, :3]
     spin = (after - before)[:, :3, :3] / (2 * h) @ here.transpose(0, 2, 1)
     assert np.allclose(np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1), twist[:, 3:], rtol=0, atol=1e-7)
-    # A point mass at the flange pulls by the transposed Jacobian.
+    # The torques of a point mass at the flange are its weight times the transposed Jacobian.
     more = Dynamics(arm, Payload(1.0)).gravity(q) - dynamics.gravity(q)
     force = -arm.gravity
     assert np.allclose(np.einsum("nij,i->nj", dynamics.jacobian(q)[:, :3], force), more, rtol=0, atol=1e-9)

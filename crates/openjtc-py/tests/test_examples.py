@@ -1,4 +1,4 @@
-"""Runs the examples unchanged, on simulated arms without real-time pacing."""
+"""Runs the unchanged examples on simulated arms, as fast as possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs the simulation examples as their docstrings say, and checks their results."""
+"""Runs the simulation examples with the commands in their docstrings, and checks their results."""
 
 import re
 import subprocess

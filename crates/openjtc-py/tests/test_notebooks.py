@@ -1,4 +1,4 @@
-"""Runs the notebooks from top to bottom, and checks that a run shows its report in them."""
+"""Runs the notebooks from top to bottom, and checks that the report of a run is shown in them."""
 
 from __future__ import annotations
 

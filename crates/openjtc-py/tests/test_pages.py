@@ -1,9 +1,9 @@
 """Runs the Python lines of the documentation pages and compares their output with the pages.
 
-Blocks of the kind ``pycon`` have statements after ``>>>`` with their output, blocks of the kind ``python`` only statements. The blocks of a
-page run one after the other in one namespace and one temporary folder. A comment directly above a block sets an option:
-``<!-- not run: REASON -->``, ``<!-- needs: PACKAGE -->`` (skips the block if the package is not installed), or ``<!-- numbers vary -->``
-(does not compare numbers). ``UPDATE_DOCS=1`` writes the output into the page. Simulated arms run at ``SPEED`` times real time.
+``pycon`` blocks contain statements after ``>>>`` and their output. ``python`` blocks contain only statements. The blocks of a page run one
+after the other in one namespace and one temporary folder. A comment directly above a block is an option: ``<!-- not run: REASON -->``,
+``<!-- needs: PACKAGE -->`` (skips the block if the package is not installed), or ``<!-- numbers vary -->`` (does not compare numbers).
+``UPDATE_DOCS=1`` updates the output in the page. Simulated arms run at ``SPEED`` times real time.
 """
 
 from __future__ import annotations
@@ -141,7 +141,8 @@ def told_to_install() -> list[tuple[Path, str]]:
 
 
 def test_nobody_is_told_to_install_a_name_that_is_not_ours():
-    """The package is on no index, so installing it by name could run code of a stranger. A wheel must be named by its path."""
+    """The package is not in a package index, so `pip install` with its name could install a stranger's code. The documentation
+    must give the path of the wheel."""
     words = told_to_install()
     if not (ROOT / "docs").exists():
         pytest.skip("the package is tested without its repository")

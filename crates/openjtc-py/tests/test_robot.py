@@ -55,7 +55,7 @@ def test_a_run_has_figures_arrays_tables_and_reports(robot, tmp_path: Path):
     n = len(run)
     assert a["time"].shape == (n,) and a["position"].shape == a["torque"].shape == (n, 6)
     assert np.all(np.diff(a["time"]) > 0)
-    # The figures agree with the samples.
+    # The figures must agree with the samples.
     operating = np.array([state == "Operate" for state in run._native.states])
     rms = 1e3 * np.sqrt(np.mean(a["error"][operating] ** 2, axis=0))
     assert [joint.rms_error_mrad for joint in run.joints] == pytest.approx(rms, rel=0.05)
@@ -197,7 +197,7 @@ def test_a_blend_in_degrees_is_refused_where_rad_are_meant(robot, blend: float):
 
 def test_a_run_in_which_joints_stand_still_is_small_in_a_notebook(robot):
     run = robot.move([0, 30, 0, 0, 0, 0], degrees=True)
-    # A notebook requests every representation of an object and shows one of them.
+    # A notebook asks an object for every representation and shows one of them.
     forms = [form for form in ("html", "svg", "png", "jpeg", "pdf", "markdown") if hasattr(run, f"_repr_{form}_")]
     assert forms == ["html"] and len(run._repr_html_()) < 2_000_000
 
@@ -352,7 +352,7 @@ def test_the_end_of_a_context_and_of_a_program_stops_what_moves(tmp_path: Path):
     with pytest.raises(openjtc.NoLinkError, match="closed"):
         robot.move(HOME)
     robot.close()
-    # Checked without a context, too.
+    # The same is checked without a context manager.
     program = (
         "import openjtc\n"
         "robot = openjtc.connect('sim:', speed=10.0)\n"

@@ -1,4 +1,5 @@
-"""Tests of everything that stops an arm: Stop, Ctrl-C, the end of a block, of a wait for a motion and of the program."""
+"""Tests of everything that stops an arm: Stop, Ctrl-C, and the end of a ``with`` block, of a wait for a motion, and of
+the program."""
 
 from __future__ import annotations
 
@@ -54,11 +55,12 @@ def port(tmp_path: Path):
 
 
 class Wire:
-    """Simulated controller at a pseudo-terminal. The test sees its bytes and can silence it."""
+    """Simulated controller at a pseudo-terminal. The test sees its bytes and can suppress them."""
 
     def __init__(self) -> None:
         self.simulator, self.sent, self.is_silent, self.is_over = Simulator(), b"", False, False
-        #: Bytes of another program, and a callback that sees the bytes sent here before the controller receives them.
+        #: Bytes that simulate another program. The callback gets the bytes sent here before the controller receives
+        #: them.
         self.to_send, self.on_sent = b"", None
         self.master, self.slave = pty.openpty()
         tty.setraw(self.master)
@@ -281,11 +283,11 @@ def test_a_stop_is_written_first_of_all(wire: Wire):
         robot.use_defaults()
         robot.wait_ready()
         assert wire.stops() == 0
-        # The arm is at rest, and the Stop is still written before any query.
+        # Even if the arm is at rest, the Stop is written before any query.
         before = len(wire.sent)
         robot.stop()
         assert wire.sent[before:].startswith(encode.stop())
-        # A Stop during another wait, and on a silent line, which raises an error.
+        # Tests a Stop during another wait, and a Stop on a silent line, which raises an error.
         robot.disable()
         waiting = Aside(lambda: robot.wait_ready(60))
         time.sleep(0.2)
@@ -308,7 +310,7 @@ def test_what_a_stop_overtakes_on_its_way_is_not_sent(wire: Wire):
         until(lambda: robot.status.trajectory == "Pause")
         executed = wire.sent.count(encode.execute())
 
-        # A resume reads the controller's settings before it sends Execute; the Stop comes in between.
+        # A resume reads the controller's settings before it sends Execute. The Stop comes in between.
         def stop(data: bytes) -> None:
             if any(bytes([0x9B, kind]) in data for kind in range(0x40, 0x60)):
                 wire.on_sent = None
@@ -330,7 +332,7 @@ def test_a_stop_of_somebody_else_ends_all_that_waits_here(wire: Wire):
         motion = robot.start(openjtc.example("motion"), approach=True)
         second = robot.start(openjtc.example("motion"), approach=True)
         until(lambda: is_moving(robot))
-        # The Stop arrives in the way in which an agent forwards the Stop of another client.
+        # The Stop arrives like a Stop of another client that an agent forwards.
         wire.to_send = encode.stop()
         with pytest.raises(openjtc.StoppedError) as caught:
             motion.wait(30)
@@ -364,7 +366,7 @@ def test_a_stop_of_another_program_voids_what_waits_however_late_its_turn_comes(
             with pytest.raises(openjtc.FaultError, match=r"cancelled|stopped"):
                 motion.wait(30)
         assert stands(robot) and wire.sent.count(encode.execute()) == executed
-        # A new request is executed.
+        # After that a new request is executed.
         assert robot.run(openjtc.example("motion"), approach=True).outcome == "finished"
 
 
@@ -420,7 +422,7 @@ def test_jogging_that_is_stopped_is_an_error_and_the_arm_rests(live):
 @needs_jtc
 def test_a_motion_that_is_resumed_outside_a_run_is_stopped_by_the_end(port: str):
     def paused() -> None:
-        # This program ends without closing its connection while its motion is paused.
+        # This program ends while its motion is paused, without closing its connection.
         program = (
             "import os, sys, time, openjtc\n"
             "robot = openjtc.connect(sys.argv[1])\n"
@@ -520,7 +522,7 @@ def test_several_threads_wait_for_a_motion_and_each_gets_it(live):
 
 
 class Pressed:
-    """Progress bar that raises `KeyboardInterrupt`, or that cannot be drawn."""
+    """Progress bar that raises `KeyboardInterrupt`, or an error because it cannot be drawn."""
 
     disable = False
     error: type[BaseException] = KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Tests of numbers and values of a connection: refused values, unknown values, and a different arm."""
+"""Tests of the values that a connection takes and returns: refused values, unknown values, and a different arm."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_no_number_panics(robot):
             try:
                 act(number)
             except Exception as error:
-                # A panic is not an `Exception`.
+                # A panic would not be one of these exceptions.
                 assert isinstance(error, (openjtc.Error, OverflowError)), repr(error)
             # A push may have put the controller into Error.
             if robot.status.state == "Error":
@@ -150,7 +150,7 @@ def test_another_arm_than_the_one_that_was_named_is_neither_moved_nor_let_go(tmp
         robot.set_settings({"velocity_max_rad_s": [1.25] * 6})
         robot.use_defaults()
         robot.wait_ready()
-        # The controller's arm can be read, but not moved.
+        # The controller's arm can be read, but motions are refused.
         assert robot.arm.limits["velocity_max"] == pytest.approx(1.25)
         refused = (lambda: robot.move(HOME), lambda: robot.jog(0.1, 0.2, joint=1), lambda: robot.teach().__enter__(), robot.resume)
         for act in refused:
@@ -198,7 +198,7 @@ def test_what_a_silent_joint_measures_is_not_known(robot):
     robot.inject(f'format = 2\n[[fault]]\nkind = "node-silent"\njoint = 3\nat_s = {now + 0.5}\n')
     while robot.status.state != "Error":
         pass
-    # A drive that is lost before the controller has seen it was never measured.
+    # The joint was never measured, because its drive is lost before the controller has received its first answer.
     with pytest.raises(openjtc.Error):
         robot.recover()
     status = robot.status

@@ -111,7 +111,7 @@ def test_a_payload_hangs_on_the_arm():
         simulator.step(4_000)
     extra = Dynamics(Arm.avena(), Payload(3.0)).gravity(light.position) - Dynamics(Arm.avena()).gravity(light.position)
     more = heavy.torque - light.torque
-    # Without friction the drives carry the whole torque.
+    # Without friction, the drives carry the whole torque of the payload.
     assert abs(extra[1]) > 5.0 and abs(more[1] - extra[1]) < 0.2 * abs(extra[1]), (more, extra)
 
 
@@ -169,7 +169,8 @@ def test_drives_measure_as_drives_do_and_trip():
 
 
 def test_the_plant_of_a_seed_is_the_arm_of_its_simulator():
-    """Replays the torques of the simulator's controller: the plant of the same seed moves alike, the plant of another seed differs."""
+    """Replays the torques of the simulator's controller. The plant with the same seed moves in the same way, and the plant with
+    another seed does not."""
     about = {"model_error": ModelError(mass=0.3), "start": [0, 0.4, -0.8, 0, 0.2, 0]}
     simulator = Simulator(Arm.avena(), seed=11, **about)
     simulator.wait("Init")
@@ -228,7 +229,7 @@ def test_an_arm_on_gears_that_yield_meets_a_wall_and_takes_up_a_load():
         simulator.step()
         outside.append(simulator.outside_torque[0])
         assert simulator.position[0] < 0.05
-    assert max(outside) == 79.0 and min(outside) < 70.0  # the wall is against the push
+    assert max(outside) == 79.0 and min(outside) < 70.0  # the wall acts against the push
     assert any("payload 1 kg" in text for _, text in simulator.events)
     for wrong, match in (
         ({"gear_stiffness": 5.0}, "gear_stiffness: joint 1: 5 N·m/rad is out of range"),

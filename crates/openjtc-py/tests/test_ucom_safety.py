@@ -1,4 +1,4 @@
-"""Tests of chains after ends and failures: outputs are left safe, and the failure is reported."""
+"""Tests that the end of a chain and failures leave outputs safe, and that a failure is reported."""
 
 from __future__ import annotations
 

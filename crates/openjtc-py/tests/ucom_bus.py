@@ -1,4 +1,4 @@
-"""Client of a chain's bus that shares no code with the package, and simulated chains for tests."""
+"""Client of a chain's bus, which shares no code with the package, and simulated chains for tests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from openjtc import ucom
 
 #: Identifier of MCA_ADMIN_DATA to and from board 0.
 ADMIN_TO = 0x600
-#: Its data: run, active, debug, global debug.
+#: Data of MCA_ADMIN_DATA: run, active, debug, global debug.
 STOPPED, SAFE, ACTIVE = bytes(4), bytes([1, 0, 0, 0]), bytes([1, 1, 0, 0])
 #: The heartbeat of a PC.
 ALIVE = (0x680, b"")
@@ -27,7 +27,7 @@ class Bus:
         host, port, channel = re.fullmatch(r"socketcand:([^:]+):(\d+)/(\w+)", url).groups()  # type: ignore[union-attr]
         self.socket = socket.create_connection((host, int(port)))
         self.frames: list[tuple[int, bytes]] = []
-        #: Time of each frame on the bus, s by its server.
+        #: Time of each frame on the bus, s, from the clock of the bus server.
         self.times: list[float] = []
         self.text, self.ended = "", False
         self.thread = threading.Thread(target=self._read)
@@ -80,15 +80,15 @@ class Bus:
         return answers()[0][3]
 
     def runs(self, board: int) -> bool:
-        """Returns MCARUN (0x20) of its status."""
+        """Returns bit MCARUN (0x20) of the board's status."""
         return bool(self.status(board) & 0x20)
 
     def started(self, board: int) -> bool:
-        """Returns MSTART (0x80) of its status."""
+        """Returns bit MSTART (0x80) of the board's status."""
         return bool(self.status(board) & 0x80)
 
     def sends_outputs(self, board: int) -> bool:
-        """Returns True if its sensor outputs (0x380 + number) come within 0.1 s."""
+        """Returns True if sensor outputs of the board (0x380 + number) arrive within 0.1 s."""
         before = len(self.frames)
         time.sleep(0.1)
         return any(identifier == 0x380 + board for identifier, _ in self.frames[before:])

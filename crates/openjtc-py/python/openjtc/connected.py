@@ -29,7 +29,7 @@ class Connected:
 
     def __init__(self, link: _native.Link) -> None:
         self._link = link
-        #: By thread: number of Stops after the last Stop that the thread requested.
+        #: For each thread: total number of Stops at the time of the last Stop that the thread requested.
         self._stops: dict[int, int] = {}
 
     # The connection
@@ -67,12 +67,12 @@ class Connected:
         self._stops[threading.get_ident()] = self._link.asked()
 
     def _stopped_since(self, asked: int) -> bool:
-        """Returns true if this thread has stopped the arm since the count of Stops was `asked`."""
+        """Returns true if this thread has stopped the arm since the number of Stops was `asked`."""
         return self._stops.get(threading.get_ident(), 0) > asked
 
     @property
     def is_closed(self) -> bool:
-        """True after the connection was closed; every request then fails."""
+        """True after the connection was closed. Every later request fails."""
         return self._link.is_closed
 
     def __repr__(self) -> str:
@@ -93,7 +93,8 @@ class Connected:
 
     @property
     def arm(self) -> Arm:
-        """Arm of the controller. If the controller cannot report it: the arm given to `connect`, or the built-in one.
+        """Arm of the controller. If the controller cannot report its arm, this is the arm given to `connect`, or the
+        built-in arm.
 
         If `connect` was given another arm, this is still the controller's arm, and motions, jogging and teaching are refused.
         """
@@ -138,7 +139,7 @@ class Connected:
 
     @property
     def payload(self) -> Payload:
-        """Payload at the flange that the controller computes with; None: no payload. A new payload changes the torques over 0.5 s."""
+        """Payload at the flange that the controller uses; None: no payload. A new payload changes the torques over 0.5 s."""
         mass, com, inertia = self._link.payload()
         return Payload(mass, tuple(com), tuple(inertia))
 
@@ -152,7 +153,7 @@ class Connected:
         return self._link.settings()
 
     def set_settings(self, values: Mapping[str, float | Sequence[float] | Array]) -> None:
-        """Changes settings by name, all or none.
+        """Changes settings by name. Either all values are changed, or none.
 
         Args:
             values: Value of each setting: a number, or six numbers for a setting of joints, base to wrist.
@@ -175,7 +176,7 @@ class Connected:
     def recover(
         self, *, arm: Arm | None = None, defaults: bool = False, accept_device_limits: bool = False
     ) -> list[str]:
-        """Brings the controller back to a held arm, and returns the steps in words.
+        """Brings the controller back to position hold, and returns the steps in words.
 
         Args:
             arm: Arm with the parameters for a controller that has lost its own. Its gains are checked before anything is sent.

@@ -28,8 +28,9 @@ _process = os.getpid()
 
 @atexit.register
 def _close_all() -> None:
-    """Stops the motions of all connections when the program ends: first sends every Stop, then waits for one arm after the other."""
-    # In a child process they count as closed, because they belong to the parent.
+    """Stops the motions of all connections when the program ends. First sends a Stop to every arm, then waits for one arm after the
+    other."""
+    # In a child process the connections are reported as closed, because they belong to the parent.
     robots = [robot for robot in list(_open) if not robot.is_closed]
     for robot in robots:
         robot._link.halt()
@@ -42,14 +43,15 @@ def _close_all() -> None:
 
 def _end(number: int, frame: FrameType | None) -> None:
     if os.getpid() != _process:
-        # A child process has no arm to stop and ends by the signal as usual.
+        # A child process has no arm to stop, so the signal ends it as usual.
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
     raise SystemExit(128 + number)
 
 
 def _catch_signals() -> None:
-    """Lets a program that ends by a signal stop its motions, too. Signal handlers that exist already are kept."""
+    """Installs signal handlers, so that a program that is ended by a signal also stops its motions. Existing signal
+    handlers are kept."""
     global _process
     _process = os.getpid()
     if threading.current_thread() is not threading.main_thread():

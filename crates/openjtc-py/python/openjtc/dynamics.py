@@ -81,7 +81,8 @@ class Dynamics:
         return self._native.gravity(q)
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
-        """Computes joint-space mass matrices, symmetric, without rotors: (6, 6) or (N, 6, 6), kg·m²."""
+        """Computes joint-space mass matrices: (6, 6) or (N, 6, 6), kg·m². They are symmetric and do not include the
+        rotors."""
         return self._native.mass_matrix(q)
 
     def friction(self, qd: ArrayLike, temperature: ArrayLike = 25.0) -> Floats:
@@ -111,7 +112,8 @@ class Dynamics:
     def jacobian(self, q: ArrayLike) -> Floats:
         """Computes geometric Jacobians of the flange in the base frame: (6, 6) or (N, 6, 6).
 
-        Rows 0 to 2 are its velocity (m/rad), rows 3 to 5 its angular velocity (rad/rad), one column per joint.
+        Rows 0 to 2 are the velocity of the flange (m/rad), rows 3 to 5 its angular velocity (rad/rad), with one column
+        per joint.
         """
         return self._native.jacobian(q)
 

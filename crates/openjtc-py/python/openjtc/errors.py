@@ -1,4 +1,4 @@
-"""Errors: the failed request, place, value and limit, the likely cause, and the remedy."""
+"""Errors, each with the failed request, the place, value and limit, the likely cause, and the remedy."""
 
 from __future__ import annotations
 
@@ -13,15 +13,12 @@ class Error(Exception):
 
     Attributes:
         message: The failed request, its place, value and limit.
-        code: Short name for programs, the same as in ``jtc`` if ``jtc`` has the error, too.
-        joint: Joint, counted from 1; None if the error is not about one joint.
-        point: Point of the trajectory, counted from 0; in motion the millisecond of its path.
-        value: Value that was found, in the unit of the message.
-        limit: Allowed value, in the same unit.
-        cause: Usual cause; empty if unknown.
-        next: Next step that helps; empty if unknown.
-        board: Number of the UCoM board; None if the error is about no board, or about several.
-        run: Run of a motion that ended in this error; None for any other error.
+        code: Short name for programs. It is the same as in ``jtc``, if ``jtc`` has the same error. joint: Joint,
+        counted from 1; None if the error is not about one joint. point: Point of the trajectory, counted from 0; during
+        a motion the time on its path, ms. value: Value that was found, in the unit of the message. limit: Allowed
+        value, in the same unit. cause: Usual cause; empty if unknown. next: Next step that helps; empty if unknown.
+        board: Number of the UCoM board; None if the error is not about a single board. run: Run of a motion that ended
+        in this error; None for any other error.
     """
 
     run: Run | None = None
@@ -83,7 +80,8 @@ class FaultError(Error):
 
 
 class HeldStopError(FaultError):
-    """The controller stopped the arm and holds it after a contact, or under a load that its model lacks. The code is ``held-stop``.
+    """The controller stopped the arm and holds it after a contact, or because of a load that its model does not include. The code
+    is ``held-stop``.
 
     ``text``, ``joint``, ``value`` and ``limit`` describe the cause. The arm does not move until ``robot.recover()``. Look at the arm before
     that call.

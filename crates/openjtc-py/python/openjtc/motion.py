@@ -26,9 +26,9 @@ FilePath: TypeAlias = "str | os.PathLike[str]"
 
 
 class Motion:
-    """A running motion. `Robot.pause`, `Robot.resume` and `Robot.speed` act on it, too.
+    """A running motion. `Robot.pause`, `Robot.resume` and `Robot.speed` also act on it.
 
-    Several threads may use one motion. A motion keeps its robot open; the end of the program stops it.
+    Several threads may use one motion. A motion keeps its robot open. The end of the program stops the motion.
     """
 
     def __init__(self, native: _native.Motion, robot: Robot, asked: int) -> None:
@@ -56,7 +56,7 @@ class Motion:
         try:
             came = self._native.wait(seconds)
         except UsageError:
-            # `seconds` is not a valid time.
+            # The error is raised, because `seconds` is not a valid time.
             raise
         except Exception as error:
             self._error = error
@@ -71,12 +71,12 @@ class Motion:
         run = Run(samples)
         if isinstance(error_of_run, Error):
             error_of_run.run = run
-        # Sets the run last, because other threads read it.
+        # The run is set last, because other threads check it to see if the motion is over.
         self._error, self._run = error_of_run, run
         return True
 
     def stop(self) -> None:
-        """Stops the arm on its path, as `Robot.stop` does. A later `wait` then raises no `StoppedError`."""
+        """Stops the arm on its path, like `Robot.stop`. A later `wait` then raises no `StoppedError`."""
         self._stopped = True
         self._robot.stop()
 
@@ -151,7 +151,8 @@ class Teaching:
         return self._rows.copy()
 
     def waypoints(self, tolerance: float = 0.01) -> Array:
-        """Thins the recorded positions: every dropped position is within a tolerance of the straight legs between the kept ones.
+        """Reduces the recorded positions to waypoints. Every dropped position is within a tolerance of the straight lines
+        between the waypoints.
 
         Args:
             tolerance: Largest deviation of any joint, rad.
@@ -198,8 +199,8 @@ def followed(robot: Robot, begin: Callable[[], Motion], progress: bool | None) -
         motion = begin()
         _show(motion, progress)
     except BaseException as error:
-        # Stops the arm if the wait is interrupted by Ctrl-C in Python code or by a bar that cannot be drawn: no caller waits any more.
-        # An `Exception` before the start has started no motion.
+        # If Ctrl-C in Python code, or a bar that cannot be drawn, interrupts the wait, the arm is stopped, because no caller waits for
+        # it any more. After an `Exception` before the start, there is no motion to stop.
         if motion is not None or not isinstance(error, Exception):
             robot._link.rest()
         raise

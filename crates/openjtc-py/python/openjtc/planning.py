@@ -27,15 +27,12 @@ class Planner:
 
     Args:
         arm: The arm; None: the built-in one.
-        speed: Percent of what the limits allow, 1 to 100.
-        blend: Distance from a waypoint at which its corner may be rounded, rad of the joint that is furthest, 0.5 at most; 0: the arm stops
-            at each waypoint. `through` also takes a blend in degrees.
-        blend_m: Like `blend`, for corners between lines and arcs of the flange, m, 0.5 at most.
-        line: Moves the flange along a straight line to each waypoint that does not set this itself.
-        jerk: Limits jerk, too.
-        temperature: Lowest bearing temperature for which friction torque is planned, °C; None: 20, as in a cold hall.
-        payload: Payload at the flange.
-        margin: Torque to leave for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
+        speed: Percent of the limits, 1 to 100. blend: Distance from a waypoint within which its corner may be rounded, rad of the joint
+        that is furthest away, 0.5 at most; 0: the arm stops at each waypoint. `through` also takes a blend in degrees. blend_m: Like
+        `blend`, for corners between lines and arcs of the flange, m, 0.5 at most. line: Moves the flange along a straight line to each
+        waypoint that does not set this itself. jerk: Also limits the jerk. temperature: Lowest bearing temperature for which friction
+        torque is planned, °C; None: 20, for a cold hall. payload: Payload at the flange. margin: Torque to leave for masses and friction
+        that the model does not know, percent of each limit, 0 to 50; None: 15.
     """
 
     def __init__(
@@ -97,14 +94,14 @@ class Planner:
             waypoints: An array (N, 6) of joint positions (rad), a file, or a list of pose names and dicts.
             times: Time of each waypoint of an array, s from the first one; NaN: as soon as the limits allow.
             blend: Replaces the planner's blend; in degrees if `degrees` is true, else in rad.
-            degrees: True if angles are degrees, including `blend`. Data that names its own units is not affected.
+            degrees: True if angles are degrees, including `blend`. Data with its own units is not affected.
 
         Returns:
-            The plan. Its `notes` name waypoints that rounded corners miss by more than 0.05 rad.
+            The plan. Its `notes` list the waypoints that rounded corners miss by more than 0.05 rad.
 
         Raises:
             UsageError: The blend is above 0.5 rad.
-            RefusedError: The motion is not possible; the message names the waypoint.
+            RefusedError: The motion is not possible; the message contains the waypoint.
         """
         blend_rad = None if blend is None else float(np.radians(blend) if degrees else blend)
         if isinstance(waypoints, (str, os.PathLike)):
@@ -120,7 +117,8 @@ class Planner:
         return Plan(self._native.through(positions, blend_rad, given))
 
     def check(self, trajectory: Trajectory | Plan, *, start: ArrayLike | None = None) -> Check:
-        """Checks a trajectory as a run would: limits at and between points, torques, distance to stop.
+        """Checks a trajectory in the same way as a run: limits at and between points, torques, and the distance to
+        stop.
 
         Args:
             trajectory: A trajectory or a plan.

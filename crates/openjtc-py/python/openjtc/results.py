@@ -147,7 +147,8 @@ class Samples:
         return path
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Writes a recording, by the file ending as MCAP, which Foxglove, PlotJuggler and Rerun open, or as CSV."""
+        """Writes a recording. The file ending selects the format: MCAP, which Foxglove, PlotJuggler and Rerun open, or
+        CSV."""
         self._native.write(path, overwrite)
         return Path(path)
 
@@ -205,7 +206,7 @@ class Run(Samples):
 class Check:
     """Result of the trajectory check that guards each run.
 
-    True in a condition if the trajectory may run.
+    In a condition, the result is true if the trajectory may run.
     """
 
     def __init__(self, verdict: dict[str, Any]) -> None:
@@ -307,7 +308,8 @@ class Plan(Samples):
 
 
 class FlightLog(Samples):
-    """Every tick of the last seconds before the first error, read from the controller and replayed with the same control code."""
+    """Every tick of the last seconds before the first error. The log is read from the controller and replayed with the same
+    control code."""
 
     def __init__(self, native: _native.FlightLog) -> None:
         super().__init__(native.samples())
@@ -325,7 +327,7 @@ class FlightLog(Samples):
 
     @property
     def state(self) -> str:
-        """``recording``, or why the recorder stopped."""
+        """``recording``, or the reason why the recorder stopped."""
         return self._log.state
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:

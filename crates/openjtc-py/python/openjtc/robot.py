@@ -48,10 +48,10 @@ class Robot(Connected):
         degrees: bool = False,
         margin: float | None = None,
     ) -> Plan:
-        """Plans a motion of the controller's arm with its payload; nothing moves.
+        """Plans a motion of the controller's arm with its payload. Nothing moves.
 
-        The arguments are described at `Planner` and `Planner.through`. `speed` is 100 % of the limits by default, also on a real arm;
-        the `speed` of `run` decides how fast the plan is executed.
+        For the arguments see `Planner` and `Planner.through`. `speed` is 100 % of the limits by default, even on a real arm. The
+        `speed` of `run` sets how fast the plan is executed.
         """
         mass, com, inertia = self._link.payload() if self.info else (0.0, [0.0] * 3, [0.0] * 6)
         payload = Payload(mass, tuple(com), tuple(inertia)) if mass else None
@@ -66,7 +66,7 @@ class Robot(Connected):
         degrees: bool = False,
         accept_device_limits: bool = False,
     ) -> Check:
-        """Checks a trajectory as `run` would; nothing is sent.
+        """Checks a trajectory like `run`. Nothing is sent.
 
         Args:
             trajectory: A trajectory, a plan, or a file of any form that ``jtc traj run`` reads.
@@ -128,7 +128,8 @@ class Robot(Connected):
         degrees: bool = False,
         accept_device_limits: bool = False,
     ) -> Motion:
-        # `asked` is the number of Stops at the time of the request. Reading the file may take a while, and a Stop can come meanwhile.
+        # `asked` is the number of Stops at the time of the request. Reading the file may take a while, and a Stop may be requested
+        # meanwhile.
         trajectory, name = self._trajectory(trajectory, degrees)
         options = options_of(asked, name, approach, speed, repeat, record, overwrite, accept_device_limits)
         return Motion(self._link.run(trajectory, options), self, asked)
@@ -197,7 +198,8 @@ class Robot(Connected):
                 await asyncio.sleep(0.02)
         except BaseException as error:
             if motion is not None or not isinstance(error, Exception):
-                # Stops at once, so that a motion that is about to begin in the executor is discarded: its request is older.
+                # Stops at once. This discards a motion that is about to begin in the executor, because its request is older
+                # than the Stop.
                 self._link.halt()
                 # A closed coroutine must not wait.
                 if not isinstance(error, GeneratorExit):
@@ -237,7 +239,8 @@ class Robot(Connected):
         """
         if (to is None) == (flange is None):
             raise UsageError("give either a place or `flange`; nothing was sent", "target")
-        # Read before anything that takes time, so that a Stop in the meantime cancels the motion.
+        # The number of Stops is read before any step that takes time, so that a Stop in the meantime cancels the
+        # motion.
         asked = self._link.asked()
         name = f"move to {to if isinstance(to, str) else 'a place'}"
         options = options_of(asked, name, False, speed, 1, record, overwrite, accept_device_limits)
@@ -256,7 +259,7 @@ class Robot(Connected):
     def pause(self) -> None:
         """Pauses the motion on its path.
 
-        If the motion ends before the pause acts and another motion waits, that motion is paused when it begins.
+        If the motion ends before the pause takes effect and another motion waits, that motion is paused when it begins.
         """
         self._link.pause()
 
@@ -319,7 +322,8 @@ class Robot(Connected):
 
     @contextlib.contextmanager
     def teach(self) -> Iterator[Teaching]:
-        """Lets the arm be led by hand inside the context. The arm is held again when the context ends or after a Stop of this program."""
+        """Allows the arm to be led by hand inside the context. The arm is held again when the context ends, or after a Stop of this
+        program."""
         try:
             self._link.teach(True)
             yield Teaching(self._link)

@@ -116,21 +116,16 @@ class Simulator:
     """Simulated system of host line, real controller, joint bus, drives and arm, starting at power-on.
 
     Args:
-        arm: The arm; the controller has it stored if its file is complete. None: the built-in arm, and a controller as new.
-        seed: Seed of all random numbers.
-        payload: True payload of the arm. The controller does not know it until :func:`openjtc.control.encode.payload` sends it.
-        model_error: Difference between the true arm and its file; None: no difference.
-        start: Positions at the start, rad; None: 0, or near its limit for a joint that cannot reach 0.
-        friction: Gives the joints the friction of the arm's file.
+        arm: The arm; the controller has it stored if its file is complete. None: the built-in arm, and a new controller. seed: Seed of
+        all random numbers. payload: True payload of the arm. The controller does not know it until :func:`openjtc.control.encode.payload`
+        sends it. model_error: Difference between the true arm and its file; None: no difference. start: Positions at the start, rad;
+        None: 0, or near its limit for a joint that cannot reach 0. friction: Gives the joints the friction of the arm's file.
         gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the
-            motor.
-        over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
-        support: Support of the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they are first enabled, or
-            ``"none"``.
-        baud: Rate of the serial line, bit/s; None: bytes take no time.
-        answer_jitter_ms: Largest random delay of the drives' answers, ms.
-        faults: Faults and their times, as the text of a fault file (``jtc help faults``).
-        watch: Keeps the inputs and outputs of the controller for :attr:`inputs` and :attr:`outputs`.
+        motor. over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit. support:
+        Support of the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they are first enabled, or ``"none"``.
+        baud: Rate of the serial line, bit/s; None: bytes take no time. answer_jitter_ms: Largest random delay of the drives' answers, ms.
+        faults: Faults and their times, as the text of a fault file (``jtc help faults``). watch: Keeps the inputs and outputs of the
+        controller for :attr:`inputs` and :attr:`outputs`.
 
     Raises:
         UsageError: An argument is not valid.
@@ -210,7 +205,8 @@ class Simulator:
 
     @property
     def outputs(self) -> Outputs:
-        """Outputs of the controller in the last millisecond; for a missing tick only the safety output. Needs ``watch=True``."""
+        """Outputs of the controller in the last millisecond; for a missing tick only the safety output is valid. Needs
+        ``watch=True``."""
         return Outputs(*self._exchange()[1], self._native.telemetry)
 
     def _exchange(
@@ -226,7 +222,7 @@ class Simulator:
         self._native.write(data)
 
     def read(self) -> bytes:
-        """Returns the bytes that have reached the host since the last call. :meth:`command` consumes them, too."""
+        """Returns the bytes that have reached the host since the last call. :meth:`command` also consumes them."""
         return self._native.read()
 
     @property
@@ -311,7 +307,7 @@ class Simulator:
         entry = dict(fault)
         if not {"at_s", "in_state", "at_point"} & entry.keys():
             entry["at_s"] = self.time
-        # Strings and numbers are written alike in TOML and JSON.
+        # Strings and numbers have the same form in TOML and JSON.
         lines = "\n".join(f"{key} = {json.dumps(value, ensure_ascii=False, default=_plain)}" for key, value in entry.items())
         self._native.inject(f"format = 2\n[[fault]]\n{lines}\n")
 
@@ -320,7 +316,8 @@ class Simulator:
         self.inject({"kind": "push", "joint": joint, "torque_nm": float(torque), "for_s": float(seconds)})
 
     def lead(self, path: ArrayLike, step: float = 0.01) -> None:
-        """Leads the arm by hand along a path (N, 6), rad, with ``step`` seconds from row to row, as soon as teaching begins."""
+        """Simulates a hand that leads the arm along a path (N, 6), rad, when teaching begins. The time from row to row is
+        ``step`` seconds."""
         self._native.lead(path, step)
 
     def set_safety_input(self, level: bool) -> None:
@@ -377,8 +374,9 @@ class PlantState:
 class Plant:
     """Arm and drives without a controller: each millisecond takes a torque and returns a measurement.
 
-    This is the plant of :class:`Simulator`: the same bodies, friction and stops, the same drives with their encoders, over-speed trip,
-    working area and torque limit, and the same delay over the joint bus. The drives are enabled; brakes hold an arm whose drives trip.
+    This is the plant of :class:`Simulator`, with the same bodies, friction and end stops. It has the same drives with their encoders,
+    over-speed trip, working area and torque limit, and the same delay over the joint bus. The drives are enabled. If drives trip,
+    brakes hold the arm.
 
     Args:
         arm: The arm; None: the built-in one.

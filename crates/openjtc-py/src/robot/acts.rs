@@ -16,7 +16,7 @@ use crate::error::Failure;
 
 /// Longest wait from a Stop to standstill. The arm needs 0.5 s, or 1 s if it brakes with full torque (J-33).
 const STANDSTILL: Duration = Duration::from_secs(5);
-/// Time after the last sample of a teaching recording at which teaching counts as ended.
+/// Time after the last sample of a recording after which teaching is considered ended.
 const TAUGHT_NO_MORE: Duration = Duration::from_secs(1);
 
 /// Returns the error for a caller whose action was ended by a Stop.
@@ -29,13 +29,13 @@ pub fn stopped(what: &str) -> Failure {
 }
 
 impl Machine {
-    /// Stops the arm and waits for standstill; an arm at rest is not an error. Teaching ends, also if another program switched it on,
-    /// because the caller wants the arm to be held.
+    /// Stops the arm and waits for standstill. An arm that is already at rest is not an error. Also ends teaching, even if another
+    /// program has switched it on, because the caller wants the arm to be held.
     pub fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
-        // The Stop goes out before any query: a line that returns no bytes may still carry it.
+        // The Stop is sent before any query, because it may reach the controller even on a line that returns no bytes.
         let stopped = match self.session.stop() {
-            // The arm has no motion to stop.
+            // The controller refuses the Stop if there is no motion to stop.
             Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
             done => done,
         };
@@ -78,12 +78,12 @@ impl Machine {
         let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
         let due = [self.shared.moves(), self.teaching];
         for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
-            // A frame that cannot be sent is dropped: no caller is left to report to.
+            // An error is ignored, because no caller is left to report it to.
             let _ = port.write_all(frame);
         }
     }
 
-    /// Checks in the statuses if the motion of this connection has ended.
+    /// Updates from the last status if the motion of this connection has ended.
     pub fn look(&mut self) {
         if !self.shared.moves() || !self.session.port().is_shown() {
             return;
@@ -106,7 +106,8 @@ impl Machine {
         self.session.settle_for_jog_until(|| asked.is_halted())?;
         let end = self.session.now() + time;
         let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // Brings the arm to rest at once in any case, without waiting for the controller's jog timeout.
+        // However the jog has ended, the arm is brought to rest at once, without waiting for the controller's jog
+        // timeout.
         let rested = self.session.jog_to_rest();
         if let Ok(Some(_)) = rested {
             self.shared.set_moves(false);
@@ -129,7 +130,7 @@ impl Machine {
         self.same_arm()?;
         self.session.ask_to_move()?;
         let before = self.teaching;
-        // Set before the attempt, so that the end of the connection ends teaching in any case.
+        // The flag is set before the attempt, so that the end of the connection ends teaching in any case.
         self.teaching = true;
         let begun = self.session.teach_until(|| asked.is_halted());
         if let Err(Error::Link(

@@ -1,4 +1,4 @@
-//! Running motion, as a handle that Python's threads wait for.
+//! Handle of a running motion, which Python threads can wait for.
 
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex};
@@ -33,7 +33,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Hands the motion over to the connection's thread. `asked`: number of halts at the time of the request.
+    /// Passes the motion to the connection's thread. `asked`: number of halts at the time of the request.
     pub fn begin(link: &Bound<'_, Link>, order: Order, asked: u64) -> Result<Self, Failure> {
         let worker = &link.get().worker;
         let progress = Arc::clone(&order.progress);
@@ -66,7 +66,7 @@ fn raised(py: Python<'_>, failure: Failure) -> Py<PyAny> {
 
 #[pymethods]
 impl Motion {
-    /// Returns the samples and the error that ended the motion; `None` if the motion is not over within this time (s). Every waiting thread
+    /// Returns the samples and the error that ended the motion; `None`: the motion is not over within this time (s). Every waiting thread
     /// gets the result.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<Came>> {
@@ -87,7 +87,7 @@ impl Motion {
                     Ok((Py::new(py, Samples::of_run(ran))?, error))
                 }
                 Waited::Came(Err(failure)) => Err(raised(py, failure)),
-                // Another thread has received the result and stores it within a moment.
+                // Another thread has received the result and is about to store it.
                 Waited::Gone if looks < LOOKS => {
                     looks += 1;
                     worker.pass(py, LOOK)?;

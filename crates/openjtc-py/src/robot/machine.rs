@@ -22,13 +22,13 @@ use crate::error::Failure;
 
 /// Longest wait for a status while no job waits.
 const IDLE: Duration = Duration::from_millis(10);
-/// Largest lag of a simulator to the clock. A simulator with a larger lag continues from there and does not catch up.
+/// Largest delay of a simulator that it makes up for. After a larger delay the missed time is skipped.
 const BEHIND: Duration = Duration::from_millis(100);
 
 /// A simulated controller with its arm.
 pub struct Simulated {
     pub seed: u64,
-    /// Speed, times real time; `None`: as fast as possible, and only while a caller waits.
+    /// Speed, times real time. `None`: as fast as possible, and time passes only while a caller waits.
     pub speed: Option<f64>,
     pub faults: FaultPlan,
     /// Payload of the simulated arm; the controller does not know it.
@@ -63,7 +63,8 @@ pub struct Target {
 /// State of the worker.
 pub struct Machine {
     pub session: Session<AnyPort>,
-    /// Arm that the caller gave, else the built-in one; a controller with extensions has its own.
+    /// Arm that the caller gave, or else the built-in arm. For a controller with extensions, the controller's own arm
+    /// is used.
     pub arm: Arc<Arm>,
     /// `true` if the caller gave an arm.
     pub named: bool,
@@ -104,7 +105,7 @@ impl Machine {
         Ok(machine)
     }
 
-    /// Brings a simulated controller to a held arm, as fast as possible.
+    /// Brings a simulated controller to position hold, as fast as possible.
     fn bring_up(&mut self, stored: bool, asked: &Asked) -> Result<(), Failure> {
         let status = self.session.fresh_status()?;
         if status.jtc_init != 0 && stored {
@@ -122,7 +123,8 @@ impl Machine {
         self.session.port().name()
     }
 
-    /// Begins a job. Frames that move the arm pass until the next Stop. Late answers to an earlier Stop are not taken for this job.
+    /// Begins a job. Frames that move the arm are sent until the next Stop. A late answer to an earlier Stop is not taken for an
+    /// answer to this job.
     pub fn begin(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.session.port_mut().begin(asked.at());
         if let Some(time) = self.session.port().unsettled() {
@@ -144,14 +146,15 @@ impl Machine {
         }
     }
 
-    /// Returns the controller's arm. If the controller cannot report it: the arm of the caller, or the built-in one.
+    /// Returns the controller's arm. If the controller cannot report it, returns the arm of the caller, or the built-in
+    /// arm.
     pub fn device_arm(&mut self) -> Result<Arm, Failure> {
         let mut arm = match self.session.info()? {
             None => return Ok((*self.arm).clone()),
             Some(info) if self.arm.hash().ok().flatten() == Some(info.hash) => return Ok((*self.arm).clone()),
             Some(_) => self.session.device_arm()?,
         };
-        // Controllers store no poses.
+        // A controller does not store poses.
         arm.poses = self.arm.poses.clone();
         Ok(arm)
     }
@@ -191,7 +194,7 @@ fn simulator(
     let stored = image.is_some();
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored {
-        // As on a board, the controller reads the arm from its memory.
+        // The controller reads the arm from its memory, like on a board.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), image);
     }
     let Simulated { seed, faults, payload, .. } = simulated;
@@ -226,7 +229,7 @@ fn agent(url: &str, target: &Target) -> Result<Box<dyn Port>, Failure> {
     };
     let certificates =
         target.certificates.clone().or_else(|| own.as_ref().and_then(|own| own.certificate.clone()));
-    // A motion must not continue after this program has disconnected.
+    // The policy is Stop, because a motion must not continue after this program has disconnected.
     let options = Options { name: target.name.clone(), token, policy: Some("stop"), certificates };
     Ok(Box::new(AgentPort::open(url, &options)?))
 }
@@ -249,7 +252,7 @@ fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failu
     }
 }
 
-/// Publishes every status from now on, in all procedures of the session.
+/// Publishes every status of the session from now on, in all procedures.
 pub fn observe(session: &mut Session<AnyPort>, shared: &Arc<Shared>) {
     let shared = Arc::clone(shared);
     session.observe(move |_, status| shared.publish(status));

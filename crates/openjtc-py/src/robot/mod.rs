@@ -1,4 +1,4 @@
-//! Connection to a controller: one thread runs the session, Python's threads send it jobs.
+//! Connection to a controller: one thread runs the session, and the Python threads send jobs to it.
 
 mod acts;
 mod followed;
@@ -89,7 +89,8 @@ impl Link {
         self.worker.shared.is_running() && !self.worker.is_closed()
     }
 
-    /// Sends a request to the current or next run, which acts on it when its arm moves. Without a run the request goes to the controller.
+    /// Sends a request to the current or next run, which executes it when the arm moves. Without a run, the request goes directly to the
+    /// controller.
     fn wish(
         &self,
         py: Python<'_>,
@@ -176,7 +177,7 @@ impl Link {
         self.worker.shared.halt();
     }
 
-    /// Like `halt`, and waits until the motion of this connection is at rest.
+    /// Like `halt`, but also waits until the motion of this connection is at rest.
     fn rest(&self, py: Python<'_>) {
         self.worker.rest(py);
     }
@@ -243,7 +244,7 @@ impl Link {
 
     fn speed(&self, py: Python<'_>) -> PyResult<f64> {
         let shared = &self.worker.shared;
-        // A run answers no queries, but shares the speed.
+        // During a run the thread does not answer queries, but the run publishes the speed.
         while self.is_running() {
             if let Some(speed) = *lock(&shared.speed) {
                 return Ok(speed);
@@ -280,7 +281,7 @@ impl Link {
         self.worker.call_always(py, Machine::hold)
     }
 
-    /// Records the positions of the hand-led arm for this time (s). `take_taught` returns them, also after an interrupted recording.
+    /// Records the positions of the hand-led arm for this time (s). `take_taught` returns them, even after an interrupted recording.
     fn record_teaching(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = number::seconds(seconds, TEACH_MAX, "seconds")?;
         self.call(py, move |machine, asked| machine.record_teaching(time, asked))
@@ -297,7 +298,7 @@ impl Link {
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let shared = &self.worker.shared;
         let before = shared.seen();
-        // A run publishes each status, and answers no queries.
+        // During a run the thread does not answer queries, but the run publishes each status.
         while self.is_running() {
             if shared.seen() != before
                 && let Some(status) = *lock(&shared.status)

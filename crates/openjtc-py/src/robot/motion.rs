@@ -39,7 +39,8 @@ pub struct Order {
     pub speed: Option<f64>,
     /// Number of executions.
     pub repeat: u32,
-    /// The controller's limits, gravity and rotor inertia differ from the arm's, and are safe for it.
+    /// The caller confirms that the controller's limits, gravity and rotor inertia are safe for the arm, although they
+    /// differ from the arm's.
     pub accept_device_limits: bool,
     /// Path of a recording, and `true` if an existing file is overwritten.
     pub record: Option<(PathBuf, bool)>,
@@ -71,7 +72,8 @@ impl Order {
 }
 
 impl Machine {
-    /// Executes an order. An error before the arm moves is returned as an error; an error in or after the motion is part of the result.
+    /// Executes an order. An error before the arm moves is returned as an error. An error during or after the motion is part of the
+    /// result.
     pub fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {
         let recording = order.record.as_ref();
         let mut recording =
@@ -186,7 +188,7 @@ struct Follower<'a> {
     duration_s: f64,
     /// Upload report of the motion.
     upload: Option<UploadReport>,
-    /// Channel to the thread that waits for the result of its request.
+    /// Channel to a Python thread that waits for the result of its request.
     waits: Option<Sender<Result<(), Failure>>>,
 }
 
@@ -268,7 +270,7 @@ impl Observer<AnyPort> for Follower<'_> {
     fn ended(&mut self, session: &mut Session<AnyPort>, leg: &Leg) -> Result<(), Failure> {
         observe(session, &self.shared);
         self.tape.pause();
-        // A request of the last status is not applied: its thread learns that the motion has ended.
+        // A request that was made at the last status has no effect. Its thread is told that the motion has ended.
         self.waits = None;
         if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
             // The motion was stopped before it began.
@@ -282,7 +284,8 @@ impl Observer<AnyPort> for Follower<'_> {
             Ok(Outcome::Stopped(_)) => {
                 self.ran.outcome = "stopped";
                 if !self.asked.is_halted() {
-                    // Another program stopped the arm. Waiting requests here are older than that Stop, so they are discarded, too.
+                    // Another program has stopped the arm. Waiting requests of this program are older than that Stop, so they are
+                    // also discarded.
                     self.shared.halt();
                 }
             }
@@ -293,7 +296,7 @@ impl Observer<AnyPort> for Follower<'_> {
 }
 
 impl Follower<'_> {
-    /// Notes that the motion ended in an error.
+    /// Notes that the motion has ended with an error.
     fn broke(&mut self, error: &Error) {
         self.ran.outcome = "fault";
         let samples = self.tape.take();
@@ -305,7 +308,8 @@ impl Follower<'_> {
     }
 }
 
-/// Returns `true` if the arm may still move after this error: on its path, or paused and resumed by another program.
+/// Returns `true` if the arm may still move after this error: it is on its path, or it is paused and another program
+/// may resume it.
 fn may_move(session: &Session<AnyPort>, error: &Error) -> bool {
     let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
     matches!(error, Error::Motion(MotionError::LinkLost { .. }))

@@ -1,7 +1,7 @@
 //! Line to the controller with a gate: frames that are older than a Stop are not sent, and the Stop itself is sent at once.
 //!
-//! Every frame of every job is written here, and every wait for the controller reads here. So this module alone decides if a frame may
-//! still move the arm. A Stop is written as soon as a caller requests it, in the middle of any job.
+//! All frames of all jobs are written in this module, and every wait for the controller reads in it. So only this module decides if a
+//! frame may still move the arm. A Stop is written as soon as a caller requests it, in the middle of any job.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,18 +14,18 @@ use jtc_wire::{FrameType, fixed};
 use super::shared::Shared;
 use super::worker::lock;
 
-/// Longest wait of a read until it checks for a requested Stop.
+/// Longest wait of a read before it checks for a requested Stop.
 const LOOK: Duration = Duration::from_millis(10);
-/// Longest pause between two pieces of a frame; after it the rest of the frame is not expected any more.
+/// Longest pause between two pieces of a frame. After a longer pause, the remainder of the frame is no longer expected.
 const PIECE: Duration = Duration::from_millis(50);
-/// Time within which the record of a Stop arrives. The record only waits for the status that is just being sent.
+/// Time within which the record of a Stop arrives. The record is only delayed by the status that is just being sent.
 const RECORD: Duration = Duration::from_millis(200);
-/// Time, and number of statuses, after which a started motion shows in the statuses.
+/// Time, and number of statuses, after which the statuses show a started motion.
 const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
 /// Underlying line.
 pub enum Line {
-    /// A simulator, kept as its own type so that disturbances of its arm reach it during any job.
+    /// A simulator. It has its own type, so that disturbances of its arm can be applied during any job.
     Simulated(Box<SimPort>),
     /// A serial port or an agent.
     Other(Box<dyn Port>),
@@ -52,11 +52,11 @@ pub struct AnyPort {
     shared: Arc<Shared>,
     /// Number of halts at the time when the current job was requested.
     at: u64,
-    /// Numbers of halts and Stops that were handled.
+    /// Number of halts, and number of Stops, that were handled.
     done: (u64, u64),
     /// Known Stops and Pauses of other programs.
     foreign: Halts,
-    /// Missing bytes of the frame being written, and time of its last piece.
+    /// Number of missing bytes of the frame that is being written, and time of its last piece.
     rest: (usize, Duration),
     /// Time of the last written Stop.
     stopped: Option<Duration>,
@@ -89,12 +89,13 @@ impl AnyPort {
         self.at = at;
     }
 
-    /// Marks all halts as handled, because the caller writes the Stop.
+    /// Marks all halts as handled. The caller itself writes the Stop.
     pub fn take_over(&mut self) {
         self.done = (self.shared.halts(), self.shared.stops());
     }
 
-    /// Returns the time until the record of the last Stop must have arrived. The record must not be taken as an answer to a later frame.
+    /// Returns the remaining time within which the record of the last Stop may still arrive. The record must not be taken for the answer
+    /// to a later frame.
     pub fn unsettled(&self) -> Option<Duration> {
         let left = (self.stopped? + RECORD).saturating_sub(self.now());
         (!left.is_zero()).then_some(left)
@@ -121,8 +122,8 @@ impl AnyPort {
         }
     }
 
-    /// Handles a frame that the line withheld because of another program's Stop or Pause: waiting requests are older than that, so they are
-    /// voided. An Execute that is withheld while a motion stays paused does not void them.
+    /// Handles a frame that the line withheld because of another program's Stop or Pause. Waiting requests are older than that, so they are
+    /// voided. If an Execute is withheld while a motion stays paused, they are not voided.
     fn withheld(&mut self, frame: &[u8], moved: bool) {
         self.take_foreign_halts();
         let stays_paused = moved && frame == fixed::EXECUTE;
@@ -131,7 +132,7 @@ impl AnyPort {
         }
     }
 
-    /// Writes a Stop if one is requested, or if a halt came while this connection moves the arm.
+    /// Writes a Stop if a caller has requested it, or after a halt while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         let now = (self.shared.halts(), self.shared.stops());
@@ -140,7 +141,7 @@ impl AnyPort {
         }
         let due = now.1 != self.done.1 || self.shared.moves();
         if due && self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
-            // Existing devices would take the Stop for a part of the frame.
+            // No Stop is written here, because existing devices would take it for a part of the frame.
             return Ok(());
         }
         self.done = now;
@@ -152,13 +153,13 @@ impl AnyPort {
         Ok(())
     }
 
-    /// Lets a frame that moves the arm, or starts teaching, pass only without a halt since its request.
+    /// Refuses a frame that moves the arm or starts teaching, if there was a halt after its request.
     fn pass(&mut self, frame: &[u8]) -> Result<(), PortError> {
         let moves = frame == fixed::EXECUTE || is_jog(frame);
         if !moves && frame != fixed::TEACHING_MODE_ENABLE {
             return Ok(());
         }
-        // Sets `moves` before the check, so that a halt between the two sees a motion to stop.
+        // `moves` is set before the check, so that a halt between the two finds a motion to stop.
         let moved_before = self.shared.moves();
         if moves {
             self.shared.set_moves(true);
@@ -219,7 +220,7 @@ impl Port for AnyPort {
         let whole = if self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
             self.rest.0
         } else {
-            // The first piece always contains the whole header.
+            // The length is known, because the first piece always contains the whole header.
             length(bytes)
         };
         let written = each_line!(mut port, self => port.write_all(bytes));
@@ -247,7 +248,8 @@ impl Port for AnyPort {
         each_line!(mut port, self => port.take_denial())
     }
 
-    /// Asks for permission to move. The time of the request counts, not the start of the job.
+    /// Asks for permission to move. The line compares Stops with the time of the request, not with the start of the
+    /// job.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         if self.shared.halts() != self.at {

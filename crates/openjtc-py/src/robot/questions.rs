@@ -1,4 +1,5 @@
-//! Queries and writes besides motions: arm, settings, payload, errors, flight recorder; and disturbances of a simulated arm.
+//! Queries and changes other than motions: arm, settings, payload, errors, flight recorder. Also disturbances of a simulated
+//! arm.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -35,7 +36,7 @@ fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
     }
 }
 
-/// Converts a status to plain values; values that a joint does not report are NaN. `stop` is the present held stop, if the controller
+/// Converts a status to plain values. Values that a joint does not report are NaN. `stop` is the present held stop, if the controller
 /// has reported it.
 pub fn status<'py>(
     py: Python<'py>,
@@ -82,7 +83,7 @@ impl Link {
             } else if session.info()?.is_some() {
                 session.push_arm_until(&arm, || asked.is_halted(), |_| {})?;
             } else {
-                // A controller without extensions takes only friction, gains and model of an arm.
+                // A controller without extensions accepts only friction, gains and model of an arm.
                 let device = session.device_config()?;
                 let differences = arm.device_differences(&device);
                 if !differences.is_empty() {
@@ -112,7 +113,7 @@ impl Link {
         self.call(py, move |machine, _| Ok(machine.session.set_payload(&payload)?))
     }
 
-    /// Recovers to HoldPos; returns the steps in words.
+    /// Recovers to HoldPos. Returns the steps in words.
     #[pyo3(signature = (arm=None, defaults=false, accept_device_limits=false))]
     fn recover(
         &self,
@@ -171,7 +172,7 @@ impl Link {
         Ok(Some(all))
     }
 
-    /// Returns settings by name; a setting of joints is a list of six.
+    /// Returns settings by name. A setting of joints is a list of six.
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = self.call(py, |machine, _| Ok(machine.session.settings()?))?;
         let all = PyDict::new(py);
@@ -188,7 +189,8 @@ impl Link {
         Ok(all)
     }
 
-    /// Writes settings as (name, joint from 1, or 0, value), all or none.
+    /// Writes settings given as (name, joint, value): either all of them, or none. The joint counts from 1; 0 means a
+    /// setting of the whole arm.
     fn set_settings(&self, py: Python<'_>, values: Vec<(String, u8, f64)>) -> PyResult<()> {
         let mut given = Vec::new();
         for (name, joint, value) in values {
@@ -235,7 +237,7 @@ impl Link {
         self.call(py, |machine, _| Ok(machine.session.clear_log()?))
     }
 
-    /// Checks a trajectory as a run would, from the present position or from `start`.
+    /// Checks a trajectory in the same way as a run, from the present position or from `start`.
     #[pyo3(signature = (trajectory, start=None, accept_device_limits=false))]
     fn check<'py>(
         &self,

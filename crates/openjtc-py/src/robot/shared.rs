@@ -27,7 +27,7 @@ pub struct Wish {
 pub struct Progress {
     /// Phase: "waiting", "approach", "upload", "motion"; empty after the end.
     pub phase: &'static str,
-    /// Finished part of the path, s, or of the segments.
+    /// Completed part of the path in s, or number of uploaded segments.
     pub done: f64,
     /// Total of `done`.
     pub total: f64,
@@ -48,7 +48,7 @@ pub struct Shared {
     gone: AtomicBool,
     /// Number of statuses.
     seen: AtomicU64,
-    /// Requests to the current run or the next one; read while its arm moves.
+    /// Requests to the current or next run. The run reads them while the arm moves.
     pub wishes: Mutex<VecDeque<Wish>>,
     pub status: Mutex<Option<Status>>,
     /// Disturbances of a simulated arm, applied during any job.
@@ -65,7 +65,7 @@ impl Shared {
         self.halts.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Like [`Self::halt`], and also stops the arm if another program moves it.
+    /// Like [`Self::halt`], but also stops the arm if another program moves it.
     pub fn stop(&self) {
         self.stops.fetch_add(1, Ordering::SeqCst);
         self.halt();
@@ -110,7 +110,7 @@ impl Shared {
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Passes a request to the current run. If no run is left, the sender is dropped.
+    /// Passes a request to the current run. If there is no run, the result channel is dropped.
     pub fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {
@@ -119,7 +119,7 @@ impl Shared {
     }
 }
 
-/// Guard of a requested run, until the run is over or abandoned.
+/// Guard of a requested run. It exists until the run is over or abandoned.
 pub struct Pending(Arc<Shared>);
 
 impl Pending {
@@ -147,12 +147,12 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// Makes the view of a request that is made now.
+    /// Returns the view for a request that is made now.
     pub fn now(shared: &Arc<Shared>) -> Self {
         Self::after(shared, shared.halts())
     }
 
-    /// Makes the view of a request that was made after `at` halts.
+    /// Returns the view for a request that was made after `at` halts.
     pub fn after(shared: &Arc<Shared>, at: u64) -> Self {
         Self { shared: Arc::clone(shared), at }
     }

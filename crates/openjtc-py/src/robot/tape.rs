@@ -1,4 +1,4 @@
-//! Samples of a motion, recorded during its execution.
+//! Samples of a motion that are recorded during its execution.
 
 use std::cell::{Cell, RefCell};
 
@@ -22,7 +22,8 @@ impl Tape {
         *self.sink.borrow_mut() = sink;
     }
 
-    /// Records a sample and shifts its time: the recording begins at 0, and a further motion continues 1 ms after the last sample.
+    /// Records a sample and shifts its time, so that the recording begins at 0. A further motion continues 1 ms after the last
+    /// sample.
     pub fn push(&self, sample: &Sample) {
         if !self.on.get() {
             return;

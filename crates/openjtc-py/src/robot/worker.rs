@@ -1,6 +1,6 @@
-//! Thread that runs the session with a controller, and the calls of Python's threads into it.
+//! Thread that runs the session with a controller, and the calls that Python threads make to it.
 //!
-//! The thread owns the session. Python's threads hand over jobs and wait without the interpreter's lock. During the wait they check for
+//! The thread owns the session. Python threads send jobs to it and wait without the interpreter's lock. During the wait they check for
 //! Ctrl-C, which stops the arm before the exception is raised.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,7 +24,7 @@ const STANDSTILL: Duration = Duration::from_secs(15);
 
 type Job = Box<dyn FnOnce(&mut Machine) + Send>;
 
-/// Locks a mutex, also after a panic: the protected data is consistent between any two statements.
+/// Locks a mutex, even after a panic, because the protected data is consistent after each statement.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -41,7 +41,7 @@ pub enum Waited<T> {
 /// The connection's thread.
 pub struct Worker {
     simulated: bool,
-    /// Process that opened the connection; a forked child does not have the thread.
+    /// Process that opened the connection. A forked child does not have the thread.
     process: u32,
     /// Name of the port.
     pub port: String,
@@ -85,8 +85,8 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Hands over a job that was requested after `at` halts, and returns the channel for its result. A halt before the job's turn discards
-    /// the job.
+    /// Sends a job that was requested after `at` halts, and returns the channel for its result. A halt before the job begins discards the
+    /// job.
     pub fn ask<T: Send + 'static>(
         &self,
         at: u64,
@@ -126,7 +126,7 @@ impl Worker {
         Ok(came)
     }
 
-    /// Hands a job over and waits for it.
+    /// Sends a job and waits for its result.
     pub fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -150,7 +150,7 @@ impl Worker {
     pub fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
         match self.wait_for(py, &Mutex::new(came), None)? {
             Waited::Came(result) => {
-                // Handles a Ctrl-C that came together with the result: Python itself would not stop the arm.
+                // Handles a Ctrl-C that came together with the result, because Python itself would not stop the arm.
                 self.look_for_signals(py)?;
                 Ok(result)
             }
@@ -201,7 +201,7 @@ impl Worker {
         py.check_signals().inspect_err(|_| self.rest(py))
     }
 
-    /// Stops the motion of this connection and waits for standstill; a signal ends the wait. Cancels all earlier requests.
+    /// Stops the motion of this connection and waits for standstill. A signal ends the wait. Cancels all earlier requests.
     pub fn rest(&self, py: Python<'_>) {
         self.shared.halt();
         let Ok(came) = self.ask_always(Machine::rest).map(Mutex::new) else { return };
@@ -254,12 +254,13 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // Stops a motion that no caller follows any more; the thread ends after it.
+        // Stops a motion that no caller follows any more. The thread ends after the motion.
         self.shared.halt();
     }
 }
 
-/// Runs jobs one after the other. Reads statuses between jobs, so that no status is old. At the end stops a motion of this connection.
+/// Runs jobs one after the other. Reads statuses between jobs, so that the last status is always recent. At the end, stops a motion of
+/// this connection.
 fn serve(machine: &mut Machine, waiting: Receiver<Job>) {
     loop {
         let job = if machine.time_passes() {
@@ -289,6 +290,6 @@ fn serve(machine: &mut Machine, waiting: Receiver<Job>) {
             return;
         }
     }
-    // Ignores the error: no caller is left to report to.
+    // An error is ignored, because no caller is left to report it to.
     let _ = machine.rest();
 }

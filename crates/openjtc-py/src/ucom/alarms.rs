@@ -1,4 +1,4 @@
-//! Alarms about running boards; each alarm is raised as an error, once.
+//! Alarms about running boards. Each alarm is raised once, as an error.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use ucom_host::session::{Change, SessionError};
 use super::shared::lock;
 use crate::error::Failure;
 
-/// Alarms that are not reported yet: boards that were lost or have left their loops, and other failures.
+/// Alarms that are not reported yet: boards that were lost or have left their control loops, and other failures.
 #[derive(Default)]
 pub struct Alarms(Mutex<Waiting>);
 
@@ -24,7 +24,8 @@ struct Waiting {
 }
 
 impl Alarms {
-    /// Notes a change of a board. `runs`: this session has started its control loop; `master`: this session has started an application.
+    /// Notes a change of a board. `runs`: this session has started the control loop of the board. `master`: this session has started an
+    /// application.
     pub fn changed(&self, change: Change, board: u8, (runs, master): (bool, bool)) {
         let mut waiting = lock(&self.0);
         match change {
@@ -35,7 +36,7 @@ impl Alarms {
         }
     }
 
-    /// Notes that another board has the number of a running board, so that a command moves both.
+    /// Notes that another board has the same number as a running board, so that a command moves both boards.
     pub fn number_shared(&self, board: u8, found: &[u16]) {
         let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
         let mut own = Failure::from(SessionError::from(Error::from(error)));
@@ -49,7 +50,8 @@ impl Alarms {
         lock(&self.0).others.push_back(failure);
     }
 
-    /// Reports lost boards and boards that have left their loops, once, then the other failures one after the other.
+    /// Reports lost boards, and boards that have left their control loops, once. Later calls report the other failures
+    /// one after the other.
     pub fn check(&self) -> Result<(), Failure> {
         let (lost, rebooted, left) = {
             let mut waiting = lock(&self.0);

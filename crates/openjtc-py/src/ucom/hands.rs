@@ -1,4 +1,4 @@
-//! Session in its thread, with the requests of Python.
+//! Session in its thread, which executes the requests from Python.
 
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
@@ -15,7 +15,7 @@ use super::operator::Hand;
 use super::shared::Shared;
 use super::simulated::Simulated;
 
-/// Longest wait of a turn; a wait for the bus itself is shorter.
+/// Longest duration of a turn. A wait for the bus itself is shorter.
 const TURN: Duration = Duration::from_millis(25);
 
 /// Longest wait for the first outputs of a board, which come every few milliseconds, µs.
@@ -23,16 +23,17 @@ const FIRST_US: u64 = 500_000;
 
 /// Configuration of a session.
 pub struct Config {
-    /// Profile of how boards read the protocol.
+    /// Profile of how boards interpret the protocol.
     pub profile: Profile,
-    /// Meaning of their words.
+    /// Meaning of the words of inputs, outputs and parameters.
     pub signals: SignalTable,
     /// Cache of signal names.
     pub cache: Cache,
     /// Inventory of the chain, and its file.
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
-    /// Time without a call after which the session stops boards that it has started; `None`: they run on.
+    /// Time without a call after which the session stops boards that it has started; `None`: the boards continue to
+    /// run.
     pub deadline: Option<Duration>,
     /// Simulated chain that ends with the session.
     pub simulated: Option<Arc<Simulated>>,
@@ -93,8 +94,8 @@ impl Hands {
         Ok(())
     }
 
-    /// Stops the boards if the program makes no call within the deadline. Heartbeats only show that this computer works, not that the
-    /// commanding program does.
+    /// Stops the boards if the program makes no call within the deadline. Heartbeats only show that this computer works. They do not
+    /// show that the commanding program works.
     fn keep_deadline(&mut self) {
         if let Some(deadline) = self.deadline
             && self.shared.silence() >= deadline
@@ -125,7 +126,7 @@ impl Hands {
         let _ = self.driver.turn(Duration::ZERO);
     }
 
-    /// Waits for the first outputs of boards that run now, so that they have values; at most 0.5 s.
+    /// Waits at most 0.5 s for the first outputs of boards that were just started, so that their values are known.
     pub fn first_outputs(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let end_us = self.driver.now_us() + FIRST_US;
         let missing =

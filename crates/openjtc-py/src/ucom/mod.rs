@@ -1,6 +1,7 @@
-//! Chains of UCoM boards: a session on a bus in a separate thread, and calls of Python into it.
+//! Chains of UCoM boards: a session on a bus in a separate thread, and the calls from Python to it.
 //!
-//! - [`owner`], [`shared`], [`alarms`]: the thread, its requests, the waits of Python, and the errors it raises.
+//! - [`owner`], [`shared`], [`alarms`]: the thread, its requests, the waits of Python threads, and the errors that are
+//!   raised.
 //! - [`hands`], [`operator`]: the session in that thread.
 //! - [`procedures`], [`running`], [`values`], [`update`]: procedures of the session; Python converts their JSON results to dataclasses.
 //! - [`chain`], [`samples`], [`recording`], [`simulated`]: the classes.

@@ -37,12 +37,12 @@ pub fn boards(seen: &[BoardSeen], profile: &Profile, inventory: Option<&Inventor
     seen.iter().map(|one| board(one, profile, inventory)).collect()
 }
 
-/// Returns findings in words, with commands as they are typed.
+/// Returns findings in words. Commands in them are written as a user types them.
 pub fn texts(findings: &[impl ToString]) -> Vec<String> {
     findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
 }
 
-/// Converts the signals of a board, all kinds.
+/// Converts all kinds of signals of a board.
 pub fn signals(known: &Known) -> Value {
     let of = |kind: Kind| -> Value {
         let pairs = known.names.names(kind).iter().zip(known.signals.all(kind)).enumerate();
@@ -79,7 +79,7 @@ fn signal(index: usize, text: &str, signal: &Signal) -> Value {
     })
 }
 
-/// Converts words of a buffer to pairs of name and value, in the order of the buffer; null: not known.
+/// Converts words of a buffer to pairs of name and value, in the order of the buffer. null: the value is not known.
 pub fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     let pair = |(index, key): (usize, String)| {
         let word = words.get(index).copied().flatten();
@@ -94,7 +94,8 @@ pub fn outputs(known: &Known, words: &[u16]) -> Value {
     named(known, Kind::So, &words.iter().copied().map(Some).collect::<Vec<_>>())
 }
 
-/// Returns inputs as last set, else the initial inputs of the board, and parameters as this session wrote them.
+/// Returns the inputs that were set last, or else the initial inputs of the board, and the parameters that this session
+/// has written.
 pub fn settings(known: &Known, master: &Master) -> (Value, Value) {
     let parameter = |value: &ParValue| match value {
         ParValue::Assumed(word) => Some(*word),

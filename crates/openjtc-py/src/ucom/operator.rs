@@ -1,4 +1,4 @@
-//! Operator of the session: turns bus activity into events, samples and alarms, also in the middle of a procedure.
+//! Operator of the session: turns bus activity into events, samples and alarms, even in the middle of a procedure.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -65,7 +65,7 @@ impl Operator for Hand {
                 }
                 return;
             }
-            // Running boards already have an event for this.
+            // For running boards there is already another event.
             Event::Supervision { change: Supervision::UnknownRebooted { .. }, .. } => ("rebooted", None),
             Event::Supervision { .. } => return,
             Event::BoardError { board, .. } => ("error", Some(*board)),
@@ -94,7 +94,8 @@ impl Operator for Hand {
         let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
         let mut halts = self.shared.halts();
         if self.shared.has_ended() && !local.end_sent {
-            // The running request must undo its changes, perhaps on boards that do not answer. No board runs on in that time.
+            // The running request must undo its changes, perhaps on boards that do not answer. So the Stop is sent first, and
+            // no board continues to run in that time.
             local.end_sent = true;
             halts.push(Halt::Started);
         }

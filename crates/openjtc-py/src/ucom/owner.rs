@@ -1,4 +1,4 @@
-//! Thread that owns a session: runs requests one after the other, and a stop before all others.
+//! Thread that owns a session: runs requests one after the other. A stop comes before all other requests.
 
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::JoinHandle;
@@ -40,7 +40,7 @@ impl Owner {
         let shared = Arc::new(Shared::default());
         let own = shared.clone();
         let thread = std::thread::spawn(move || {
-            // After a fault of this thread no caller waits for it without end.
+            // This guard ensures that no caller waits without end after a fault of this thread.
             let gone = Gone(&own);
             let mut hands = Hands::new(own.clone(), config, link);
             match hands.serve() {
@@ -58,7 +58,8 @@ impl Owner {
         Self { shared, thread: Mutex::new(Some(thread)), process: Process::this() }
     }
 
-    /// Sends a request and waits for its result without the GIL. Ctrl-C cancels it, and stops everything that this session has started.
+    /// Sends a request and waits for its result without the GIL. Ctrl-C cancels the request, and stops everything that this session has
+    /// started.
     pub fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -103,7 +104,7 @@ impl Owner {
                 }),
                 Received::Nothing => Ok(()),
             };
-            // Checked also while reports arrive without a gap.
+            // Signals are checked here as well, because reports may arrive without a gap.
             let result = reported.and_then(|()| py.check_signals());
             if let Err(error) = result {
                 self.shared.queue.cancel(|request| *request == id);
@@ -117,12 +118,13 @@ impl Owner {
     /// Adds the result of each board to the exception that ended an update, because no report is returned.
     fn add_outcomes(&self, py: Python<'_>, after: u64, error: &PyErr) {
         for text in self.shared.outcomes(after) {
-            // Exceptions have notes since Python 3.11; the events have the same texts.
+            // An error is ignored: exceptions have notes only since Python 3.11, and the events contain the same texts.
             let _ = error.value(py).call_method1("add_note", (text,));
         }
     }
 
-    /// Stops everything that this session has started after a Ctrl-C, and waits for it. Another Ctrl-C only ends the wait.
+    /// After a Ctrl-C, stops everything that this session has started, and waits for the end of the stop. Another Ctrl-C
+    /// only ends the wait.
     pub fn interrupted(&self, py: Python<'_>) {
         if !self.process.is_this() {
             return;
@@ -150,7 +152,7 @@ impl Owner {
         loop {
             match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
-                // A signal needs no further stop here.
+                // After a signal no further stop is needed here.
                 _ => py.check_signals()?,
             }
         }
@@ -198,7 +200,7 @@ impl Owner {
                 hands.settle();
                 done
             });
-            // A caller that stopped waiting needs no answer.
+            // An error is ignored: a caller that has stopped waiting needs no answer.
             let _ = sender.send(Message::Done(done));
         };
         self.shared.asked();
@@ -214,10 +216,10 @@ impl Owner {
         })
     }
 
-    /// Stops everything that this session has started, and releases the bus. Returns the boards that are not certainly stopped.
+    /// Stops everything that this session has started, and releases the bus. Returns the boards whose stop is not certain.
     pub fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         if !self.process.is_this() {
-            // This process has no such thread, and the boards are not its own.
+            // A forked process does not have the thread, and the boards belong to its parent.
             return Ok(Vec::new());
         }
         self.shared.end();
@@ -241,7 +243,7 @@ impl Owner {
 
 impl Drop for Owner {
     fn drop(&mut self) {
-        // The thread stops the started boards. No wait here, because the caller may hold the GIL.
+        // The thread stops the started boards. The drop does not wait, because the caller may hold the GIL.
         self.shared.end();
     }
 }

@@ -1,4 +1,4 @@
-//! Procedures of a chain from `ucom-host`, called in the same order as in `ucom`.
+//! Procedures of a chain. They call `ucom-host` in the same order as the command `ucom`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use crate::error::Failure;
 /// Time for which the doctor listens before it sends queries.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// Reads the profile of a file, or the defaults; `on_lost` replaces the reaction to a lost board.
+/// Returns the profile in a file, or the default profile. `on_lost` replaces the reaction to a lost board.
 pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Failure> {
     let mut profile = match path {
         None => Profile::default(),
@@ -53,7 +53,7 @@ fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &'stati
     Failure::new(kind, code, texts.join("; ")).next(next)
 }
 
-/// Queries all boards; changes nothing.
+/// Queries all boards, without changing anything.
 pub fn scan(hands: &mut Hands) -> Result<Value, Failure> {
     let report = match hands.driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
@@ -182,7 +182,8 @@ pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, 
     Ok(numbered(hands, &all))
 }
 
-/// Resets boards (PC_RESET), all at once or one by one. Returns low bytes of the flash numbers of boards that reported.
+/// Resets boards (PC_RESET), all at once or one by one. Returns the low bytes of the flash numbers of the boards that
+/// have reported.
 pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
     let targets: Vec<Option<u8>> = match boards {
         Boards::All => vec![None],
@@ -242,13 +243,13 @@ pub fn doctor(hands: &mut Hands) -> Result<Value, Failure> {
     }))
 }
 
-/// Reads the image of a board's application, in the form in which it was sent.
+/// Reads the image of a board's application, with the same bytes that were sent to the board.
 pub fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
     let image = Image::read(path, &ImageOptions::default()).map_err(|e| Failure::usage(e.to_string()))?;
     Ok(image.into_bytes().into())
 }
 
-/// Measures how boards read the protocol.
+/// Measures how boards interpret the protocol.
 pub fn probe(hands: &mut Hands, options: ProbeOptions) -> Result<Value, Failure> {
     let init = options.init;
     let outcome = hands.driver.run(Request::Probe(options));

@@ -35,12 +35,13 @@ impl Sink {
     }
 }
 
-/// Bus wrapper with short waits that copies frames to a recording.
+/// Wrapper of a bus that copies frames to a recording. Its waits are short.
 pub struct Tap {
     bus: Prompt,
     sink: Sink,
     start: Instant,
-    /// Wall-clock time of the start. Later times are computed from it, so that a clock change never reverses time in a file.
+    /// Wall-clock time of the start. Later times are computed from it, so that the times in a file never go back after a
+    /// change of the clock.
     began_at: Duration,
 }
 
@@ -54,7 +55,7 @@ impl Tap {
         if let Some(sender) = &*self.sink.0.lock().unwrap_or_else(PoisonError::into_inner) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
-            // On a full disk the writer has ended and reports the error itself.
+            // An error is ignored: on a full disk the writer has ended, and reports the error itself.
             let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
         }
     }
@@ -84,7 +85,8 @@ impl CanBus for Tap {
     }
 }
 
-/// Result of a recording: number of written frames, and of left-out frames of other protocols that its form cannot hold.
+/// Result of a recording: number of written frames, and number of frames that were left out, because the format cannot
+/// hold their protocol.
 type Written = Result<(u64, u64), RecordingError>;
 
 /// A recording that is being written.
@@ -96,7 +98,7 @@ pub struct ChainRecording {
 }
 
 impl ChainRecording {
-    /// Begins a recording; the file ending selects its form.
+    /// Begins a recording. The file ending selects its format.
     pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
@@ -144,7 +146,7 @@ impl ChainRecording {
 
 impl Drop for ChainRecording {
     fn drop(&mut self) {
-        // No caller is left to report to; the written part is complete.
+        // An error is ignored, because no caller is left to report it to.
         let _ = self.finish();
     }
 }

@@ -1,4 +1,4 @@
-//! Starts applications and control loops with their values, and stops them.
+//! Starts applications and control loops, with their initial values, and stops them.
 
 use serde_json::{Value, json};
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
@@ -16,7 +16,7 @@ pub fn start(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, F
     let all = hands.starting(&numbers, |hands| {
         hands.driver.change_each(&numbers, |board| Request::Start { board, force })
     })?;
-    // Reads their signal names; a failure does not undo the start.
+    // The signal names of the boards are read. A failure does not undo the start.
     numbers.iter().for_each(|board| drop(hands.known(*board)));
     Ok(numbered(hands, &all))
 }
@@ -37,17 +37,17 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     let numbers = hands.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
-    // With `all`, every board in the file must be present.
+    // With `all`, every board of the parameter file must be present.
     let meant = |n: u8| run.boards == Boards::All || numbers.contains(&n);
     let file = run.file.take().map(|file| file.of_boards(meant));
-    // Checks identities first, because this needs no started application.
+    // The identities of the boards are checked first, because this does not need a started application.
     if let Some(file) = &file {
         file.identities(&mut hands.driver)?;
     }
     let begin = |session: &mut Session, cache: &Cache| {
         let mut prepared = Prepared::default();
         let started = begin(session, cache, &numbers, &run, file.as_ref(), &mut prepared);
-        // The procedure has undone its own steps.
+        // The failed procedure itself has undone its steps. Only the preparation must be undone here.
         let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
         Ok((report, prepared))
     };
@@ -58,7 +58,8 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     hands.runs(&numbers);
     for board in numbers.iter().filter(|_| run.texts) {
         let change = AdminChange { debug: Some(true), ..Default::default() };
-        // The boards already run, perhaps with enabled outputs. A failure would let the caller take them for stopped.
+        // The boards already run, perhaps with enabled outputs. If this returned an error, the caller would believe
+        // that they are stopped.
         if let Err(error) = hands.driver.run(Request::Admin { board: *board, change, force: true }) {
             hands.driver.note(format!("board {board} may send no texts: {error}"));
         }
@@ -72,7 +73,7 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     }))
 }
 
-/// Reads names, makes plans, and starts all boards.
+/// Reads the signal names, plans the values, and starts all boards.
 fn begin(
     session: &mut Session,
     cache: &Cache,
@@ -95,7 +96,8 @@ fn begin(
     }
 }
 
-/// Enables outputs of running boards, or makes them safe. The safe command goes to each board, even if another board fails.
+/// Enables the outputs of running boards, or makes them safe. The command for safe outputs is sent to each board, even if
+/// another board fails.
 pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), Failure> {
     let numbers = match boards {
         Boards::All => hands.held.borrow().running().iter().copied().collect(),
@@ -116,7 +118,7 @@ pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), F
     Ok(())
 }
 
-/// Returns a failure that names all uncertain boards.
+/// Returns a failure that lists all boards whose result is not certain.
 fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failure> {
     let numbers: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
     let Some((board, error)) = failed.into_iter().next() else { return Ok(()) };
@@ -152,7 +154,7 @@ pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Valu
         }
     }
     if !was_master && hands.started().is_empty() {
-        // A stop must not make this session the master.
+        // The session ends its role as master, because a stop must not make it the master of the bus.
         hands.driver.master.end_session();
     }
     all_certain("not stopped for certain", failed)?;

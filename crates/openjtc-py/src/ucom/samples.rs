@@ -14,7 +14,7 @@ use super::shared::Listener;
 use crate::error::Failure;
 use crate::json;
 
-/// Time without outputs after which no control loop runs on the bus.
+/// Time without outputs after which it is certain that no control loop runs on the bus.
 const SILENCE: Duration = Duration::from_secs(3);
 
 /// Reader of the outputs of boards, one set after the other.
@@ -26,13 +26,13 @@ pub struct ChainSamples {
 
 #[pymethods]
 impl ChainSamples {
-    /// Returns the next sample; None if no sample comes within `patience` seconds.
+    /// Returns the next sample. None: no sample arrives within `patience` seconds.
     fn next<'py>(&self, py: Python<'py>, patience: Option<f64>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let chain = self.chain.get();
         let since = Instant::now();
         let patience = patience.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
         loop {
-            // A waiting reader counts as a call, so it restarts the deadline.
+            // A waiting reader restarts the deadline, like a call.
             chain.owner.shared.asked();
             let left = patience.map_or(LOOK, |patience| patience.saturating_sub(since.elapsed()));
             let sample = py.detach(|| self.listener.next(left.min(LOOK)));

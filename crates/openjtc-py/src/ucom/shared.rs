@@ -78,14 +78,14 @@ pub struct Shared {
     pub alarms: Alarms,
     listeners: Mutex<Vec<Weak<Listener>>>,
     asked_at: Mutex<Option<Instant>>,
-    /// Boards that the session has started; readable also after its thread has ended.
+    /// Boards that the session has started. The list can be read even after its thread has ended.
     started: Mutex<Vec<u8>>,
-    /// Boards that are not certainly stopped.
+    /// Boards whose stop is not certain.
     not_stopped: Mutex<Vec<u8>>,
     seen: Mutex<Value>,
 }
 
-/// Locks a mutex, also after a panic of a thread, because no data is left half changed.
+/// Locks a mutex, even after a panic of a thread, because the data is never left half changed.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -99,7 +99,7 @@ fn stopped() -> Failure {
     failure(ErrorKind::Fault, "cancelled", "a stop came before its turn: it is not done", "")
 }
 
-/// Process that created an object; a forked child has the memory of its parent, but none of its threads.
+/// Process that created an object. A forked child has the memory of its parent, but none of its threads.
 pub struct Process(u32);
 
 impl Process {
@@ -150,12 +150,12 @@ impl Shared {
         self.left(std::mem::take(&mut *lock(&self.started)));
     }
 
-    /// Sets the boards that are not certainly stopped at the end of the session.
+    /// Sets the boards whose stop is not certain at the end of the session.
     pub fn left(&self, boards: Vec<u8>) {
         *lock(&self.not_stopped) = boards;
     }
 
-    /// Takes the boards that are not certainly stopped.
+    /// Takes the boards whose stop is not certain.
     pub fn take_left(&self) -> Vec<u8> {
         std::mem::take(&mut *lock(&self.not_stopped))
     }
@@ -214,8 +214,8 @@ impl Shared {
         lock(&self.seen).clone()
     }
 
-    /// Reports that running boards were stopped because no call came within the deadline; `not_stopped` lists boards whose stop is not
-    /// certain.
+    /// Reports that running boards were stopped because no call came within the deadline. `not_stopped` lists the boards whose stop is
+    /// not certain.
     pub fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
         let mut text = format!(
             "nothing was asked of the chain for {} s: its boards are stopped",
@@ -230,7 +230,7 @@ impl Shared {
         self.alarms.add(failure(ErrorKind::Fault, "deadline", &text, next));
     }
 
-    /// Restarts the deadline, at a request or after its end.
+    /// Restarts the deadline. Called at a request, and after the end of a request.
     pub fn asked(&self) {
         *lock(&self.asked_at) = Some(Instant::now());
     }
@@ -278,7 +278,7 @@ impl Shared {
         true
     }
 
-    /// Returns the reason why the queue is closed; `None`: it is open.
+    /// Returns the reason why the queue is closed. `None`: the queue is open.
     pub fn gone(&self) -> Option<Failure> {
         lock(&self.closed).clone()
     }
@@ -289,7 +289,7 @@ impl Shared {
         self.queue.close();
     }
 
-    /// Returns the failure of a request that is not done.
+    /// Returns the failure of a request that was not executed.
     pub fn refusal(&self, refused: Refused) -> Failure {
         match refused {
             Refused::Stopped | Refused::Cancelled => stopped(),

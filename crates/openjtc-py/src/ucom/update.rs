@@ -1,4 +1,4 @@
-//! Updates the firmware of boards: checks, writes and reads back.
+//! Updates the firmware of boards: checks the image, writes it, and reads back its Program ID and date.
 
 use std::path::PathBuf;
 
@@ -41,7 +41,7 @@ pub struct Update {
     pub boards: Boards,
     pub image: UpdateImage,
     pub second: Option<UpdateImage>,
-    /// Flash date in the profile's form.
+    /// Flash date in the format of the profile.
     pub date: u16,
     /// `true` if the caller gave no date.
     pub any_date: bool,
@@ -58,7 +58,7 @@ pub struct Update {
 }
 
 impl Read {
-    /// Reads the image, or the images of both cycles if there are two, and the flash date in the profile's form.
+    /// Reads the image, or the images of both cycles if there are two, and the flash date in the format of the profile.
     pub fn read(
         &self,
         first: &Source,
@@ -84,7 +84,7 @@ impl Read {
         Ok((image(first, &options)?, second, self.day(profile)?))
     }
 
-    /// Returns the flash date in the profile's form; 0 if no header has a date.
+    /// Returns the flash date in the format of the profile. 0: no header has a date.
     fn day(&self, profile: &Profile) -> Result<u16, Failure> {
         if !has_header(profile) {
             let text = "date: it goes into the header, and the profile sends none";
@@ -138,7 +138,7 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash number that each board must have: from the caller, else from the inventory.
+/// Returns the flash number that each board must have. It comes from the caller, or else from the inventory.
 fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {
@@ -149,7 +149,7 @@ fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateT
             }
         };
     }
-    // A single board may be given by its number alone; several boards need an inventory.
+    // A single board can be selected by its number alone. Several boards need an inventory.
     if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &hands.inventory) {
         return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
     }

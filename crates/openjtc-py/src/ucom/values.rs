@@ -16,7 +16,7 @@ use super::hands::Hands;
 use super::objects;
 use crate::error::Failure;
 
-/// Age after which the last outputs of a board are old, µs.
+/// Age after which the last outputs of a board are outdated, µs.
 const OLD_US: u64 = 500_000;
 
 /// Returns the signals of boards.
@@ -51,7 +51,7 @@ pub fn set(
     note_rounded(&hands.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = hands.driver.now_us();
     let boards = hands.driver.master.boards();
-    // The inputs of a running board are repeated, so a lost frame does not matter. A board without power does not run.
+    // The inputs of a running board are repeated, so a lost frame has no effect. A board without power does not run.
     let runs = hands.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
@@ -82,8 +82,8 @@ pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
     numbers.into_iter().map(|board| of_board(hands, board)).collect()
 }
 
-/// Returns the boards with signal names, which are cached. With `all`, skips boards whose applications are not started; returns an error
-/// if this leaves no board.
+/// Returns the boards whose signal names are known, and caches the names. With `all`, skips boards whose applications are not started.
+/// Returns an error if no board is left.
 pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSet<u8>, SessionError> {
     let (mut named, mut idle) = (BTreeSet::new(), None);
     for board in boards {
@@ -101,7 +101,7 @@ pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSe
     }
 }
 
-/// Like [`values`], for running boards; old outputs are an error.
+/// Like [`values`], for running boards. Returns an error for outdated outputs.
 pub fn running(hands: &mut Hands) -> Result<Value, Failure> {
     let numbers: Vec<u8> = hands.held.borrow().running().iter().copied().collect();
     let all = values(hands, &Boards::Some(numbers))?;
@@ -126,7 +126,7 @@ fn of_board(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
     let followed = held.followed.outputs(&hands.driver.master, now_us);
     let followed =
         followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
-    // Another program runs this board.
+    // If this session does not run the board, another program does.
     let other =
         || held.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
     let last = followed.or_else(other);
@@ -142,7 +142,8 @@ fn of_board(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
     }))
 }
 
-/// Returns a value by its name: an output of a board that sends outputs, else an input, else a parameter. An old output is an error.
+/// Returns a value by its name. This is an output of a board that sends outputs, else an input, else a parameter. Returns an error
+/// for an outdated output.
 pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure> {
     let known = hands.known(board)?;
     let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
@@ -167,7 +168,7 @@ pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure>
     Ok(list[usize::from(index)][1].clone())
 }
 
-/// Returns the failure for missing or old outputs of a board; `what` is one output, or all of them.
+/// Returns the failure for missing or outdated outputs of a board. `what` is one output, or all outputs.
 fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
     let (code, message) = match age_s {
         None => ("no-outputs", format!("board {board} has sent no outputs: no control loop runs")),
@@ -216,7 +217,7 @@ pub fn apply_parameters(
     force: bool,
 ) -> Result<usize, Failure> {
     file.identities(&mut hands.driver)?;
-    // Writing needs a running application; a dry run only needs known names.
+    // Writing needs a started application. A dry run only needs the signal names.
     let session = &mut hands.session;
     let known = session.cache.all(&mut session.driver, &session.signals, &file.numbers(), |_| !dry_run)?;
     let checked =

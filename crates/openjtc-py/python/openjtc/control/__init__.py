@@ -10,7 +10,8 @@ a clock nor a thread::
         answers, host = drives(out.bus), b""          # your drives: see openjtc.control.bus
 
 :mod:`openjtc.control.encode` makes the frames of the host, :class:`StatusReader` reads the controller's statuses, and
-:mod:`openjtc.control.bus` has both ends of the joint bus. :class:`openjtc.sim.Simulator` is this controller with simulated drives.
+:mod:`openjtc.control.bus` contains both ends of the joint bus. :class:`openjtc.sim.Simulator` is this controller with simulated
+drives.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ class Inputs:
         bus_off: True if the CAN controller is bus-off.
         safety_input: Level of the safety input; True means no error.
         status_free: True if the serial transmitter can take a status.
-        ticked: True if the tick occurs. False: the timer is late by a whole tick, and only the bytes of the host are read. After ten
-            missing ticks in a row the watchdog resets the controller.
+        ticked: True if the tick occurs. False: the timer is late by a whole tick, so the controller only reads the bytes of the
+        host. After ten missing ticks in a row the watchdog resets the controller.
     """
 
     bus: Sequence[Frame] = ()
@@ -87,8 +88,8 @@ class Controller:
     """A controller on its board, immediately after power-on.
 
     Args:
-        arm: Stored arm of the controller, which :func:`openjtc.control.encode.use_defaults` selects. An arm with an incomplete file only
-            sets the limits. None: a controller as new, with the built-in arm.
+        arm: Stored arm of the controller, which :func:`openjtc.control.encode.use_defaults` selects. If the file of the arm is
+        incomplete, only the limits are set. None: a new controller, with the built-in arm.
     """
 
     def __init__(self, arm: Arm | None = None) -> None:

@@ -107,7 +107,7 @@ def joint_answer(
     errors: int = 0,
     warnings: int = 0,
 ) -> tuple[int, bytes]:
-    """Makes a drive's answer to a :class:`Move`. Numbers beyond the scale of the bus are limited to it.
+    """Makes a drive's answer to a :class:`Move`. Values outside the range of the bus are limited to the range.
 
     Args:
         node: Node, 0 to 5.

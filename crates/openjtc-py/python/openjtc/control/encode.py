@@ -29,7 +29,8 @@ __all__ = [
 
 
 def use_defaults() -> list[bytes]:
-    """Makes three frames that select the friction, model and gains of the controller's stored arm, else of ``Arm.avena()``.
+    """Makes three frames that select the friction, model and gains of the controller's stored arm, or without one of
+    ``Arm.avena()``.
 
     Without parameters the controller does not power an arm.
     """
@@ -37,7 +38,7 @@ def use_defaults() -> list[bytes]:
 
 
 def parameters(arm: Arm) -> list[bytes]:
-    """Makes the frames of an arm's friction, model and gains, as far as its file has them.
+    """Makes the frames of an arm's friction, model and gains. A part that the arm file lacks is left out.
 
     Raises:
         UsageError: A number does not fit into a frame.
@@ -75,7 +76,7 @@ def stop() -> bytes:
 
 
 def teach() -> bytes:
-    """Makes the frame that lets the arm be led by hand; :func:`hold` ends teaching."""
+    """Makes the frame that starts teaching: the arm can be led by hand. :func:`hold` ends teaching."""
     return _native.encode_command("teach")
 
 
@@ -85,7 +86,8 @@ def hold() -> bytes:
 
 
 def jog(velocity: ArrayLike) -> bytes:
-    """Makes the frame that moves the joints with these velocities (6,), rad/s, as long as such frames keep coming."""
+    """Makes the frame that moves the joints with these velocities (6,), rad/s. The motion continues while such frames
+    are sent repeatedly."""
     return _native.encode_jog(velocity)
 
 

@@ -63,7 +63,7 @@ class Status:
 
 
 class StatusReader:
-    """Finds the statuses in the bytes of a controller, in pieces of any size."""
+    """Finds the statuses in the bytes of a controller. The bytes can be passed in pieces of any size."""
 
     def __init__(self) -> None:
         self._native = _native.StatusReader()

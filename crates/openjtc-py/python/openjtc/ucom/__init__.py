@@ -7,8 +7,8 @@
 ...     print(chain["1.position"])
 
 The procedures are the same as in the command ``ucom``. Only ``ucom`` decodes and replays recordings, makes signal databases, runs
-conformance tests that program a board, and has ``ucom serve``. An agent that owns a bus is reached by HTTP; this package has no client for
-HTTP yet.
+conformance tests that program a board, and has ``ucom serve``. An agent that owns a bus is reached over HTTP. This package has no HTTP
+client yet.
 """
 
 from __future__ import annotations

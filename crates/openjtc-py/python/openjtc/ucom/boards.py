@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Board", "BoardValues", "Signal", "Signals", "Value"]
 
-#: Value of a signal in its unit; a bool for a switch; None if the value is not known.
+#: Value of a signal in its unit. A switch is a bool. None: the value is not known.
 Value = bool | int | float | None
 
 
@@ -31,7 +31,7 @@ class Signal:
         offset: Value of the word 0, in units.
         minimum: Smallest value that may be written, in units.
         maximum: Largest value that may be written, in units.
-        known: True if the signal comes from a signal table; otherwise values are bare words.
+        known: True if the signal comes from a signal table. Otherwise values are raw words.
     """
 
     name: str
@@ -81,14 +81,12 @@ class BoardValues:
 
     Attributes:
         board: Number of the board.
-        time_s: Time at which its outputs came, s since the chain was opened; None: no outputs came.
-        age_s: Age of its outputs, s; None: no outputs came.
-        stale: True if its outputs are out of date: no outputs come, or its heartbeats are missing.
-        outputs: Sensor outputs, in the order of the buffer.
-        inputs: Inputs as last set, else the initial inputs of the board; None if neither is known.
-        parameters: Parameters as this chain wrote them, because boards cannot send them back. None: not written since the application
-            started.
-        units: Units by name, as far as a signal table has them.
+        time_s: Time at which its outputs arrived, s since the chain was opened; None: no outputs have arrived. age_s: Age of its
+        outputs, s; None: no outputs have arrived. stale: True if its outputs are outdated, because no outputs arrive or its
+        heartbeats are missing. outputs: Sensor outputs, in the order of the buffer. inputs: Inputs that were set last, or the
+        initial inputs of the board; None if neither is known. parameters: Parameters that this chain has written, because a board
+        cannot return its parameters. None: not written since the application started. units: Units by name, for signals whose
+        unit is in a signal table.
     """
 
     board: int
@@ -118,7 +116,8 @@ def _array(values: dict[str, Value]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Board:
-    """A board as it answered to PC_INFO. The protocol has no hardware version; the flash number identifies the board.
+    """A board, according to its answer to PC_INFO. The protocol has no hardware version. The flash number identifies
+    the board.
 
     Attributes:
         number: Address of the board, which is its place in the chain, 1 to 31.
@@ -146,7 +145,7 @@ class Board:
         """Inputs, outputs and parameters of the board.
 
         Raises:
-            RefusedError: The application is not started, and its signal names are not remembered from before (``no-application``).
+            RefusedError: The application is not started, and its signal names are not known from before (``no-application``).
             NoLinkError: The board does not answer.
         """
         return self._of_chain().signals(self.number)

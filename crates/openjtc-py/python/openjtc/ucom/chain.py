@@ -39,21 +39,21 @@ class Chain(ValuesByName):
     """A chain of UCoM boards, made by `connect`.
 
     A separate thread owns the session. The thread sends heartbeats for boards that this chain has started, supervises the boards, and
-    takes one call after the other. Calls may come from any thread and let other Python threads run.
+    executes one call after the other. Any thread may make calls. Other Python threads run meanwhile.
 
-    The end of the context stops the control loops, then the applications that this chain has started, as ``ucom`` does. Ctrl-C during a
+    The end of the context stops the control loops, then the applications that this chain has started, like ``ucom``. Ctrl-C during a
     call does the same before `KeyboardInterrupt` is raised, and so does the end of a program that has not closed its chain. A killed
     program sends no more heartbeats, and the boards make their outputs safe by themselves after 1.5 s.
 
     Inputs and outputs have names ``BOARD.SIGNAL``, with the board's number or name (``"2.position"``, ``"gripper.position"``). The
-    signal's name alone is enough if only one board has it.
+    name of the signal alone is enough if only one board has this signal.
 
     Every method may raise:
         NoLinkError: The bus is lost, or a board does not answer (``.board``).
         RefusedError: Another PC is master of the bus (``foreign-master``), or a check refused the call; no board was changed.
         DeviceError: A board reports an error.
         FaultError: The call failed while it ran, or was cancelled.
-    ``.next`` of an error names commands of ``ucom``; methods of the same name do the same here.
+    ``.next`` of an error suggests commands of ``ucom``. Methods with the same names have the same effect here.
     """
 
     # Discovery and numbers.
@@ -67,7 +67,7 @@ class Chain(ValuesByName):
         Args:
             renew: Replaces the inventory without comparing.
             force: Continues even if another PC is on the bus.
-            check: Raises an error for findings; False: only the report has them.
+            check: Raises an error for findings; False: findings are only in the report.
 
         Raises:
             DeviceError: Boards are missing, in another order, or not reached (``init``).
@@ -143,14 +143,15 @@ class Chain(ValuesByName):
         self._native.outputs(self._list(boards), active)
 
     def stop(self, boards: Boards = "all", *, application: bool = True) -> dict[int, Board]:
-        """Stops boards, also boards that another program has started: control loops at once, then with confirmation of each board.
+        """Stops boards, including boards that another program has started. First stops the control loops at once, then stops each
+        board with its confirmation.
 
         The stop interrupts a call of another thread on this chain, which ends with the error ``cancelled``; an update continues.
         Stopping is always allowed, also with another PC on the bus.
 
         Args:
             boards: Boards to stop; ``all`` by broadcast.
-            application: Ends applications, too; False: only control loops.
+            application: Also ends applications; False: ends only control loops.
 
         Raises:
             FaultError, NoLinkError: Some boards may not be stopped.
@@ -182,15 +183,16 @@ class Chain(ValuesByName):
     def probe(
         self, *, init: bool = False, alive: bool = False, image: _Path | None = None, force: bool = False
     ) -> ProbeReport:
-        """Measures how the boards read the points that the published protocol leaves open, by harmless requests.
+        """Measures with harmless requests how the boards interpret the open points of the published protocol.
 
         This chain keeps its profile. To use the measured profile, pass it to `connect`.
 
         Args:
-            init: Also measures points that show only while boards are numbered: resets and numbers the chain.
-            alive: Starts a control loop with safe outputs to see which heartbeats count, and stops it again.
-            image: Image of a board's present application, to find the checksum of Program IDs.
-            force: Continues even if another PC is on the bus, or if ``init`` or ``alive`` ends running control loops.
+            init: Also measures points that can be observed only while boards are numbered. This resets and numbers the
+            chain. alive: Starts a control loop with safe outputs to find out which heartbeats a board accepts, and
+            stops it again. image: Image of a board's present application, to find the checksum algorithm of Program
+            IDs. force: Continues even if another PC is on the bus, or if ``init`` or ``alive`` ends running control
+            loops.
 
         Raises:
             RefusedError: Control loops run (``running``), and ``init`` or ``alive`` would end them.
@@ -211,7 +213,7 @@ class Chain(ValuesByName):
         only: Sequence[str] = (),
         force: bool = False,
     ) -> ConformanceReport:
-        """Tests the boards against the protocol. Without ``init`` and ``run`` only by harmless requests.
+        """Tests the boards against the protocol. Without ``init`` and ``run``, sends only harmless requests.
 
         Args:
             boards: Boards to test.
@@ -263,17 +265,15 @@ class Chain(ValuesByName):
             raw: Reads a file of any name as raw bytes; never records, and text only from a ``.bin``.
             addresses: Unit of the addresses in records, if the file does not show it.
             fill_gaps: Fills gaps between records with FF.
-            date: Flash date; None: today, UTC. A board that shows the program already keeps its date.
-            expect_program_id: Program ID that the boards must show at the end.
-            name_target: Names the board in the header, so that any other board refuses the image.
-            group: Updates all boards with one transfer, by broadcast.
-            start: Starts the application at the end; closing the chain stops the application, as after `start`.
-            dry_run: Only runs the checks; no frame that changes a board is sent.
-            unverified: Accepts boards that cannot be verified, also ``program-up-to-date``.
-            force: Continues even if boards run, another PC is on the bus, or the board shows the program already.
-            rewrite: Updates a board that shows the program already; skips no check.
-            check: Raises an error if a board was not updated; False: only the report has the failure.
-            progress: Function that is called with each `Progress`; True: a line on a terminal's stderr.
+            date: Flash date; None: today, UTC. A board that already has the program keeps its date. expect_program_id:
+            Program ID that the boards must show at the end. name_target: Writes the board into the header, so that any
+            other board refuses the image. group: Updates all boards with one transfer, by broadcast. start: Starts the
+            application at the end; closing the chain stops the application, as after `start`. dry_run: Only runs the
+            checks; no frame that changes a board is sent. unverified: Accepts boards that cannot be verified, also
+            ``program-up-to-date``. force: Continues even if boards run, another PC is on the bus, or the board already
+            has the program. rewrite: Updates a board that already has the program. All checks are still made. check:
+            Raises an error if a board was not updated; False: the failure is only in the report. progress: Function
+            that is called with each `Progress`; True: a line on a terminal's stderr.
 
         Raises:
             RefusedError, NoLinkError, DeviceError: No board was erased.

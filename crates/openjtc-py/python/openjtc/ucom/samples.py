@@ -22,10 +22,9 @@ class Sample:
     """All outputs of a board at one time.
 
     Attributes:
-        time_s: Time at which the last output came, s since the chain was opened.
-        board: Number of the board.
-        outputs: Outputs by name, in the order of the buffer, in units if a signal table has them.
-        missed: Number of incomplete sets of outputs that were dropped since the previous sample.
+        time_s: Time at which the last output arrived, s since the chain was opened. board: Number of the board.
+        outputs: Outputs by name, in the order of the buffer, in units if a signal table has them. missed: Number of
+        incomplete sets of outputs that were dropped since the previous sample.
     """
 
     time_s: float
@@ -55,11 +54,11 @@ class OutputTable:
 
 
 class Monitor(Iterator[Sample]):
-    """Iterator over samples as they come; ends after a time or a number of samples. Made by `Chain.monitor`.
+    """Iterator over samples as they arrive. It ends after a time or a number of samples. `Chain.monitor` makes it.
 
     Raises:
-        FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); raised once.
-        NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is lost.
+        FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); raised only
+        once. NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is lost.
     """
 
     def __init__(self, native: ChainSamples, seconds: float | None, count: int | None) -> None:

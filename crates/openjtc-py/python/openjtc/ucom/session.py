@@ -19,7 +19,8 @@ from openjtc.ucom.reports import BusState, Event
 
 __all__ = ["Boards", "Recording", "Session"]
 
-#: Selection of boards: a number, several, names of an inventory, a list or range as text (``"1,4-6"``), or ``"all"``.
+#: Selection of boards: a number, several numbers, names of an inventory, a list or range as text (``"1,4-6"``), or
+#: ``"all"``.
 Boards = int | str | Iterable[int | str]
 _Path = str | os.PathLike[str]
 _Self = TypeVar("_Self", bound="Session")
@@ -29,7 +30,7 @@ def _close(native: _native.Chain) -> None:
     """Closes a chain at the end of the program, or when the last reference to an open chain ends."""
     not_stopped = native.close()
     if not_stopped and sys.stderr is not None:
-        # No caller could catch an exception here.
+        # Exceptions are suppressed, because no caller could catch them here.
         with contextlib.suppress(OSError, ValueError):
             print(f"openjtc: {_not_stopped(not_stopped)}", file=sys.stderr, flush=True)
 
@@ -56,7 +57,7 @@ class Session:
 
     @property
     def simulated(self) -> SimulatedChain | None:
-        """Simulated chain, if `connect` was given one or has made one."""
+        """Simulated chain that was passed to `connect` or that `connect` has made; otherwise None."""
         return self._simulated
 
     def __enter__(self: _Self) -> _Self:
@@ -86,7 +87,7 @@ class Session:
         try:
             return list(self._native.close())
         except BaseException:
-            # Ctrl-C interrupted the wait: the thread continues, and the end of the program waits for it.
+            # Ctrl-C has interrupted the wait. The thread continues, and the end of the program waits for it.
             self._finalizer = weakref.finalize(self, _close, self._native)
             raise
 
@@ -129,9 +130,8 @@ class Session:
         """Records every frame of the bus, including the frames of this chain, until the end of the context or ``.end()``.
 
         Args:
-            path: File: ``.log`` for candump's form, ``.fzi`` for FZI-CAN, ``.mcap`` for MCAP. The profile is written into the file or next
-                to it.
-            overwrite: Overwrites an existing file.
+            path: File: ``.log`` for the format of candump, ``.fzi`` for FZI-CAN, ``.mcap`` for MCAP. The profile is written into the file
+            or next to it. overwrite: Overwrites an existing file.
         """
         if not overwrite and Path(path).exists():
             raise UsageError(f"{os.fspath(path)}: is there already", "exists", next="overwrite=True writes over it")
@@ -163,11 +163,12 @@ class Session:
 
 
 class Recording:
-    """A recording that is being written; a context manager that ends it."""
+    """A recording in progress. As a context manager it ends the recording."""
 
     def __init__(self, native: ChainRecording) -> None:
         self._native = native
-        #: Number of written frames, and of left-out frames of other protocols that the form cannot hold; set at the end.
+        #: Number of written frames. The next attribute is the number of frames that were left out, because the format
+        #: cannot hold their protocol. Both are set at the end.
         self.frames = 0
         self.left_out = 0
 

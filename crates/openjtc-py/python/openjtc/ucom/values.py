@@ -17,7 +17,7 @@ from openjtc.ucom.session import Boards, Session
 
 __all__ = ["Settable", "ValuesByName"]
 
-#: A value to set: a number, a number with its unit (``"15.5 deg"``), a word as it is (``"0x05DC"``), or a switch.
+#: A value to set: a number, a number with its unit (``"15.5 deg"``), a raw word (``"0x05DC"``), or a switch.
 Settable = bool | int | float | str
 _Path = str | os.PathLike[str]
 
@@ -43,7 +43,7 @@ class ValuesByName(Session):
     def __init__(self, native: _native.Chain, names: Mapping[str, int], simulated: SimulatedChain | None) -> None:
         super().__init__(native, names, simulated)
         self._boards: dict[int, Board] = {}
-        #: True after the names of the inventory were read.
+        #: True after a scan has read the names of the inventory.
         self._looked = False
 
     def scan(self) -> ScanReport:
@@ -58,7 +58,7 @@ class ValuesByName(Session):
 
     @property
     def boards(self) -> dict[int, Board]:
-        """Boards by number, as last seen; the first use queries all boards."""
+        """Boards by number, according to their last answers. The first use queries all boards."""
         if not self._boards:
             self.scan()
         return dict(self._boards)
@@ -67,7 +67,7 @@ class ValuesByName(Session):
         """Returns the inputs, outputs and parameters of a board.
 
         Raises:
-            RefusedError: The application is not started, and its signal names are not remembered (``no-application``): call `start`.
+            RefusedError: The application is not started, and its signal names are not known (``no-application``): call `start`.
         """
         (value,) = self._native.signals(str(self._number(board)))
         return Signals._of(value)
@@ -91,11 +91,10 @@ class ValuesByName(Session):
         them when its application ends.
 
         Args:
-            name: ``BOARD.NAME``, in upper or lower case, or the name alone if only one board has it.
-            value: A number, ``"15.5 deg"``, a word ``"0x05DC"``, or a switch.
-            unit: Unit of the value. A signal with a unit in the signal table refuses bare numbers.
-            kind: Selects the input or the parameter if both have the same name; None: the input.
-            force: Continues even if another PC is on the bus.
+            name: ``BOARD.NAME``, in upper or lower case, or the name alone if only one board has this signal. value: A
+            number, ``"15.5 deg"``, a word ``"0x05DC"``, or a switch. unit: Unit of the value. A signal with a unit in
+            the signal table refuses bare numbers. kind: Selects the input or the parameter if both have the same name;
+            None: the input. force: Continues even if another PC is on the bus.
 
         Returns:
             The value that was sent, in the unit of the signal, rounded to the nearest word.
@@ -111,10 +110,11 @@ class ValuesByName(Session):
         self.set(name, value)
 
     def __getitem__(self, name: str) -> Value:
-        """Returns an output by its name; else an input as last set, or a parameter as written (None: not known).
+        """Returns an output by its name. If no output has the name, returns the input that was set last, or the
+        parameter that was written last (None: not known).
 
         Raises:
-            NoLinkError: The board sends no outputs (``no-outputs``), or none for 0.5 s (``stale``).
+            NoLinkError: The board has sent no outputs at all (``no-outputs``), or none for 0.5 s (``stale``).
             FaultError: The board was lost, or has left its control loop by itself.
         """
         board, signal = self._find(name)
@@ -125,14 +125,15 @@ class ValuesByName(Session):
 
         Raises:
             FaultError: A board was lost, or has left its control loop by itself.
-            NoLinkError: A board sends no outputs (``no-outputs``), or none for 0.5 s (``stale``), with ``.board``.
+            NoLinkError: A board has sent no outputs at all (``no-outputs``), or none for 0.5 s (``stale``), with
+            ``.board``.
         """
         self.check()
         boards = [BoardValues._of(value) for value in self._native.running()]
         return {f"{one.board}.{name}": value for one in boards for name, value in one.outputs.items()}
 
     def board_values(self, boards: Boards = "all") -> dict[int, BoardValues]:
-        """Returns outputs with their age, inputs and parameters of boards, also of boards that another program runs.
+        """Returns outputs with their age, inputs and parameters of boards, including boards that another program runs.
 
         ``all`` leaves out boards without names, because their applications are not started.
         """
@@ -142,7 +143,8 @@ class ValuesByName(Session):
     def monitor(
         self, boards: Boards | None = None, *, seconds: float | None = None, count: int | None = None
     ) -> Monitor:
-        """Returns an iterator of `Sample` with outputs as they come; ``.to_pandas()`` and ``.to_numpy()`` make tables of it.
+        """Returns an iterator of `Sample` with outputs as they arrive. ``.to_pandas()`` and ``.to_numpy()`` make tables from
+        it.
 
         Args:
             boards: Boards to read, also boards that another program runs. None: the boards that this chain runs, or all boards if it runs

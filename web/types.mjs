@@ -1,4 +1,5 @@
-// Makes api-types.ts of each page: types of the objects in the description of its API. With --check it compares the files instead.
+// Makes api-types.ts for each page, with the types of the objects in the description of its API. With --check it compares the
+// files instead.
 import { readFileSync, writeFileSync } from 'node:fs';
 
 import openapiTS, { astToString } from 'openapi-typescript';

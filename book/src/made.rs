@@ -1,10 +1,10 @@
-//! The book that was made: every link in it leads to a file of it.
+//! Checks that every link in the finished book leads to a file of the book.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, ensure};
 
-/// Looks at each page below `out`; returns how many links there are between its files.
+/// Checks each page below `out`. Returns the number of links between files of the book.
 pub fn check(out: &Path) -> Result<usize> {
     let (mut links, mut broken, mut waiting) = (0, Vec::new(), vec![out.to_owned()]);
     while let Some(folder) = waiting.pop() {
@@ -26,7 +26,7 @@ pub fn check(out: &Path) -> Result<usize> {
     Ok(links)
 }
 
-/// Files that a page links to, as it names them.
+/// Returns the files to which a page links, as written in the page.
 fn targets(page: &str) -> Vec<PathBuf> {
     let of = |name: &'static str| page.split(name).skip(1).filter_map(|rest| Some(rest.split_once('"')?.0));
     let path = |target: &str| {

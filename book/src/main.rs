@@ -1,8 +1,8 @@
-//! Makes the HTML book of docs/: `openjtc-book ROOT OUT`.
+//! Makes the HTML book from docs/: `openjtc-book ROOT OUT`.
 //!
-//! mdbook does the work; what it does not know is that docs/ is a part of a repository. Links that lead out of docs/ are resolved here
-//! ([`outside`]): pictures are copied, and files that can be read become pages of the book's last part. Diagrams get the script that draws
-//! them ([`diagrams`]).
+//! mdbook makes the book, but it does not know that docs/ is a part of a repository. So this program resolves links that lead out of docs/
+//! ([`outside`]): it copies pictures, and turns readable files into pages of the book's last part. It also adds the script that draws the
+//! diagrams ([`diagrams`]).
 #![forbid(unsafe_code)]
 
 mod diagrams;
@@ -16,7 +16,7 @@ use anyhow::{Context, Result, bail, ensure};
 use mdbook_driver::MDBook;
 use mdbook_driver::config::Config;
 
-/// A file that every book of mdbook has.
+/// A file that every book made by mdbook contains.
 const MARK: &str = "searcher.js";
 
 fn main() -> Result<()> {
@@ -29,7 +29,7 @@ fn main() -> Result<()> {
     let root = root.canonicalize().with_context(|| root.display().to_string())?;
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let out = out.canonicalize()?;
-    // mdbook empties the folder first.
+    // This is checked because mdbook first empties the folder.
     ensure!(!root.starts_with(&out), "{} holds the repository, and would be emptied", out.display());
     let is_empty = std::fs::read_dir(&out)?.next().is_none();
     ensure!(

@@ -74,7 +74,7 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
 
 export const card = (page, number) => page.getByRole('button', { name: new RegExp(`^Board ${number} `) });
 
-/** Returns an image; a simulated board accepts any bytes as a program. */
+/** Returns an image. A simulated board accepts any bytes as a program. */
 export function image(bytes) {
   return Buffer.from(Array.from({ length: bytes }, (_, i) => (37 * i + 11) & 0xff));
 }
@@ -93,7 +93,7 @@ export function intelHex(bytes) {
   return `${text}:00000001FF\n`;
 }
 
-/** Like `intelHex`, as Motorola S-records. */
+/** Like `intelHex`, but as Motorola S-records. */
 export function sRecords(bytes) {
   const record = (kind, address, data) => {
     const all = [data.length + 3, address >> 8, address & 0xff, ...data];

@@ -11,7 +11,7 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 const on = staged(() => browser);
 
-// The controller is at a port, like a real one: the dialog names the arm and the risk.
+// The controller is at a port, like a real one. The dialog shows the arm and the risk.
 on('a controller without parameters gets none before the page has asked which arm it is', { faults: 'format = 2\n' }, async ({ agent, look }) => {
   const page = await look();
   const sent = [];
@@ -33,7 +33,7 @@ on('a controller without parameters gets none before the page has asked which ar
     await dialog.waitFor({ state: 'detached' });
   }
   assert.deepEqual(sent, []);
-  // Another arm: its file is compared and sent.
+  // The file of another arm is compared and sent.
   const { text } = (await agent.ask('GET', '/api/arm')).body;
   writeFileSync(join(agent.dir, 'mine.toml'), text.replace('kp = 8000', 'kp = 7900'));
   await state(page).getByRole('button', { name: 'Recover …' }).click();
@@ -60,7 +60,7 @@ on('an arm at rest is drawn where it stands in a new theme, and when its gains a
   });
   const same = async (what) => (await posed()).measured.forEach((q, i) => assert.ok(Math.abs(q - at[i]) < 0.002, `${what}: joint ${i + 1} is drawn at ${q}, stands at ${at[i]}`));
   const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
-  // Dark, light, and the setting of the system.
+  // Switches to dark, to light, and to the setting of the system.
   for (const wanted of ['dark', 'light', 'light']) {
     await page.getByRole('button', { name: /^Theme/ }).click();
     await until(`the theme is ${wanted}`, async () => (await theme()) === wanted);
@@ -107,7 +107,7 @@ on('waypoints that are added are in the units of the file, and planned so', {}, 
     const { body } = await agent.ask('GET', `/api/trajectories/${/number (\d+)/.exec(kept)[1]}/points`);
     body.positions_rad.at(-1).forEach((q, i) => assert.ok(Math.abs(q - to[i]) < 0.005, `${file}, ${button}: joint ${i + 1} ends at ${q} rad, the arm stands at ${to[i]} rad`));
   }
-  // A table that cannot take the row is unchanged.
+  // A table to which the row cannot be added is unchanged.
   const own = 't,q1,q2,q3,q4,q5,q6,qd1\n';
   await text.fill(own);
   await page.getByRole('button', { name: 'Add current position' }).click();
@@ -124,7 +124,7 @@ on('the jog keys are disabled while a motion is uploaded, with the reason', {}, 
   await page.click('#tab-jog');
   const keys = page.getByRole('button', { name: /^Joint \d, / });
   await until('they are enabled', async () => (await keys.count()) === 12 && (await keys.nth(0).isEnabled()));
-  // The page itself watches for the upload, which is short.
+  // The page itself watches for the upload, because the upload is too short for the test to see it.
   const seen = page.evaluate(() => new Promise((done) => {
     const look = () => {
       const reason = [...document.querySelectorAll('#panel .note')].map((note) => note.textContent).find((text) => /being uploaded/.test(text));

@@ -18,7 +18,7 @@ const SHOWN = readFileSync(new URL('../../docs/dashboard.md', import.meta.url), 
 const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/release/jtc', import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 
-/** Runs `jtc` with these arguments; resolves to its output. */
+/** Runs `jtc` with these arguments. Resolves to its output. */
 export function jtc(args, options = {}) {
   return new Promise((done, fail) => {
     const child = spawn(JTC, args, options);
@@ -30,7 +30,8 @@ export function jtc(args, options = {}) {
   });
 }
 
-/** Starts an agent in a new directory: with a simulated arm, or with `faults` at the port of a simulated controller that has these faults. */
+/** Starts an agent in a new directory, with a simulated arm. With `faults`, the agent uses the port of a simulated controller that has
+ * these faults. */
 export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = undefined } = {}) {
   const dir = mkdtempSync(join(tmpdir(), 'openjtc-web-'));
   const tokenFile = join(dir, 'tokens.toml');
@@ -65,7 +66,7 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
     dir,
     operator: token('operator'),
     viewer: token('viewer'),
-    /** Kills the agent, which then closes nothing, as after a power failure. */
+    /** Kills the agent. It closes nothing, like after a power failure. */
     kill() {
       child.kill('SIGKILL');
       return gone;
@@ -112,7 +113,7 @@ export function startBrowser() {
   return chromium.launch(LAUNCH);
 }
 
-/** Starts a browser that can be killed, like a tablet with an empty battery. */
+/** Starts a browser that can be killed. This simulates a tablet whose battery is empty. */
 export async function startMortal() {
   const server = await chromium.launchServer(LAUNCH);
   return { browser: await chromium.connect(server.wsEndpoint()), kill: () => server.kill() };
@@ -123,7 +124,7 @@ export async function picture(page, name) {
   if (process.env.PICTURES && SHOWN.includes(`/${name}.png`)) await page.screenshot({ path: join(PICTURES, `${name}.png`) });
 }
 
-/** Returns an agent with its page for one test; `look` opens the page in a new browser context. */
+/** Returns an agent with its page for one test. `look` opens the page in a new browser context. */
 export function stage(browser, agent) {
   const contexts = [];
   return {
@@ -147,7 +148,7 @@ export function stage(browser, agent) {
   };
 }
 
-/** Defines tests that run on a new stage each. A failed test takes a picture. */
+/** Defines tests. Each test has its own new agent. A failed test takes a picture. */
 export function staged(browser, start = startAgent) {
   return (name, options, act) =>
     test(name, async () => {
@@ -219,7 +220,7 @@ export async function passes(page, ms) {
   await page.clock.pauseAt((await page.evaluate(() => Date.now())) + ms);
 }
 
-/** Waits until a condition holds in this process; the timeout is long, for a busy computer. */
+/** Waits until a condition holds in this process. The timeout is long enough for a busy computer. */
 export async function until(what, condition, within = 120_000) {
   const end = Date.now() + within;
   for (;;) {
@@ -230,7 +231,7 @@ export async function until(what, condition, within = 120_000) {
   }
 }
 
-/** Calls `act` with the lease of another client. */
+/** Calls `act` while another client holds the lease. */
 export async function commanding(agent, act, name = 'test') {
   const grant = await agent.ask('POST', '/api/lease', { name, lasts_s: 60 });
   if (grant.status !== 200) throw new Error(JSON.stringify(grant));

@@ -18,7 +18,7 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 const on = staged(() => browser);
 
-/** All faults so far; they are reported together. */
+/** All faults so far. They are reported together. */
 const wrong = [];
 function collect(found, what) {
   wrong.push(...found.map((each) => `${what}: ${each}`));

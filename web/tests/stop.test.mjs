@@ -1,4 +1,4 @@
-// Stop, and the messages about an unknown state: the most important part of the page.
+// Stop, and the messages about an unknown state. These are the most important parts of the page.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,7 +12,8 @@ after(() => browser.close());
 
 const on = staged(() => browser);
 
-/** Starts a motion of half a minute as another client, and calls `act` during it: long enough for a busy computer. */
+/** Starts a motion of half a minute as another client, and calls `act` during the motion. This is long enough even on a
+ * busy computer. */
 async function moving(agent, act) {
   await jtc(['example', 'motion', '-o', agent.dir]);
   const text = readFileSync(join(agent.dir, 'motion.csv'), 'utf8');
@@ -35,7 +36,7 @@ on('Stop by one touch ends a motion, and says what it did', {}, async ({ agent, 
   await state(page).getByText('Holding').waitFor();
   await moving(agent, async () => {
     await state(page).getByText('Moving').waitFor();
-    // Stop acts on the press, without a release of the button.
+    // Stop acts when the button is pressed, before it is released.
     const box = await page.getByRole('button', { name: /STOP/ }).boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     const said = await says(page, /Stopped on the path in \d\.\d s; the arm is held/);
@@ -142,7 +143,7 @@ on('an agent that hangs is noticed as well, and comes back by itself', {}, async
   agent.suspend();
   await passes(page, 2000);
   await page.getByText('No connection', { exact: true }).first().waitFor();
-  // A file dialog may stay open longer than that.
+  // A file dialog may stay open longer than this loss.
   await file.setInputFiles(join(agent.dir, 'motion.csv'));
   agent.wake();
   await page.clock.resume();
@@ -169,7 +170,7 @@ on('a Stop that nobody confirms says so, at once and as often as it is touched',
   const page = await look();
   await state(page).getByText('Holding').waitFor();
   const words = page.getByTestId('stop-words');
-  // Loads the parts of the page that are opened later.
+  // Loads the parts of the page that are needed later.
   await page.getByRole('button', { name: 'Nobody commands' }).click();
   await page.getByRole('button', { name: 'Close' }).click();
   // The message of an earlier Stop is still shown.

@@ -1,4 +1,4 @@
-// The page in use: run, jog, poses, teaching, arm files, plots and gains, two users of one arm, errors.
+// Use of the page: run, jog, poses, teaching, arm files, plots and gains, two users of one arm, errors.
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,14 +11,15 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 
 const on = staged(() => browser);
-/** Times are judged only on a computer without other load. */
+/** Times are checked only on a computer without other load. */
 const JUDGED = process.env.FIGURES !== undefined;
 
 const status = async (agent) => (await agent.ask('GET', '/api/status')).body;
 const joints = async (agent) => (await status(agent)).controller.joints.map((joint) => joint.position_rad);
 const moves = async (agent) => (await status(agent)).controller.joints.some((joint) => Math.abs(joint.velocity_rad_s) > 0.01);
 
-/** Presses a jog key again, as a user would: the page releases it after the browser was suspended for half a second. */
+/** Presses a jog key again, like a user, because the page releases it after the browser was suspended for half a
+ * second. */
 async function pressAgain(page, key) {
   if (!(await key.getAttribute('class')).includes('held')) {
     await page.mouse.up();
@@ -58,7 +59,7 @@ on('a file is checked, looked at, and run; the report is one touch away', {}, as
   await slider.fill('3');
   await until('the ghost is where the motion is at 3 s', () => page.evaluate(() => Math.abs(globalThis.arm.preview.time - 3) < 0.01));
   assert.deepEqual(await joints(agent), before, 'the preview moved the arm');
-  // At a low speed until it was paused and resumed, because a busy computer needs seconds for each touch.
+  // The speed is low until the motion was paused and resumed, because a busy computer needs seconds for each touch.
   await page.getByLabel('Speed, % of its own').selectOption({ label: '25 %' });
   await page.getByRole('button', { name: /^Run/ }).click();
   await state(page).getByText('Moving', { exact: true }).waitFor();
@@ -86,7 +87,7 @@ on('what a check refuses is named with its joint, and shown at its place', {}, a
   const page = await look();
   await held(page);
   await page.click('#tab-run');
-  // First an invalid file: the page shows the place of the error.
+  // First the file is invalid, and the page shows the place of the error.
   writeFileSync(join(agent.dir, 'none.csv'), 't,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n0.1,0,0,x,0,0,0\n');
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'none.csv'));
   await page.getByRole('alert').getByText(/line 3, column 4, q3: "x" is not a number/).waitFor();
@@ -96,7 +97,7 @@ on('what a check refuses is named with its joint, and shown at its place', {}, a
   await page.getByText(/Error: joint \d/).first().waitFor();
   await page.locator('#panel').getByRole('button', { name: 'Show' }).first().click();
   assert.ok((await page.evaluate(() => globalThis.arm.preview.time)) > 0);
-  // A file that passes, and is replaced by another client before it runs.
+  // This file passes the check. Another client replaces it before it runs.
   await jtc(['example', 'motion', '-o', agent.dir]);
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
   await page.getByText('Passed the check').waitFor();
@@ -123,7 +124,7 @@ on('a joint moves as long as its key is held', {}, async ({ agent, look }) => {
   });
   await page.mouse.up();
   await until('it rests', async () => !(await moves(agent)), 5000);
-  // By keyboard; the key is released because the window loses the focus.
+  // Uses the keyboard. The key is released because the window loses the focus.
   await page.getByRole('button', { name: 'Joint 3, negative' }).focus();
   await page.keyboard.down('Enter');
   await until('it moves back', () => moves(agent));
@@ -177,7 +178,7 @@ on('a key that was let go before the lease came moves nothing, nor does one that
   await page.mouse.move(box.x + 20, box.y + 400);
   await until('it rests', async () => !(await moves(agent)), 5000);
   await page.mouse.up();
-  // Another key directly afterwards, with the same mouse.
+  // Presses another key directly afterwards, with the same mouse.
   const other = await page.getByRole('button', { name: 'Joint 2, positive' }).boundingBox();
   await page.mouse.move(other.x + 20, other.y + 20);
   await page.mouse.down();
@@ -280,7 +281,7 @@ on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) =>
   await page.click('#tab-plots');
   await page.locator('.uplot canvas').first().waitFor();
   await until('the plot has curves', () => page.evaluate(() => globalThis.arm.history.length > 20));
-  // Each tick of the last second, from the flight recorder.
+  // Shows each tick of the last second, from the flight recorder.
   await page.getByRole('group', { name: 'Time read from the flight recorder' }).getByRole('button', { name: '1 s' }).click();
   await page.getByRole('button', { name: 'Each ms of them' }).click();
   await page.getByText(/1001 ticks of 1 ms/).waitFor({ timeout: 120_000 });
@@ -289,7 +290,7 @@ on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) =>
   assert.ok(await page.getByRole('button', { name: 'Temperature' }).isDisabled());
   await page.getByRole('button', { name: 'Live again' }).click();
   await page.getByLabel(/^Kp/).fill('7000');
-  // A value that is typed while the arm is read does not replace the value to set.
+  // A value that the user types while the arm is being read does not replace the value to set.
   let read;
   await page.route('**/api/arm', async (route) => {
     if (route.request().method() === 'GET') await new Promise((done) => (read = done));
@@ -308,7 +309,7 @@ on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) =>
   await page.locator('#panel td', { hasText: '7000' }).waitFor();
   const now = await joints(agent);
   before.forEach((q, i) => assert.ok(Math.abs(q - now[i]) < 0.002, 'it is back where it began'));
-  // A Stop before the return motion ends the test.
+  // A Stop before the return motion ends the test of the gains.
   let second;
   await page.route('**/api/moves*', async (route) => {
     second = route.request().url();
@@ -358,7 +359,7 @@ on('two at one arm: one commands, the other asks for it and gets it', {}, async 
   await anna.getByRole('button', { name: /You command/ }).click();
   await anna.getByRole('button', { name: 'Give it to Bert' }).click();
   await bert.getByRole('banner').getByRole('button', { name: 'You command' }).waitFor();
-  // Every client can stop, independent of the lease.
+  // Every client can stop, whether or not it holds the lease.
   await anna.getByRole('button', { name: 'Close' }).click();
   await anna.getByRole('button', { name: /STOP/ }).click();
   await until('it was sent', async () => (await status(agent)).last_halt === 1);

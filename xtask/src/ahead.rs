@@ -1,8 +1,8 @@
-//! Builds for later steps, made at the lowest priority while earlier steps wait.
+//! Builds for later steps, which run at the lowest priority while earlier steps wait.
 //!
-//! Most tests wait: for a line as slow as a real one, for leases that lapse. The free processor time is used to build the boards'
-//! programs, the emulator and the Python package. A failed build is reported in the step that needs it, because that step runs the same
-//! build.
+//! Most tests wait, for example for a line that is as slow as a real one, or for the end of a lease. The free processor time is used to
+//! build the boards' programs, the emulator and the Python package. A failed build is reported in the step that needs it, because that
+//! step runs the same build.
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 
@@ -17,15 +17,15 @@ pub struct Ahead {
 }
 
 impl Ahead {
-    /// Begins with the slowest builds.
+    /// Begins the builds. The slowest ones come first.
     pub fn begin() -> Self {
         let (sender, receiver) = mpsc::channel();
         let make = move || shell::in_background(|| drop(make(&receiver)));
         Self { workspace_is_built: Some(sender), making: Some(std::thread::spawn(make)) }
     }
 
-    /// Allows the build of the Python package. Cargo lets one build at a time use a target folder: begun earlier, this one would hold up
-    /// the steps at the lowest priority.
+    /// Allows the build of the Python package. Cargo allows one build at a time in a target folder. If this low-priority build began
+    /// earlier, it would delay the steps.
     pub fn workspace_is_built(&self) {
         if let Some(sender) = &self.workspace_is_built {
             // An error means that an earlier build has failed and the thread has ended.
@@ -36,10 +36,10 @@ impl Ahead {
 
 impl Drop for Ahead {
     fn drop(&mut self) {
-        // If the workspace was not built, this ends the thread's wait for it.
+        // If the workspace was not built, this ends the wait of the thread.
         self.workspace_is_built = None;
         if let Some(thread) = self.making.take() {
-            // A panic of the thread does not concern the checks.
+            // A panic of the thread has no effect on the checks, so it is ignored.
             let _ = thread.join();
         }
     }
@@ -47,7 +47,7 @@ impl Drop for Ahead {
 
 fn make(workspace_is_built: &Receiver<()>) -> Result<()> {
     python::environment("requirements.txt")?;
-    // Without it the step that needs it is skipped.
+    // An error is ignored: without the browser, the step that needs it is skipped.
     let _ = web::install_browser();
     emulate::programs()?;
     firmware::lints()?;

@@ -1,4 +1,5 @@
-//! `cargo xtask bench`: figures and their anchors, all measured in the same run on the same machine.
+//! `cargo xtask bench`: measures figures and their anchors (reference values of other software) in the same run on the
+//! same machine.
 mod load;
 mod table;
 mod tracking;
@@ -15,7 +16,8 @@ use load::{Load, OTHERS_MAX};
 use crate::python;
 use crate::shell::{self, cargo, command, root, run};
 
-/// Time of Pinocchio's inverse dynamics in an equal build on the machine on which the absolute targets were set, ns.
+/// Time of Pinocchio's inverse dynamics, ns, measured with the same kind of build on the machine for which the absolute
+/// targets were set.
 const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 
 /// Figures by name.
@@ -58,7 +60,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         samples.append(&mut failed.attempt(&["plan."], planned));
         keep_best(&mut figures, samples);
     }
-    // Measured once: the minimum of several maxima would not be a maximum.
+    // This is measured only once, because the minimum of several maxima would not be a maximum.
     figures.append(&mut stops(quick, &mut failed));
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
@@ -98,8 +100,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(if missed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Keeps the better of two measurements of a figure: the smaller time or size, the greater throughput. Other programs can only make a
-/// measurement worse.
+/// Keeps the better of two measurements of a figure: the smaller time or size, or the greater throughput. This is valid because other
+/// programs can only make a measurement worse.
 fn keep_best(figures: &mut Figures, samples: Figures) {
     for (name, value) in samples {
         let throughput = ["_gb_s", "_frames_s"].iter().any(|end| name.ends_with(end));
@@ -116,7 +118,7 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Failed measurements: the beginnings of the names of their figures, and the cause.
+/// Failed measurements. Each has the beginnings of the names of its figures, and the cause.
 #[derive(Default)]
 pub struct Failed(Vec<(&'static [&'static str], String)>);
 
@@ -138,13 +140,13 @@ impl Failed {
         self.0.push((figures, why));
     }
 
-    /// Returns the reason why this figure is missing: the cause in one line.
+    /// Returns the reason why this figure is missing, in one line.
     pub fn why(&self, figure: &str) -> Option<&str> {
         let (_, why) = self.0.iter().find(|(names, _)| names.iter().any(|name| figure.starts_with(name)))?;
         why.lines().map(str::trim).rfind(|line| !line.is_empty())
     }
 
-    /// All causes, one line for each.
+    /// Returns all causes, one line for each.
     fn causes(&self) -> Vec<String> {
         self.0.iter().map(|(figures, why)| format!("{}: {why}", figures.join(", "))).collect()
     }
@@ -201,7 +203,7 @@ fn cantools(frames: &Path) -> Result<Figures> {
     Ok(Figures::from([("cantools_frames_s".to_owned(), rate)]))
 }
 
-/// Measures planned motions, ours and those of toppra and Ruckig.
+/// Measures planned motions of our planner, toppra and Ruckig.
 fn planned() -> Result<Figures> {
     let mut script = command(python::environment("requirements.txt")?);
     script.arg(root().join("references/plan/bench_plan.py")).arg(shell::target().join("dist/examples/plans"));
@@ -209,7 +211,7 @@ fn planned() -> Result<Figures> {
     object(&shell::read(&mut script)?)
 }
 
-/// Measures the time until a Stop is on the line of an agent, under each load.
+/// Measures, under each load, the time until an agent has sent a Stop on its line.
 fn stops(quick: bool, failed: &mut Failed) -> Figures {
     const LOADS: [(&str, &[&str]); 3] = [
         ("idle", &["stop.idle_", "bare.idle_"]),
@@ -255,7 +257,8 @@ fn lines(text: &str) -> Figures {
         .collect()
 }
 
-/// Measures our dynamics and those of others in turn, with the same arm and states. If `rounds` is 0, it only builds them.
+/// Measures our dynamics and those of other libraries in turn, with the same arm and states. If `rounds` is 0, only builds
+/// the programs.
 fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) -> Result<Figures> {
     for (header, package) in [
         ("/usr/include/eigen3/Eigen/Core", "libeigen3-dev"),
@@ -290,7 +293,7 @@ fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) 
     Ok(figures)
 }
 
-/// Prints the errors of each joint, with our control law and with the plain one.
+/// Prints the errors of each joint, with our control law and without its feed-forward.
 fn print_tracking(figures: &Figures) {
     let figure = |name: String| figures.get(&name).map_or("?".into(), |value| format!("{value:.2}"));
     println!("\ntracking, mrad (RMS, largest) | ours | straight lines, PID and gravity only");

@@ -17,7 +17,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns cargo for the program that makes the book, a separate workspace, so that a build of the project does not build mdbook.
+/// Returns a cargo command for the program that makes the book. The program is a separate workspace, so that a build of the
+/// project does not build mdbook.
 fn tool(words: &[&str]) -> Command {
     let mut cargo = cargo(words);
     cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));
@@ -43,8 +44,8 @@ pub fn made() -> Result<()> {
     make(&scratch.path().join("book"))
 }
 
-/// Checks that every page of docs/ is in the book, and that every link to a section leads to a heading of the page. Checks that tests run
-/// every block of commands, or that the block tells why not.
+/// Checks that every page of docs/ is in the book, and that every link to a section leads to a heading of the page. Also checks that
+/// tests run every block of commands, or that the block gives the reason why they do not.
 pub fn check() -> Result<()> {
     let docs = root().join("docs");
     let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).context("docs/SUMMARY.md")?;
@@ -103,7 +104,7 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Returns the names of the headings of a page, as links contain them.
+/// Returns the names of the headings of a page, in the form that links use.
 fn anchors(page: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for heading in prose(page).filter(|line| line.starts_with('#')) {

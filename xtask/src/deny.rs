@@ -1,4 +1,4 @@
-//! deny.toml, the file of cargo-deny: licences, sources and bans, compared with cargo's resolution.
+//! Compares deny.toml, the file of cargo-deny with rules for licences, sources and bans, with cargo's resolution.
 //!
 //! cargo-deny itself takes minutes to install, too long for every test run; `cargo xtask dist` runs it. The checks here read the same file.
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,9 +14,9 @@ use crate::shell::{self, root, run};
 /// Version of cargo-deny that reads deny.toml for a release.
 const CARGO_DENY: &str = "0.20.2";
 
-/// Workspaces with shipped parts.
+/// Workspaces with parts that a release contains.
 const SHIPPED: [&str; 2] = ["Cargo.toml", "firmware/Cargo.toml"];
-/// All lock files: sources are checked in each.
+/// All lock files. The sources in each of them are checked.
 const LOCKS: [&str; 5] =
     ["Cargo.lock", "firmware/Cargo.lock", "emulator/Cargo.lock", "fuzz/Cargo.lock", "book/Cargo.lock"];
 
@@ -63,7 +63,7 @@ pub fn check() -> Result<()> {
     Ok(())
 }
 
-/// Runs cargo-deny itself; installs it below the build folder if it is missing.
+/// Runs cargo-deny itself. If it is missing, installs it below the build folder.
 pub fn with_cargo_deny() -> Result<()> {
     let folder = shell::target().join("tools");
     let program = folder.join("bin/cargo-deny");
@@ -120,7 +120,7 @@ fn licence(rules: &Table, found: &Crate) -> Result<()> {
     Ok(())
 }
 
-/// Returns the reason why a crate may not be used at all.
+/// Returns the reason why a crate is banned; `None` if it is not.
 fn banned(rules: &Table, name: &str) -> Option<String> {
     let bans = rules.get("bans")?.get("deny")?.as_array()?;
     let ban = bans.iter().find(|ban| ban.get("crate").and_then(Value::as_str) == Some(name))?;

@@ -1,5 +1,4 @@
-//! Checks that every direct dependency of a manifest, or of a list of Python or Node.js, has its line in docs/dependencies.md, and that
-//! every line has its dependency.
+//! Checks that docs/dependencies.md lists exactly the direct dependencies in the manifests and in the lists for Python and Node.js.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};
@@ -7,7 +6,7 @@ use serde_json::Value;
 
 use crate::shell::{files, root};
 
-/// Returns the names under the dependency tables of a manifest.
+/// Returns the names in the dependency tables of a manifest.
 fn direct(manifest: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     let mut inside = false;

@@ -53,7 +53,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes all files of a release into a folder without other files. Returns the omitted parts with the reasons.
+/// Makes all files of a release in an empty folder. Returns the omitted parts with the reasons.
 fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     let mut left_out = Vec::new();
     empty(out)?;
@@ -129,8 +129,8 @@ fn version() -> Result<String> {
     Ok(version.context("the workspace has no version")?.to_owned())
 }
 
-/// Creates the folder, or removes the files of an earlier release, which its list names. With any other file in it, the folder is not
-/// changed and an error is returned.
+/// Creates the folder, or removes the files of an earlier release that are in its list. If the folder contains any other file, it is
+/// not changed and an error is returned.
 fn empty(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let list = std::fs::read_to_string(out.join(tree::SUMS)).unwrap_or_default();
@@ -149,7 +149,8 @@ fn empty(out: &Path) -> Result<()> {
     earlier.iter().try_for_each(|path| std::fs::remove_file(path).with_context(|| path.display().to_string()))
 }
 
-/// Makes the packages and archives with the existing programs in `folder` twice, from one commit and the same images of the boards.
+/// Makes the packages and archives twice from the existing programs in `folder`, with the same commit and the same images of the
+/// boards.
 fn assembled_twice(folder: &Path) -> Result<[Vec<Made>; 2]> {
     let (time, own) = (programs::time()?, programs::own()?);
     let mut images = images::build()?;

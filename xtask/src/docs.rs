@@ -1,4 +1,4 @@
-//! `cargo xtask docs`: writes the generated parts of docs/ again.
+//! `cargo xtask docs`: updates the generated parts of docs/.
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -22,7 +22,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         cargo(&["test", "--release", "--package", "jtc-core", "--test", "suite", "reactions::"]);
     run(reactions.env("UPDATE_DOCS", "1"))?;
     println!("wrote the table of reactions of docs/safety.md");
-    // In sequence: both write the same page.
+    // These run one after the other, because both write the same page.
     let drawn =
         ["test", "--release", "--package", "jtc-core", "--lib", "--", "the_diagram_is", "--test-threads=1"];
     let mut drawn = cargo(&drawn);

@@ -14,11 +14,11 @@ use crate::tally::{Counts, Outcome};
 /// Target for which the board's code is compiled.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The boards, by the feature that selects each.
+/// The boards, by the names of the features that select them.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Functions that run at the priority of the tick. The second one wakes the links, and is the only function that the tick calls through a
-/// register.
+/// Functions that run at the priority of the tick. The second function wakes the links. It is the only function that the tick calls
+/// through a register.
 const ROOTS: [&str; 2] = ["TIM7", "embassy_executor::raw::waker::wake"];
 
 /// Memories of the chip: name, first address, bytes.
@@ -35,7 +35,7 @@ const REGIONS: [(&str, u64, u64); 8] = [
 
 /// Adds the compiler's target for the board if rustup manages the toolchain.
 pub fn add_target() -> Result<()> {
-    // A toolchain that rustup does not manage has its own targets.
+    // If rustup does not manage the toolchain, it has its own targets.
     if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
         && !installed.lines().any(|target| target == TARGET)
     {
@@ -75,11 +75,11 @@ pub fn build(board: &str) -> Result<PathBuf> {
     Ok(elf)
 }
 
-/// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest of J-01.
+/// Rate of both lines in the program that [`build_fast`] builds, Bd. It is the highest rate of J-01.
 const FAST: &str = "15000000";
 
-/// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. The build has its
-/// own directory, so that neither build makes the other one stale.
+/// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. This build has
+/// its own directory, so that the two builds do not invalidate each other.
 pub fn build_fast() -> Result<PathBuf> {
     let target = directory().join("fast");
     run(cargo_for(BOARDS[0], "build")?.env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;
@@ -147,7 +147,7 @@ pub fn lints() -> Result<()> {
     Ok(())
 }
 
-/// Tests the part that needs no hardware, on this machine.
+/// Tests, on this machine, the part of the firmware that needs no hardware.
 pub fn tests() -> Result<Outcome> {
     let host = shell::read(shell::command("rustc").args(["--print", "host-tuple"]))?;
     let mut cargo = shell::cargo(&["test", "--lib", "--target", host.trim()]);

@@ -1,4 +1,4 @@
-//! The command for all chores of the workspace: `cargo xtask help`.
+//! The command for all tasks of the workspace. `cargo xtask help` lists them.
 #![forbid(unsafe_code)]
 
 mod ahead;

@@ -1,8 +1,8 @@
-//! Checks that the control tick can reach no panic, by following the calls of the linked program.
+//! Checks that the control tick cannot reach a panic, by following the calls of the linked program.
 //!
-//! The check reads the ELF and not the source, because only compiled code counts. From each root it follows every branch that leaves the
-//! function. If reached code forms the address of a function, that function counts as called. Calls through a register are listed, because
-//! their targets are not known here.
+//! The check reads the ELF and not the source, because only the compiled code runs on the board. From each root it follows every branch
+//! that leaves the function. If reached code forms the address of a function, the check assumes that it calls this function. Calls through
+//! a register are listed, because their targets are not known here.
 
 mod thumb;
 
@@ -36,7 +36,8 @@ pub struct Report {
     pub instructions: usize,
     /// Calls and jumps through a register: function and address.
     pub indirect: Vec<String>,
-    /// A path to each place that panics or traps: names of functions, each with the address of the branch that leaves it, then the place.
+    /// A path to each place that panics or traps. A path lists the names of functions, each with the address of the branch that leaves
+    /// it, and then the place.
     pub paths: Vec<String>,
 }
 
@@ -109,7 +110,7 @@ fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32)
     }
 }
 
-/// Target of a place in a function.
+/// Target of an instruction that leaves a function.
 enum End {
     Function(u32),
     /// An address outside all functions.
@@ -171,7 +172,7 @@ impl<'a> Program<'a> {
             }
         }
         ensure!(!program.functions.is_empty(), "the program has no symbols of functions");
-        // Functions in assembly have no size: they extend to the next function.
+        // Functions in assembly have no size. They are assumed to extend to the next function.
         let starts: Vec<u32> = program.functions.keys().copied().collect();
         for (start, next) in starts.iter().zip(starts.iter().skip(1).map(Some).chain([None])) {
             let Some(function) = program.functions.get_mut(start) else { continue };
@@ -202,7 +203,7 @@ impl<'a> Program<'a> {
         bytes.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]))
     }
 
-    /// Returns the pieces of a function; true for data.
+    /// Returns the pieces of a function. The flag is true for data.
     fn pieces(&self, function: &Range<u32>) -> Vec<(Range<u32>, bool)> {
         let mut is_data = self.data.range(..=function.start).next_back().is_some_and(|(_, data)| *data);
         let mut at = function.start;
@@ -215,7 +216,7 @@ impl<'a> Program<'a> {
         pieces
     }
 
-    /// Calls `found` for everything in the function that leaves it.
+    /// Calls `found` for each instruction, or address, through which the function may be left.
     fn scan(&self, start: u32, function: &Function, count: &mut usize, mut found: impl FnMut(u32, End)) {
         let whole = start..function.end;
         let mut halves = [None; 16];
@@ -226,7 +227,7 @@ impl<'a> Program<'a> {
                 let Some(first) = self.halfword(function.section, address) else { break };
                 let second = self.halfword(function.section, address + 2).unwrap_or(0);
                 if is_data {
-                    // Literals: the addresses of functions have the lowest bit set.
+                    // In literals, the addresses of functions have the lowest bit set.
                     let word = u32::from(second) << 16 | u32::from(first);
                     if address.is_multiple_of(4) && word & 1 == 1 && self.functions.contains_key(&(word & !1))
                     {
@@ -244,7 +245,7 @@ impl<'a> Program<'a> {
                         call = true;
                         found(address, self.function_at(to).map_or(End::Nowhere(to), End::Function));
                     }
-                    // A jump to a constant address, which the linker uses for long distances.
+                    // The linker uses such a jump to a constant address for long distances.
                     Flow::Indirect(register) => match halves[usize::from(register)] {
                         Some((at, to)) if at + 4 == address => {
                             found(address, self.function_at(to & !1).map_or(End::Nowhere(to), End::Function));

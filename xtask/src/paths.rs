@@ -1,4 +1,4 @@
-//! Folders of this computer whose paths compilers write into their output, and the names that replace them.
+//! Folders of this computer whose paths compilers would write into their output, and the names that replace the paths.
 use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
@@ -12,7 +12,7 @@ fn cargo_home() -> PathBuf {
         .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))
 }
 
-/// Returns the folders with the name for each. Later entries have priority.
+/// Returns the folders, each with its replacement name. Later entries have priority.
 pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut folders = vec![
         (shell::root().to_owned(), "openjtc"),
@@ -26,7 +26,7 @@ pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
             path.display()
         );
     }
-    // A checkout that is reached through a link has two names.
+    // A checkout that is reached through a link has two paths.
     for at in 0..folders.len() {
         let (path, name) = folders[at].clone();
         if let Ok(real) = path.canonicalize()

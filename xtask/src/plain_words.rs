@@ -1,6 +1,7 @@
 //! `cargo xtask plain-words`: counts marks of sentences that are hard to read in comments, messages, help and documents.
 //!
-//! The counts of each part of the project are kept, and may only fall. CONTRIBUTING.md tells how to write instead.
+//! The counts of each part of the project are stored and may only decrease. CONTRIBUTING.md explains how to write
+//! instead.
 mod marks;
 mod texts;
 
@@ -14,11 +15,12 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, files, root};
 
-/// File with the kept counts.
+/// File with the stored counts.
 const KEPT: &str = "xtask/plain-words.txt";
 /// Files with prose.
 const EXTENSIONS: [&str; 7] = ["rs", "py", "pyi", "md", "toml", "ts", "svelte"];
-/// Excluded files: a record of the past, and files that another project or a command has written.
+/// Excluded files: the changelog, which is a record of the past, and files that another project or a command has
+/// written.
 const EXCLUDED: [&str; 3] = ["CHANGELOG.md", "Cargo.toml", "api-types.ts"];
 
 /// Mark in a file.
@@ -58,7 +60,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Fails if a part has more marks than it had.
+/// Returns an error if a part has more marks than its stored count.
 pub fn check() -> Result<()> {
     compare(&counts(&places()?), &kept()?)
 }
@@ -124,7 +126,7 @@ fn places() -> Result<Vec<Place>> {
     Ok(places)
 }
 
-/// Returns the name of the crate; for other files the folder, and `pages` for files at the root.
+/// Returns the name of the crate. For other files, returns the name of the folder, or `pages` for files at the root.
 fn part(path: &Path) -> String {
     let mut folders = path.iter().map(|folder| folder.to_string_lossy());
     let first = folders.next().unwrap_or_default();

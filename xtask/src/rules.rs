@@ -1,11 +1,11 @@
-//! Rule coverage: every rule of the protocol pages is named by a test in the Rust sources.
+//! Rule coverage: checks that a test in the Rust sources mentions every rule of the protocol pages.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};
 
 use crate::shell::{files, root};
 
-/// Protocol pages, with the letter of their rules and the least number of rules of each.
+/// Protocol pages, each with the letter of its rules and the smallest expected number of rules.
 const PAGES: [(&str, char, usize); 2] =
     [("docs/protocol-jtc.md", 'J', 30), ("docs/protocol-ucom.md", 'D', 30)];
 
@@ -15,7 +15,7 @@ fn defined(page: &str, letter: char) -> BTreeSet<u32> {
     page.split(&start).skip(1).filter_map(|rest| rest.split_once("**")?.0.parse().ok()).collect()
 }
 
-/// Returns the numbers of the rules that a source names: `j13_…`, `J-13`, `j_13`, in either case.
+/// Returns the numbers of the rules that a source mentions as `j13_…`, `J-13` or `j_13`, in upper or lower case.
 fn named(source: &str, letter: char) -> BTreeSet<u32> {
     let mut rules = BTreeSet::new();
     let bytes = source.as_bytes();
@@ -35,7 +35,8 @@ fn named(source: &str, letter: char) -> BTreeSet<u32> {
     rules
 }
 
-/// Returns the part of a source that contains tests: a whole file in tests/, or the part from `#[cfg(test)]` on.
+/// Returns the part of a source that contains tests: the whole file if it is in tests/, otherwise the part from
+/// `#[cfg(test)]` on.
 fn test_part<'a>(path: &std::path::Path, source: &'a str) -> &'a str {
     let is_test_file = path.components().any(|c| c.as_os_str() == "tests")
         || path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with("tests"));

@@ -1,4 +1,5 @@
-//! `cargo xtask size`: static memory of the controller with its trajectory, compared with the limit, and that of the boards by region.
+//! `cargo xtask size`: compares the static memory of the controller with its trajectory with the limit, and prints the memory of each
+//! board by region.
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
@@ -6,11 +7,11 @@ use anyhow::{Context, Result, ensure};
 use crate::shell;
 use crate::{firmware, suite};
 
-/// Largest size of the controller with its trajectory, bytes: 432 000 for the points, and 40 KiB of the board's fast memory for the rest,
-/// including the stored arm. The receive buffers of 60 000 bytes come in addition.
+/// Largest size of the controller with its trajectory, bytes: 432 000 for the points, and 40 KiB of the board's fast memory for the
+/// remaining data, including the stored arm. The receive buffers of 60 000 bytes are not included.
 pub const LIMIT: u64 = 432_000 + 40 * 1024;
 
-/// Returns the bytes of the controller with memory for 12 000 points, as the compiler arranges it.
+/// Returns the size that the controller with memory for 12 000 points has in the compiled program, bytes.
 pub fn controller_bytes() -> Result<u64> {
     let text = shell::read(&mut shell::command(suite::programs()?.join("examples/tick")))?;
     let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));

@@ -1,4 +1,5 @@
-//! `cargo xtask soak`: hours of virtual time with random commands and faults; the invariants are checked each tick.
+//! `cargo xtask soak`: runs hours of virtual time with random commands and faults, and checks the invariants in each
+//! tick.
 use std::process::ExitCode;
 
 use anyhow::{Result, ensure};

@@ -1,4 +1,4 @@
-//! Steps of a run: a heading for each, the collected failures, and a closing line.
+//! Runs the steps of a command. Prints a heading for each step, collects the failures, and prints a closing line.
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -12,7 +12,7 @@ pub enum Outcome {
     Passed,
     /// Counts of several tests, and the output of the failed ones.
     Counted(Counts, String),
-    /// The step was not run, for this reason.
+    /// The step was not run. Contains the reason.
     Skipped(String),
 }
 
@@ -25,7 +25,7 @@ pub struct Counts {
     pub failed: u64,
     /// Skipped tests.
     pub skipped: u64,
-    /// Test programs that failed at first and passed when they ran again, alone.
+    /// Test programs that failed at first, and passed when they ran again alone.
     pub passed_alone: u64,
 }
 
@@ -39,7 +39,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Creates a tally that runs the steps with `only` in their title; `None`: all steps.
+    /// Creates a tally that runs only the steps with `only` in their title. `None`: runs all steps.
     pub fn new(only: Option<String>) -> Self {
         Self { only, ..Self::default() }
     }
@@ -49,7 +49,7 @@ impl Tally {
         self.only.as_ref().is_none_or(|only| title.contains(only))
     }
 
-    /// Runs a step under its heading; an error is reported and counted, and the next step still runs.
+    /// Runs a step under its heading. An error is reported and counted. The next step still runs.
     pub fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
         if !self.wants(title) {
             return;
@@ -96,7 +96,7 @@ impl Tally {
         }
     }
 
-    /// Counts programs that failed at first and passed when they ran again, alone.
+    /// Counts programs that failed at first, and passed when they ran again alone.
     pub fn passed_alone(&mut self, programs: u64) {
         self.counts.passed_alone += programs;
     }
@@ -119,7 +119,8 @@ impl Tally {
     }
 }
 
-/// Returns the output from the first line that begins with `heading`; there test runners describe the failures.
+/// Returns the output from the first line that begins with `heading`. After this line, test runners describe the
+/// failures.
 pub fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
     let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
     let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();

@@ -1,5 +1,5 @@
-//! Checks that every file with tests belongs to a program: the tests of a crate are one program, and cargo does not find other
-//! files by itself.
+//! Checks that every file with tests belongs to a test program. The tests of a crate are one program, and cargo does not find
+//! other files by itself.
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, root};
 
-/// Returns the roots of a crate's test programs, if its manifest names them.
+/// Returns the root files of a crate's test programs, if its manifest lists them.
 fn programs(package: &Path) -> Result<Option<Vec<PathBuf>>> {
     let manifest: toml::Table = read_to_string(package.join("Cargo.toml"))?.parse()?;
     if manifest["package"].get("autotests").and_then(toml::Value::as_bool) != Some(false) {

@@ -11,7 +11,7 @@ fn bytes(line: &str) -> Vec<u8> {
         .collect()
 }
 
-/// Returns the CRC-16/XMODEM, calculated here so that the page is not checked against the code that it describes.
+/// Returns the CRC-16/XMODEM. It is calculated here, so that the page is not checked with the code that it describes.
 fn crc(bytes: &[u8]) -> u16 {
     let mut crc = 0u16;
     for byte in bytes {
@@ -23,7 +23,7 @@ fn crc(bytes: &[u8]) -> u16 {
     crc
 }
 
-/// Returns an error that names the first wrong line.
+/// Returns an error with the first wrong line.
 pub fn check() -> Result<()> {
     let page =
         std::fs::read_to_string(root().join("docs/protocol-jtc.md")).context("docs/protocol-jtc.md")?;

@@ -1,7 +1,7 @@
-// Requests to an agent, and its refusals. Independent of the device of the agent: shared by the pages of an arm and of
-// a chain.
+// Requests to an agent, and its refusals. The code does not depend on the agent's device. The pages of an arm and of a
+// chain share it.
 
-/** Reason of a refusal, as agents answer. */
+/** Reason of a refusal, in the format of an agent's answer. */
 export interface Problem {
   code: string;
   message: string;
@@ -25,17 +25,17 @@ export class ApiError extends Error {
     this.problem = problem;
   }
 
-  /** The agent does not know this path: it is older than the page. */
+  /** True if the agent does not know this path, because it is older than the page. */
   get isMissingPath(): boolean {
     return this.status === 405 || (this.status === 404 && this.problem.code === 'no-such-path');
   }
 
-  /** The agent refused this token, or a request without one. */
+  /** True if the agent refused the token, or a request without a token. */
   get wantsToken(): boolean {
     return this.status === 401 || this.status === 403;
   }
 
-  /** No answer arrived. */
+  /** True if no answer arrived. */
   get isNoConnection(): boolean {
     return this.status === 0;
   }
@@ -48,26 +48,27 @@ export interface Ask {
   body?: unknown;
   /** Longest time for the answer, ms. */
   within?: number;
-  /** Outlives the page: for requests sent while it closes. */
+  /** The request continues after the page has closed. */
   keepalive?: boolean;
-  /** Waits for no other request: Stop, Pause, and held keys. */
+  /** The request is sent without waiting for others: Stop, Pause, and held keys. */
   ahead?: boolean;
-  /** Without the token. */
+  /** The request is sent without the token. */
   bare?: boolean;
-  /** Moves nothing: a Stop does not drop it from the queue. */
+  /** The request moves nothing, so a Stop does not drop it from the queue. */
   ends?: boolean;
-  /** Cancelled if a Stop needs its connection. */
+  /** The request is cancelled if a Stop needs its connection. */
   yields?: boolean;
 }
 
-/** Most open requests, in addition to those sent ahead: a browser opens six connections to one agent, and silently queues the next. */
+/** Largest number of open requests, in addition to those sent ahead. A browser opens six connections to one agent, and silently queues
+ * further requests. */
 export const OPEN_MAX = 3;
-/** Longest wait of a command for its turn, ms: after that the command is dropped, because the user looks at a changed page by then. */
+/** Longest wait of a command for its turn, ms. After that the command is dropped, because the page may have changed by then. */
 export const WAIT_MAX_MS = 2000;
 
 type Fetch = (input: string, init: RequestInit) => Promise<Response>;
 
-/** The path with its query; parts that are undefined are left out. */
+/** Returns the path with its query. Undefined parts are left out. */
 export function address(path: string, query: Query = {}): string {
   const parts = Object.entries(query).filter((entry): entry is [string, string | number] => entry[1] !== undefined);
   if (parts.length === 0) return path;
@@ -82,7 +83,7 @@ export function problemOf(status: number, text: string): Problem {
       return { ...(value as Problem), next: (value as Problem).next ?? '' };
     }
   } catch {
-    // Not JSON: answered by a proxy, or by a router without this path.
+    // The answer is not JSON. It comes from a proxy, or from a router without this path.
   }
   if (status === 404) {
     return {
@@ -105,7 +106,7 @@ interface Waiting {
   drop(why: string): void;
 }
 
-/** No answer arrived, or only a part of it. */
+/** Returns the error for an answer that did not arrive, or only in part. */
 function unreached(error: unknown): ApiError {
   const late = error instanceof DOMException && error.name === 'TimeoutError';
   return new ApiError(0, {

@@ -1,4 +1,4 @@
-// The stream of an agent: one WebSocket that is reopened after each loss, and continues at the last event.
+// The stream of an agent. It is a WebSocket that is reopened after each loss and continues after the last event.
 
 /** Common part of every agent's status. */
 export interface BaseStatus {
@@ -18,7 +18,7 @@ export interface EventsMessage<E extends Entry = Entry> {
   missed: boolean;
 }
 
-/** The part of a WebSocket that is needed. */
+/** The part of a WebSocket that this module needs. */
 export interface Socket {
   onopen: ((event: never) => void) | null;
   onmessage: ((event: { data: unknown }) => void) | null;
@@ -29,7 +29,7 @@ export interface Socket {
 
 export interface Surroundings {
   open(path: string, protocols: string[]): Socket;
-  /** ms, from any start. */
+  /** Time in ms, from any start. */
   now(): number;
   later(act: () => void, ms: number): unknown;
   never(handle: unknown): void;
@@ -37,7 +37,8 @@ export interface Surroundings {
 
 export type Phase = 'connecting' | 'open' | 'waiting' | 'closed';
 
-/** Time without a message after which the connection counts as lost, ms: the agent sends at least one each half second. */
+/** Time without a message after which the connection is considered lost, ms. The agent sends at least one message every
+ * half second. */
 export const SILENT_MS = 1400;
 /** Longest time to open a socket, ms. */
 const OPENING_MS = 4000;
@@ -49,7 +50,7 @@ export interface Handlers<S extends BaseStatus> {
   /** Handles every other message, by its kind. */
   other?(message: { kind: string }): void;
   phase(phase: Phase): void;
-  /** A socket did not open: the reason must be requested separately, because a browser does not report it. */
+  /** Called if a socket did not open. The reason must be requested separately, because a browser does not report it. */
   refused(): void;
 }
 
@@ -75,7 +76,7 @@ export class Connection<S extends BaseStatus> {
     return this.#phase;
   }
 
-  /** ms since the last message. */
+  /** Time since the last message, ms. */
   get silence(): number {
     return this.#around.now() - this.#heard;
   }
@@ -99,7 +100,8 @@ export class Connection<S extends BaseStatus> {
     this.#enter('closed');
   }
 
-  /** Tries at once instead of waiting for the next attempt: the network is back, or the page is visible again. */
+  /** Tries at once instead of waiting for the next attempt. Called when the network is back, or the page is visible
+   * again. */
   hurry(): void {
     if (this.#phase !== 'waiting') return;
     this.#around.never(this.#timer);
@@ -107,7 +109,7 @@ export class Connection<S extends BaseStatus> {
     this.#open();
   }
 
-  /** Reopens the socket after a long silence: a lost network closes no socket. */
+  /** Reopens the socket after a long silence, because the loss of a network does not close the socket. */
   check(): void {
     if (this.#phase === 'open' && this.silence > 2 * SILENT_MS) this.#gone(true);
   }
@@ -164,7 +166,8 @@ export class Connection<S extends BaseStatus> {
     }
   }
 
-  /** Another agent restarts its event numbers: its events are requested from the beginning, and this message is dropped. */
+  /** Detects another agent, whose event numbers begin again. Its events are requested from the beginning, and this message
+   * is dropped. */
   #know(agent: string): boolean {
     const other = this.#agent !== undefined && this.#agent !== agent;
     this.#agent = agent;

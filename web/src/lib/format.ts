@@ -1,4 +1,4 @@
-// Numbers with their units, in one format. An unknown value is a dash: never an old value.
+// Formats numbers with their units. An unknown value is shown as a dash, never as an old value.
 
 export const NONE = '–';
 export const DEGREES = 180 / Math.PI;
@@ -24,7 +24,7 @@ export function speedSign(unit: AngleUnit): string {
   return unit === 'deg' ? '°/s' : 'rad/s';
 }
 
-/** Converts to the displayed unit. */
+/** Converts an angle to the displayed unit. */
 export function fromRad(rad: number, unit: AngleUnit): number {
   return unit === 'deg' ? rad * DEGREES : rad;
 }
@@ -33,13 +33,13 @@ export function toRad(value: number, unit: AngleUnit): number {
   return unit === 'deg' ? value / DEGREES : value;
 }
 
-/** Parses a typed number: a decimal comma and a true minus are accepted. NaN if invalid. */
+/** Parses a typed number. A decimal comma and a true minus are accepted. NaN: the text is invalid. */
 export function parse(text: string): number {
   const plain = text.trim().replace('\u2212', '-').replace(',', '.');
   return plain === '' ? NaN : Number(plain);
 }
 
-/** 4.2 s, 1:05 min, 2:03:10 h. */
+/** Formats a duration, such as 4.2 s, 1:05 min or 2:03:10 h. */
 export function duration(s: number | null | undefined): string {
   if (s === null || s === undefined || !Number.isFinite(s)) return NONE;
   if (s < 60) return `${s.toFixed(s < 10 ? 1 : 0)} s`;
@@ -49,7 +49,7 @@ export function duration(s: number | null | undefined): string {
   return h > 0 ? `${h}:${two(m)}:${two(rest)} h` : `${m}:${two(rest)} min`;
 }
 
-/** 14:03:27, in the browser's time zone. */
+/** Formats a time in the browser's time zone, such as 14:03:27. */
 export function clock(unix_s: number): string {
   return new Date(unix_s * 1000).toLocaleTimeString('en-GB', { hour12: false });
 }
@@ -59,7 +59,7 @@ export function bytes(n: number): string {
   return n < 1e6 ? `${(n / 1000).toFixed(1)} kB` : `${(n / 1e6).toFixed(1)} MB`;
 }
 
-/** "one point", "2 points". */
+/** Returns a number with its noun, such as "one point" or "2 points". */
 export function count(n: number, one: string, many = `${one}s`): string {
   return n === 1 ? `one ${one}` : `${n} ${many}`;
 }

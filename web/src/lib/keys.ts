@@ -1,6 +1,6 @@
 // The space bar stops everywhere except in text fields.
 
-/** The properties of an element that are needed. */
+/** The properties of an element that this module needs. */
 export interface Focused {
   tagName: string;
   type?: string;
@@ -9,7 +9,8 @@ export interface Focused {
 
 const TYPED = new Set(['text', 'search', 'url', 'tel', 'email', 'password', 'date', 'time', '']);
 
-/** Returns `true` if keys enter text here. Buttons, sliders and switches take no text: there the space bar stops, and Enter presses. */
+/** Returns `true` if keys enter text in this element. Buttons, sliders and switches do not take text. There the space bar stops, and
+ * Enter presses the button. */
 export function takesText(element: Focused | null | undefined): boolean {
   if (!element) return false;
   if (element.isContentEditable) return true;
@@ -18,7 +19,7 @@ export function takesText(element: Focused | null | undefined): boolean {
   return tag === 'INPUT' && TYPED.has((element.type ?? '').toLowerCase());
 }
 
-/** "Tablet", "Phone", "Computer": name of the lease holder for other clients. */
+/** Returns "Tablet", "Phone" or "Computer", which other clients see as the name of the lease holder. */
 export function deviceKind(agent: string, touchPoints: number, width: number): string {
   if (/iPhone|Android.*Mobile/i.test(agent)) return 'Phone';
   if (/iPad|Android|Tablet/i.test(agent) || (/Macintosh/.test(agent) && touchPoints > 1)) return 'Tablet';

@@ -1,33 +1,34 @@
-// Delay of messages: a network that delays all messages by the same time loses none, but the displayed state is old.
+// Delay of messages. If a network delays all messages by the same time, none is lost, but the displayed state is old.
 
 /** Length of a span, ms; times are kept for `SPANS` spans, after which two clocks may have drifted apart. */
 const SPAN_MS = 60_000;
 const SPANS = 10;
-/** Least number of probes for a lower bound of the difference: a single probe may have been delayed. */
+/** Smallest number of probes for a lower bound of the difference, because a single probe may have been delayed. */
 const PROBES = 3;
-/** Time for which a probe counts, ms. */
+/** Time for which a probe is used, ms. */
 const PROBED_MS = 120_000;
 
 /**
- * Compares the clock of an agent, from the times in its messages, with this browser's; both count ms from any start.
- * The fastest message bounds the difference from above. An answer was created after its request: that bounds the
- * difference from below, and shows a delay of all messages. If the two bounds contradict each other, a clock has stood
- * still, and all earlier bounds are dropped.
+ * Compares the clock of an agent, from the times in its messages, with this browser's clock. Both count ms from any
+ * start. The fastest message gives an upper bound of the difference. An answer was created after its request, which
+ * gives a lower bound and shows a delay of all messages. If the two bounds contradict each other, one of the clocks was
+ * suspended, and all earlier bounds are dropped.
  */
 export class Lateness {
-  /** Least difference in each span that had messages, the newest last. */
+  /** Smallest difference in each span that had messages. The newest span is the last one. */
   #spans: { span: number; least: number }[] = [];
   /** Lower bounds of the difference, and the time of each. */
   #floors: { at: number; floor: number }[] = [];
 
-  /** A request sent at `sent` was answered, at `made` by the agent's clock. */
+  /** Takes the answer to a request that was sent at `sent`. `made` is the time of the answer by the agent's clock. */
   probe(sent: number, made: number): void {
     const floor = sent - made;
     if (this.#spans.length > 0 && floor > this.#least() + 1) this.#spans = [];
     this.#floors = [...this.#floors.filter(({ at }) => at > sent - PROBED_MS), { at: sent, floor }];
   }
 
-  /** Returns the largest delay, ms, of a message created at `made` and received at `now`; without probes, relative to the fastest. */
+  /** Returns the largest possible delay, ms, of a message that was created at `made` and received at `now`. Without probes the delay
+   * is relative to the fastest message. */
   take(made: number, now: number): number {
     const span = Math.floor(now / SPAN_MS);
     const difference = now - made;
@@ -39,7 +40,7 @@ export class Lateness {
     return difference - floor;
   }
 
-  /** Returns the agent's clock at `now`, or slightly less: by the delay of the fastest message. */
+  /** Returns the agent's clock at `now`. The result may be too low by the delay of the fastest message. */
   agentTime(now: number): number | undefined {
     return this.#spans.length === 0 ? undefined : Math.floor(now - this.#least());
   }

@@ -1,5 +1,5 @@
-// The lease: one client commands at a time. Taken by the first command, renewed while the page is in use, released by
-// hand or with the page.
+// The lease: one client commands at a time. The first command takes the lease. The page renews it while it is in use,
+// and releases it when the user requests this or closes the page.
 import { type Api, ApiError } from './api.ts';
 
 export type Policy = 'continue' | 'pause' | 'stop';
@@ -35,14 +35,14 @@ export class Lease {
     this.#wishes = wishes;
   }
 
-  /** Takes the lease if this client does not have it. Two commands at once take it once. */
+  /** Takes the lease if this client does not have it. Two commands at the same time send only one request. */
   take(): Promise<void> {
     if (this.phase === 'held') return Promise.resolve();
     this.#taking ??= this.#post(false).finally(() => (this.#taking = undefined));
     return this.#taking;
   }
 
-  /** Asks the holder for the lease, and keeps the place in the queue by renewing. */
+  /** Asks the holder for the lease. Renewing keeps the place in the queue. */
   ask(): Promise<void> {
     return this.#post(true);
   }
@@ -65,14 +65,14 @@ export class Lease {
       if (lost) this.#enter('none', undefined);
       else this.#enter(state.held ? 'held' : 'waiting', key);
     } catch (error) {
-      // Without an answer the lease may still be ours; after a refusal it is not.
+      // Without an answer this client may still hold the lease. After a refusal it does not.
       if (!(error instanceof ApiError) || error.isNoConnection) return this.phase === 'held';
       if (this.key === key) this.#enter('none', undefined);
     }
     return this.phase === 'held';
   }
 
-  /** A command was refused: another client has the lease, or the agent no longer knows this key. */
+  /** Notes that a command was refused, because another client holds the lease or the agent no longer knows this key. */
   lost(): void {
     this.#enter('none', undefined);
   }

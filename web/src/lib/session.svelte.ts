@@ -1,4 +1,5 @@
-// Shared parts of every page: connection, token, lease, Stop, messages, events. Independent of the device of the agent.
+// Parts that all pages share: connection, token, lease, Stop, messages, events. They do not depend on the agent's
+// device.
 import { getContext, setContext } from 'svelte';
 
 import { Api, ApiError, type Ask, type Problem } from './api.ts';
@@ -21,11 +22,11 @@ export interface SessionStatus extends BaseStatus {
   role: 'viewer' | 'operator';
   last_halt?: number;
   lease?: LeaseView | null;
-  /** ms since the last status of the device. */
+  /** Time since the last status of the device, ms. */
   age_ms?: number | null;
   lost?: string | null;
   simulated?: boolean;
-  /** The agent's own time when this was created, ms. */
+  /** Time of the agent when this message was created, ms. */
   at_ms?: number | undefined;
 }
 
@@ -35,12 +36,12 @@ export interface Toast {
   title: string;
   text: string;
   problem?: Problem;
-  /** A button next to the message with a remedy. */
+  /** A button with a remedy, next to the message. */
   action?: { word: string; act: () => void };
 }
 
 export interface Line {
-  /** Number of this page: agents restart their numbers. */
+  /** Number that this page has given the line, because a new agent restarts its event numbers. */
   id: number;
   unix_s: number;
   text: string;
@@ -61,28 +62,29 @@ export interface StopState {
 export interface Driven {
   /** `arm` or `chain`. */
   thing: string;
-  /** Actions open to all viewers, a sentence. */
+  /** Sentence about the actions that every viewer can take. */
   works: string;
   /** Actions allowed with a viewer's token. */
   viewerMay: string;
-  /** Policies for a running motion after a disconnect of this browser, the usual first, with the words that end the sentence `left`. */
+  /** Policies for a running motion after a disconnect of this browser, the usual one first. Each has the words that end the sentence
+   * `left`. */
   policies: readonly [[Policy, string], ...[Policy, string][]];
   left: string;
 }
 
-/** Turns an event into a line. */
+/** Function that turns an event into a line. */
 export type Describe = (entry: Entry) => Omit<Line, 'id' | 'unix_s'> | undefined;
 
-/** Time after a touch of the page within which the lease is renewed, ms; a running job of this page renews it as well. */
+/** Time after a touch of the page during which the lease is renewed, ms. A running job of this page renews it as well. */
 const IN_USE_MS = 120_000;
 const LINES_MAX = 400;
-/** Period of requests for the agent's time until it is known, ms. */
+/** Interval of requests for the agent's time until the time is known, ms. */
 const PROBE_MS = 1000;
 /** Longest wait for the lease after which a command that may move the device is still sent, ms. */
 const LEASE_MAX_MS = 3000;
-/** Least time for which a failed Stop is shown, ms. */
+/** Shortest time for which a failed Stop is shown, ms. */
 const FAILED_MS = 20_000;
-/** Age above which status values count as outdated, ms. */
+/** Age above which status values are shown as outdated, ms. */
 const OLD_MS = 1500;
 
 function load(name: string): string | null {
@@ -95,7 +97,7 @@ function save(name: string, value: string): void {
 
 const KEY = Symbol('session');
 
-/** For the components of every page. */
+/** Makes the session available to the components of a page. */
 export function provideSession<S extends SessionStatus>(session: Session<S>): void {
   setContext(KEY, session);
 }
@@ -111,19 +113,19 @@ export class Session<S extends SessionStatus> {
   readonly tokens = new TokenStore(tab, device);
 
   phase = $state<Phase>('connecting');
-  /** Messages arrive. */
+  /** True if messages arrive. */
   live = $state(false);
-  /** The device answers the agent. */
+  /** True if the device answers the agent. */
   fresh = $state(false);
-  /** Delay of steady messages, s; 0 if a delay is not the reason for the unknown state. */
+  /** Delay of messages that arrive steadily, s. 0: a delay is not the reason for the unknown state. */
   late = $state(0);
-  /** Whole seconds without connection. */
+  /** Time without connection in whole seconds. */
   lostFor = $state(0);
   status = $state.raw<S | undefined>(undefined);
   role = $state<'viewer' | 'operator'>('viewer');
   hasToken = $state(false);
   denied = $state<Problem | undefined>(undefined);
-  /** Reason for which the token dialog is open. */
+  /** Reason why the token dialog is open. */
   asksToken = $state<string | undefined>(undefined);
   leasePhase = $state<LeasePhase>('none');
   wantedBy = $state<string | undefined>(undefined);
@@ -137,9 +139,10 @@ export class Session<S extends SessionStatus> {
 
   /** `true` while a job of this page runs. */
   isBusy: () => boolean = () => false;
-  /** `true` if no motion would continue without a lease: otherwise the lease expires, and its policy applies. */
+  /** `true` if no motion would continue without a lease. Then the lease is released when the page closes. Otherwise the
+   * lease expires, and its policy applies. */
   isAtRest: () => boolean = () => false;
-  /** Result of the last Stop, in the words of the page; empty: no message. */
+  /** Result of the last Stop, in the words of the page. Empty: no message. */
   saysOfStop: () => { text: string; failed: boolean } = () => ({ text: this.stopState.text, failed: this.stopState.phase === 'failed' });
   readonly #statusHandlers: ((status: S) => void)[] = [];
   readonly #eventHandlers: ((entry: Entry, isNew: boolean) => void)[] = [];
@@ -163,7 +166,7 @@ export class Session<S extends SessionStatus> {
   #agent = '';
   #lostAt = performance.now();
   #probing = false;
-  /** Token that was reported as not accepted; an empty string: no token was sent. */
+  /** Token whose refusal was reported. An empty string: no token was sent. */
   #refused: string | undefined;
 
   constructor(describe: Describe, of: Driven) {
@@ -215,17 +218,17 @@ export class Session<S extends SessionStatus> {
     this.#eventHandlers.push(handler);
   }
 
-  /** Called with messages of the stream other than status and events. */
+  /** Calls `handler` with messages of the stream other than status and events. */
   onMessage(handler: (message: { kind: string }) => void): void {
     this.#messageHandlers.push(handler);
   }
 
-  /** Called when the displayed state is outdated. */
+  /** Calls `handler` when the displayed state becomes outdated. */
   onLoss(handler: () => void): void {
     this.#lossHandlers.push(handler);
   }
 
-  /** Called when events were missed: the current job must be requested. */
+  /** Calls `handler` when events were missed, so that the current job must be requested. */
   onMissed(handler: () => void): void {
     this.#missedHandlers.push(handler);
   }
@@ -243,7 +246,7 @@ export class Session<S extends SessionStatus> {
       if (!document.hidden) this.connection.hurry();
     });
     addEventListener('pagehide', () => {
-      // A running job keeps its lease here: the lease then expires, and the chosen policy applies.
+      // If a job runs, the lease is not released. It then expires, and the chosen policy applies.
       if (this.lease.phase === 'waiting' || this.isAtRest()) void this.lease.release(true).catch(() => {});
     });
   }
@@ -279,20 +282,20 @@ export class Session<S extends SessionStatus> {
     this.connection.start();
   }
 
-  /** Number for a command that is requested now: a Stop since then prevents its motion. */
+  /** Number of the last Stop, for a command that is requested now. A later Stop prevents its motion. */
   get askedAfter(): number | undefined {
     const shown = this.status?.last_halt;
     return shown === undefined ? undefined : Math.max(shown, this.#halt);
   }
 
-  /** The agent's time, as accurate as this page knows it: the agent refuses a command with this time if it arrives late. */
+  /** The agent's time, as far as this page knows it. The agent refuses a command with this time if it arrives late. */
   get agentTime(): number | undefined {
     return this.#lateness.agentTime(performance.now());
   }
 
   /**
-   * Stops, ahead of all other requests; tries again if the network drops the request. The result is in `stopState`, for
-   * the last touch only: until the agent confirms the Stop, `stopState` shows that it is unconfirmed.
+   * Stops, ahead of all other requests. Tries again if the network drops the request. `stopState` has the result of the
+   * last touch only. Until the agent confirms the Stop, it shows that the Stop is unconfirmed.
    */
   async stop(): Promise<void> {
     const at = performance.now();
@@ -336,14 +339,14 @@ export class Session<S extends SessionStatus> {
     if (this.#stopping === 0) this.stopState = { phase: 'idle', at: 0, answered: 0, text: '' };
   }
 
-  /** Pauses the motion; needs no lease. */
+  /** Pauses the motion. No lease is needed. */
   async pause(): Promise<boolean> {
     return (await this.attempt('Pause', () => this.#halting('/api/pause', 3000), (sent) => {
       this.#halt = Math.max(this.#halt, sent?.halt ?? 0);
     })) !== undefined;
   }
 
-  /** Sends Stop or Pause; an expired token does not block clients that need none. */
+  /** Sends Stop or Pause. A client that needs no token is not blocked by an expired one. */
   async #halting(path: string, within: number): Promise<{ halt?: number } | undefined> {
     try {
       return await this.api.json<{ halt?: number }>('POST', path, { within, ahead: true });
@@ -357,8 +360,8 @@ export class Session<S extends SessionStatus> {
 
   /**
    * Sends a command, with the lease. A command that may move the device also carries the state that this page showed
-   * when the user requested it: now, or `after` for a later part of the same request. Returns the answer, or undefined
-   * after a refusal, whose reason is a message on the page.
+   * when the user requested it: the present state, or `after` for a later part of the same request. Returns the answer.
+   * After a refusal, returns undefined and shows the reason as a message.
    */
   async command<T = unknown>(
     what: string, method: string, path: string, ask: Ask & { moves?: boolean; after?: number | undefined; quiet?: boolean } = {},
@@ -375,7 +378,7 @@ export class Session<S extends SessionStatus> {
       try {
         return { value: await this.api.json<T>(method, path, query ? { ...ask, query } : ask) };
       } catch (error) {
-        // The lease expired while the page was idle: it is taken again, once.
+        // If the lease has expired while the page was idle, it is taken again, once.
         if (!had || !(error instanceof ApiError) || error.problem.code !== 'denied' || error.problem.next.includes('three seconds')) throw error;
         if (await this.lease.renew()) throw error;
         await this.lease.take();
@@ -436,7 +439,7 @@ export class Session<S extends SessionStatus> {
 
   #take(status: S): void {
     if (this.status?.agent !== status.agent) {
-      // Another agent restarts its Stop numbers, and its time.
+      // Another agent begins with new Stop numbers and a new time.
       this.#halt = 0;
       this.#lateness.forget();
     }
@@ -490,12 +493,12 @@ export class Session<S extends SessionStatus> {
     if (fresh !== this.fresh) {
       this.fresh = fresh;
       if (!fresh) {
-        // The user requested the waiting commands for a state that is outdated.
+        // The waiting commands are dropped, because the user requested them for a state that is now outdated.
         this.api.recall('The connection was lost');
         for (const handler of this.#lossHandlers) handler();
       }
     }
-    // The failure was shown long enough, and the device rests; a new job hides it at once.
+    // The failure was shown long enough, and the device is at rest. A new job hides the failure at once.
     if (this.stopState.phase === 'failed' && performance.now() - this.stopState.answered > FAILED_MS && this.isAtRest()) this.forgetStop();
     const lostFor = live ? 0 : Math.floor((performance.now() - this.#lostAt) / 1000);
     if (lostFor !== this.lostFor) this.lostFor = lostFor;
@@ -519,7 +522,7 @@ export class Session<S extends SessionStatus> {
   async #probeTime(): Promise<void> {
     if (!this.live || document.hidden) return;
     this.#probes += 1;
-    // Often until the time is known, then occasionally.
+    // The time is requested often until it is known, then occasionally.
     if (this.#probes > 4 && this.#probes % 5 !== 0) return;
     const [sent, agent] = [performance.now(), this.status?.agent];
     try {
@@ -530,7 +533,7 @@ export class Session<S extends SessionStatus> {
     }
   }
 
-  /** A browser does not report why a socket was refused; an ordinary request does. */
+  /** Finds out with an ordinary request why a socket was refused, because a browser does not report the reason. */
   async #probe(): Promise<void> {
     if (this.#probing) return;
     this.#probing = true;
@@ -539,7 +542,7 @@ export class Session<S extends SessionStatus> {
     } catch (error) {
       if (error instanceof ApiError && !error.isNoConnection) {
         this.denied = error.problem;
-        // Asked once for each token: a user who closes the dialog finds it next to the state.
+        // The dialog is opened only once for each token. A user who has closed it can open it again next to the state.
         const token = this.tokens.get() ?? '';
         if (error.wantsToken && this.#refused !== token) {
           this.#refused = token;

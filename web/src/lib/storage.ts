@@ -1,4 +1,4 @@
-// Storage of a browser. Without it (blocked or full) a page works, and forgets when it closes.
+// Storage of a browser. If it is blocked or full, a page still works, but its data is lost when it closes.
 
 export interface Store {
   getItem(name: string): string | null;
@@ -6,7 +6,7 @@ export interface Store {
   removeItem(name: string): void;
 }
 
-/** Returns the browser's storage with a fallback of this page, which is used if the browser's fails. */
+/** Returns the browser's storage. If it fails, a storage in the memory of this page is used. */
 export function guarded(open: () => Store): Store {
   const own = new Map<string, string>();
   const attempt = <T>(act: (store: Store) => T, instead: T): T => {
@@ -33,7 +33,7 @@ export function guarded(open: () => Store): Store {
   };
 }
 
-/** Kept on this device. */
+/** Storage that is kept on this device. */
 export const device = guarded(() => localStorage);
-/** Kept until the tab closes. */
+/** Storage that is kept until the tab closes. */
 export const tab = guarded(() => sessionStorage);

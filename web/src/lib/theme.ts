@@ -1,4 +1,4 @@
-// Light, dark, or as set in the system.
+// Theme of the page: light, dark, or the setting of the system.
 
 import { device } from './storage.ts';
 

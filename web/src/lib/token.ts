@@ -13,7 +13,7 @@ export function tokenIn(hash: string): { token: string | undefined; rest: string
   return { token: token || undefined, rest: rest ? `#${rest}` : '' };
 }
 
-/** Returns the text unchanged if it is not a valid encoding: no agent accepts it as a token then. */
+/** Decodes a token. A text that is not a valid encoding is returned unchanged. No agent accepts it as a token. */
 function decoded(text: string): string {
   try {
     return decodeURIComponent(text);
@@ -40,7 +40,7 @@ export class TokenStore {
     return this.#device.getItem(NAME) !== null;
   }
 
-  /** Sets the token for this tab only: the device keeps its own. */
+  /** Sets the token for this tab only. The stored token of the device stays unchanged. */
   use(token: string): void {
     this.#session.setItem(NAME, token);
   }

@@ -1,6 +1,6 @@
-// Tones of displayed states; the text has the same meaning.
+// Tones of displayed states. The text of a state always has the same meaning as its tone.
 
-/** A state's colour and shape; each shape is different, for users who do not see colours. */
+/** Colour and shape of a state. Each shape is different, for users who cannot distinguish colours. */
 export type Tone = 'off' | 'hold' | 'move' | 'pause' | 'teach' | 'error' | 'lost';
 
 /** Tone of an event. */

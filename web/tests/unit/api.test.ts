@@ -98,12 +98,12 @@ test('so many requests are open at once, a Stop beside them, and commands that w
 test('messages that all come late are as late as they are, beside the soonest', () => {
   const lateness = new Lateness();
   assert.equal(lateness.agentTime(0), undefined);
-  // The agent started 500 ms after this page. Its messages take 20 ms, then one takes 45 ms, then 3 s.
+  // The agent started 500 ms after this page. Its messages take 20 ms, then one takes 45 ms, and one takes 3 s.
   assert.equal(lateness.take(0, 520), 0);
   assert.equal(lateness.take(1000, 1545), 25);
   assert.equal(lateness.take(2000, 5500), 2980);
   assert.equal(lateness.agentTime(6520), 6000);
-  // A clock that is slower by 100 ppm does not count as lateness, because old messages are not used.
+  // A clock that is slower by 100 ppm is not reported as a delay, because old messages are not used.
   let [most, now] = [0, 10_000];
   const slow = new Lateness();
   for (let i = 0; i < 4000; i += 1, now += 5000) most = Math.max(most, slow.take(now * (1 - 1e-4), now));
@@ -120,7 +120,7 @@ test('a delay that all messages have is seen by what is asked, and clocks that s
     if (now % 5000 === 0) late.probe(now - 6000, now - 3000);
     if (now >= 21_000) assert.equal(found, 6000, `${now}`);
   }
-  // 10 ms in each direction, and a request that waited for a second.
+  // Messages take 10 ms in each direction, and one request waits for a second.
   const good = new Lateness();
   for (let now = 10_000; now < 60_000; now += 500) {
     const found = good.take(now - 10, now);

@@ -13,7 +13,7 @@ const joint = (n: number, xyz: [number, number, number], axis: [number, number, 
   joint: n, name: `joint_${n}`, origin_xyz_m: xyz, origin_rpy_rad: axis, position_min_rad: -2, position_max_rad: 3, velocity_max_rad_s: 1,
   acceleration_max_rad_s2: 1, torque_max_nm: 50,
 });
-/** A planar arm: two links of 1 m about z; the origins of the other joints coincide. */
+/** A planar arm: two links of 1 m that rotate about z. The origins of the other joints coincide. */
 const planar: ArmModel = {
   name: 'planar', gravity_m_s2: [0, 0, -9.81], links: [],
   joints: [joint(1, [0, 0, 0]), joint(2, [1, 0, 0]), joint(3, [1, 0, 0]), joint(4, [0, 0, 0]), joint(5, [0, 0, 0]), joint(6, [0, 0, 0])],

@@ -21,7 +21,7 @@ const model: ArmModel = {
   flange: { origin_xyz_m: [0, 0, 0.08], origin_rpy_rad: [0.2, 0, 0] },
 };
 
-/** Cells of a row with their meanings, by position, as the agent reads them. */
+/** Returns the cells of a row in their order, as the agent reads them. */
 function read(row: string, separator: string): (number | string)[] {
   const cells = separator === ' ' ? row.trim().split(/\s+/) : row.split(separator).map((cell) => cell.trim());
   return cells.map((cell) => (cell === '' || Number.isNaN(Number(cell)) ? cell : Number(cell)));
@@ -36,7 +36,7 @@ function near(found: readonly (number | string)[], wanted: readonly (number | st
   });
 }
 
-/** Headers, the switch for degrees, and the meanings of the cells of a row below. */
+/** Headers, the switch for degrees, and the expected cells of a row below the header. */
 const JOINT_HEADERS: [header: string, degrees: boolean, separator: string, cells: (number | string)[]][] = [
   ['q1,q2,q3,q4,q5,q6', false, ',', Q],
   ['q1,q2,q3,q4,q5,q6', true, ',', IN_DEGREES],
@@ -69,7 +69,7 @@ test('a row is in the columns, units and separator of the header', () => {
 test('a row of the flange is its pose, in the units of the header', () => {
   const frame = flange(model, Q);
   const xyz = [frame[3]!, frame[7]!, frame[11]!];
-  // Roll, pitch and yaw of the same frame, in the order of the file.
+  // The cells contain roll, pitch and yaw of the same frame, in the order of the file.
   const angles = (cells: (number | string)[], unit: number) => frameOf(xyz as Vector, cells.map((cell) => Number(cell) * unit) as Vector);
   const cases: [string, boolean, number][] = [
     ['x,y,z,roll,pitch,yaw', false, 1], ['x,y,z,roll,pitch,yaw', true, DEG], ['x_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg', false, DEG], ['X,Y,Z,Roll_RAD,Pitch_RAD,Yaw_RAD', true, 1],
@@ -97,7 +97,7 @@ test('a quaternion is that of the rotation, also half a turn about each axis', (
   }
 });
 
-/** Files to which no row can be added, each with a word of the reason. */
+/** Files to which no row can be added, each with a part of the reason. */
 const REFUSED: [text: string, reason: RegExp][] = [
   ['[{"q1_deg": 0}]', /JSON/],
   ['  {"waypoints": []}', /JSON/],

@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import { type ArmModel, flange, transform, type Vector } from '../../src/lib/arm/kinematics.ts';
 import { ArmScene, type Palette, type Renderer } from '../../src/lib/arm/scene.ts';
 
-/** A canvas without a browser: the controls of the view listen to it. */
+/** A canvas without a browser. The controls of the view listen to its events. */
 class Canvas extends EventTarget {
   style = {};
   ownerDocument = new EventTarget();
@@ -40,7 +40,7 @@ function scene(): ArmScene {
   return new ArmScene(new Canvas() as unknown as HTMLCanvasElement, LIGHT, renderer);
 }
 
-/** Ten poses of an arm at rest: the zero pose, with one joint moved, with all joints moved, near limits, tiny positions. */
+/** Ten poses of an arm at rest: zero pose, one joint moved, all joints moved, near limits, and tiny positions. */
 const POSES: number[][] = [
   [0, 0, 0, 0, 0, 0], [0.14, 0.5, -1, 0, 0.8, 0], [0, 0, -0.47, 0, 0, 0], [2.99, -2.99, 2.99, -2.99, 2.99, -2.99], [0, 0, 0, 0, 0, 1.57],
   [-1.2, 0.3, 0.3, 0.3, 0.3, 0.3], [1e-5, -1e-5, 1e-5, 0, 0, 0], [0.0001, 0.5, -1.0001, 0.0004, 0.8, 0.0001], [-0.7, -0.6, 1.1, 0.4, 0.7, 0.2], [3, 3, 3, 3, 3, 3],
@@ -104,7 +104,7 @@ test('a ghost that is hidden stays hidden, and a position that is not known stay
     const drawn = scene();
     drawn.setModel(model());
     drawn.setMeasured(POSES[1]);
-    // Commanded and measured are the same: no ghost.
+    // The commanded pose equals the measured pose, so the ghost is not shown.
     drawn.setGhost(POSES[1]);
     change(drawn);
     assert.equal(drawn.posed.ghostShown, false);

@@ -47,7 +47,7 @@ test('a held stop shows what the controller found, and what to do about that', (
   assert.equal(words.step, 'acknowledge');
   held.held_stop = { ...stop, kind: 'encoder-jump', remedy: 'support the arm, …, then recover' };
   assert.equal(stateWords(held, undefined, []).next, 'Support the arm, …, then recover.');
-  // An agent that does not know the cause.
+  // This agent does not know the cause.
   delete held.held_stop;
   assert.match(stateWords(held, undefined, []).next, /^Remove what it met/);
 });

@@ -1,4 +1,4 @@
-//! Sine and cosine of the system's mathematics library, an anchor for the dynamics.
+//! Time of sine and cosine in the system's mathematics library, as a reference for the dynamics.
 use std::hint::black_box;
 
 use test_kit::clock::least_ns;

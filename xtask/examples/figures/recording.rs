@@ -14,11 +14,11 @@ use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use crate::print;
 use crate::world::Result;
 
-/// Duration of the measured recording, and the factor from it to an hour.
+/// Duration of the measured recording. The next constant is the factor from this duration to an hour.
 const SECONDS: u32 = 300;
 const IN_AN_HOUR: f64 = 3600.0 / SECONDS as f64;
 
-/// Prints, for both formats, the time of a report, the time for only reading the same file, and the memory of a program that only makes the
+/// Prints for both formats: the time of a report, the time for reading the same file, and the memory of a program that only makes the
 /// report.
 pub fn figures() -> Result<()> {
     let dir = tempfile::tempdir()?;
@@ -97,7 +97,7 @@ pub fn write(path: &Path, seconds: u32) -> Result<()> {
     let mut recorder = Recorder::create(path, &info)?;
     for i in 0..seconds * 1000 {
         recorder.write(&sample(i))?;
-        // A recording of a running motion is written as often.
+        // The recording of a running motion is also written at this interval.
         if i % 200 == 199 {
             recorder.flush()?;
         }

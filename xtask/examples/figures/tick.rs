@@ -20,7 +20,7 @@ const ROUNDS: usize = 15;
 /// Inputs of the controller in one tick.
 struct Seen {
     bus: Vec<Frame>,
-    /// Index of the host's frame that was offered.
+    /// Index of the host's frame that was sent in this tick.
     host: Option<usize>,
 }
 
@@ -61,8 +61,8 @@ fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
     Inputs { bus, host: host.as_slice(), ..Inputs::QUIET }
 }
 
-/// Records a whole run: bring-up, parameters, upload, motion. The world answers its own controller; a second controller with the same
-/// inputs tells when the next frame is offered.
+/// Records a whole run: bring-up, parameters, upload, motion. The simulated world answers its own controller. A second controller
+/// with the same inputs shows when the next frame must be sent.
 fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
     let mut world = World::new(SimConfig { baud: None, ..SimConfig::default() });
     let mut shadow = controller();
@@ -92,7 +92,7 @@ fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
 pub fn figures() -> Result<()> {
     let frames = script()?;
     let seen = record(&frames);
-    // The minimum of all rounds excludes the time that the machine spent on other programs.
+    // The minimum of all rounds is used, because it does not contain the time of other programs on the machine.
     let mut least = vec![f64::INFINITY; seen.len()];
     for _ in 0..ROUNDS {
         let mut controller = controller();

@@ -1,5 +1,5 @@
-//! UCoM: numbering of 31 boards and an update of 60 KiB for one board, compared with the time of their frames on the bus; decoding of
-//! frames; memory of a board.
+//! UCoM: time for numbering 31 boards and for an update of one board with 60 KiB, compared with the time of their frames on the bus.
+//! Also speed of decoding, and memory of a board.
 use std::hint::black_box;
 
 use can_link::{BusEvent, CanFrame, Id, MemberId, TimedBus};
@@ -27,7 +27,8 @@ struct Bench {
     chain: ChainSim,
     /// All frames in the order of the bus.
     received: Vec<CanFrame>,
-    /// Time when the last frame of program data ended on the bus. The next field is the time that boards took to answer such frames, ns.
+    /// Time when the last frame of program data ended on the bus. The next field is the total time that the boards took to answer such
+    /// frames, ns.
     asked_at: Option<u64>,
     turn_round_ns: u64,
 }
@@ -87,7 +88,7 @@ impl Bench {
         }
     }
 
-    /// Lets all parties send, then advances the time to the next event.
+    /// Lets the PC and all boards send, then advances the time to the next event.
     fn step(&mut self) -> Result<()> {
         let now = self.now_us();
         self.chain.advance(now);
@@ -181,7 +182,8 @@ fn update(name: &str, profile: Profile) -> Result<()> {
     print(&format!("{name}_s"), cost.seconds);
     print(&format!("{name}_bus_s"), cost.busy_seconds);
     print(&format!("{name}_turn_round_s"), cost.turn_round_seconds);
-    // The share is the time that the PC adds to the time of the bus. Answers of the boards and the wait for the restart do not count.
+    // The share is the time that the PC adds to the time of the bus. The time of the boards' answers and the wait for the restart are
+    // subtracted.
     let waits = cost.turn_round_seconds + f64::from(profile.xreset_wait) * 1e-3;
     print(&format!("{name}_share"), (cost.seconds - waits) / cost.busy_seconds);
     Ok(())

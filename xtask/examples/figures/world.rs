@@ -6,7 +6,7 @@ use jtc_host::port::sim::SimPort;
 use jtc_sim::{Operator, SimConfig, World, host};
 use jtc_wire::{ExecCommand, RawPoint};
 
-/// Result whose error is of any type.
+/// Result with an error of any type.
 pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// Returns a session with a controller in HoldPos that uses its default parameters.
@@ -17,8 +17,8 @@ pub fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     Ok(session)
 }
 
-/// Uploads and starts `points` with the simulator's own operator. A session of the library uploads only points that pass its check, and
-/// points without velocities must be measured, too.
+/// Uploads and starts `points` with the simulator's own operator. The library's session cannot be used for all measurements, because it
+/// uploads only points that pass its check, and points without velocities do not.
 pub fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;

@@ -1,9 +1,9 @@
-//! The control law of the existing firmware, as it was published in April 2022, for comparison.
+//! The control law of the existing firmware in the version published in April 2022, for comparison.
 //!
 //! τ = 1.3·(inverse dynamics + PID + friction). Each channel of the trajectory is interpolated linearly between points. The inverse
 //! dynamics use rigid links at the measured position, with the commanded velocity and acceleration. The error is the present set position
-//! minus the measured position, which is two milliseconds old. The derivative is that of the mean of five errors. The sign in the friction
-//! polynomial is a step at zero. A joint whose answer is lost keeps its last measured position.
+//! minus the measured position, which is two milliseconds old. The derivative is taken of the mean of five errors. The sign function in
+//! the friction polynomial is a step at zero. If the answer of a joint is lost, its last measured position is used.
 use jtc_bus::{Answer, Frame, JOINTS, NodeState, Request, Scale, Target, config};
 use jtc_core::{Config, Friction, Parameters, PidGains, SetPoint};
 use jtc_dynamics::Dynamics;
@@ -74,7 +74,8 @@ pub struct Existing {
 }
 
 impl Existing {
-    /// Creates the controller for a path, with the parameters of the built-in arm, which are those of the existing firmware.
+    /// Creates the controller for a path, with the parameters of the built-in arm. The existing firmware has the same
+    /// parameters.
     pub fn new(config: &Config, parameters: &Parameters, points: &[RawPoint], step_ms: u16) -> Self {
         let Friction::Polynomial(friction) = parameters.friction else { unreachable!("it has a polynomial") };
         Self {
@@ -117,7 +118,7 @@ impl Existing {
         Request::Move { torque: self.torque(), pump: false }.emit()
     }
 
-    /// Returns a Move or another request, in turn, until all joints are enabled.
+    /// Returns the next request of the bring-up: alternately a Move and another request, until all joints are enabled.
     fn bring_up(&mut self) -> Frame {
         const TORQUE_MODE: u8 = 1;
         let states = self.states;

@@ -10,7 +10,7 @@ use jtc_sim::{FrictionModel, LuGre, ModelError, SimConfig};
 
 use run::{Figures, Outcome, Path, Result};
 
-/// Number of random arms; each figure is the median over them.
+/// Number of random arms. Each figure is the median over these arms.
 const SEEDS: u64 = 10;
 
 /// Condition of a run.
@@ -115,7 +115,8 @@ impl Condition {
         Self { error: ModelError { mass, friction, ..self.error }, ..self }
     }
 
-    /// Returns the simulation of a seed. Gravity is that of the existing firmware, whose arm hangs; `gain` is our torque gain.
+    /// Returns the simulation of a seed. Gravity has the direction for a hanging arm, like in the existing firmware. `gain` is
+    /// our torque gain.
     fn world(&self, seed: u64, start: [f64; JOINTS], gain: f64) -> SimConfig {
         let mut controller = Config { gravity: [0.0, 0.0, 9.81], ..Config::avena() };
         controller.friction_sign_width = self.sign_width;
@@ -137,7 +138,8 @@ impl Condition {
         world
     }
 
-    /// Returns the results of the existing law and of ours: the median of each figure over the seeds that reached the end of the path.
+    /// Returns the results of the existing law and of ours. Each figure is the median over the seeds whose run reached the end of the
+    /// path.
     pub fn compare(&self, path: &Path) -> Result<[Runs; 2]> {
         let start = path.points.first().map(jtc_wire::RawPoint::position_rad).ok_or("an empty path")?;
         let (mut existing, mut ours) = (Vec::new(), Vec::new());
@@ -189,7 +191,8 @@ fn median(all: &[Figures]) -> Figures {
     }
 }
 
-/// Returns our error with a model that is partly or completely correct: a heading, and mrad per joint.
+/// Returns our errors with a partly and a completely correct model. Each entry is a heading, and an error per joint in
+/// mrad.
 fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64; JOINTS])>> {
     let sharp = match condition.friction {
         FrictionModel::Smooth { width } => width,

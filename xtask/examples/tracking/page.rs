@@ -20,8 +20,9 @@ pub struct Comparison {
 const SHARE: f64 = 0.2;
 const LEAST: f64 = 0.04;
 
-/// Figures of the existing firmware's own code on this plant, compiled for a PC. With ideal drives: commanded − measured and commanded −
-/// true, mrad, and the change of torque, N·m/ms. With drives that deliver 1/1.3: commanded − measured, mrad.
+/// Figures of the existing firmware's own code, compiled for a PC, on this plant. The first three are for ideal drives: commanded −
+/// measured and commanded − true, mrad, and the change of torque, N·m/ms. The fourth is for drives that deliver 1/1.3 of the torque:
+/// commanded − measured, mrad.
 const REFERENCE: [(&str, [f64; JOINTS]); 4] = [
     ("ideal drives, commanded − measured", [0.258, 0.416, 0.368, 0.121, 0.127, 0.136]),
     ("ideal drives, commanded − true", [1.07, 0.88, 1.14, 0.76, 0.65, 0.91]),
@@ -55,7 +56,7 @@ position; a sign of friction that steps. Ours is the controller itself.
 ";
 
 impl Comparison {
-    /// Joints (from 0) that miss the goal, with our error and the goal, mrad.
+    /// Returns the joints (from 0) that miss the goal, with our error and the goal in mrad.
     pub fn missed(&self) -> Vec<(usize, f64, f64)> {
         let (Some(existing), Some(ours)) = (self.existing.figures, self.ours.figures) else {
             return Vec::new();
@@ -137,7 +138,7 @@ fn row(page: &mut String, name: &str, values: &[f64; JOINTS], digits: usize) {
     let _ = writeln!(page, "| {name} | {cells} |");
 }
 
-/// Writes the table that compares the existing law here with the existing firmware's own code.
+/// Writes the table that compares our implementation of the existing law with the existing firmware's own code.
 fn reference(page: &mut String, all: &[Comparison]) {
     let figures = |name: &str| {
         let found = all.iter().find(|c| c.path == "demo path" && c.condition.name == name);

@@ -21,7 +21,7 @@ pub fn all() -> Result<Vec<Path>> {
     Ok(paths)
 }
 
-/// Returns the points of `TrajectoryInt.csv`, with the points that the recording lacks filled in.
+/// Returns the points of `TrajectoryInt.csv`. Points that the recording lacks are interpolated.
 fn recorded() -> Option<Vec<RawPoint>> {
     let raw =
         |[position, velocity, acceleration]: [[i16; 6]; 3]| RawPoint { position, velocity, acceleration };
@@ -37,7 +37,7 @@ fn recorded() -> Option<Vec<RawPoint>> {
     Some(points)
 }
 
-/// Returns the point in the middle between two points that are 20 ms apart. The position is that of a cubic.
+/// Returns the point in the middle between two points that are 20 ms apart. The position is interpolated with a cubic.
 fn between(a: &RawPoint, b: &RawPoint) -> RawPoint {
     let mean = |a: &[i16; 6], b: &[i16; 6]| {
         core::array::from_fn(|j| ((i32::from(a[j]) + i32::from(b[j])) / 2) as i16)

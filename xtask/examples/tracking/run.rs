@@ -18,7 +18,7 @@ pub struct Path {
     pub step_ms: u16,
 }
 
-/// RMS over the path, per joint.
+/// RMS values over the path, per joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Figures {
     /// Commanded minus true position at the time when the command begins to act, mrad.

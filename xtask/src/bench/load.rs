@@ -1,4 +1,4 @@
-//! Load of the machine: tells whether it is quiet enough to judge the measurements.
+//! Load of the machine. It shows if the machine is idle enough to judge the measurements.
 use std::time::Instant;
 
 /// Largest share of one processor that other programs may use while figures are judged.
@@ -16,7 +16,7 @@ impl Load {
         Self { began: Instant::now(), busy: busy() }
     }
 
-    /// Returns the share of one processor that other programs have used since then.
+    /// Returns the share of one processor that other programs have used since the first measurement.
     pub fn others(&self) -> Option<f64> {
         let ((all_before, own_before), (all, own)) = (self.busy?, busy()?);
         let others = (all - all_before) - (own - own_before);
@@ -31,10 +31,11 @@ fn busy() -> Option<(f64, f64)> {
     let sum = |fields: &[&str]| fields.iter().map(|field| field.parse::<f64>().ok()).sum::<Option<f64>>();
     let all = std::fs::read_to_string("/proc/stat").ok()?;
     let all: Vec<&str> = all.lines().next()?.split_whitespace().collect();
-    // user, nice, system; irq, softirq, steal: all fields but the idle times.
+    // All fields except the idle times: user, nice and system, then irq, softirq and steal.
     let all = sum(all.get(1..4)?)? + sum(all.get(6..9)?)?;
     let own = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // Fields 14 to 17 of the line, after the name, which may contain spaces: utime, stime, cutime and cstime.
+    // Fields 14 to 17 of the line are utime, stime, cutime and cstime. They are counted after the name, which may
+    // contain spaces.
     let own: Vec<&str> = own.rsplit_once(')')?.1.split_whitespace().collect();
     let own = sum(own.get(11..15)?)?;
     Some((all / USER_HZ, own / USER_HZ))

@@ -19,7 +19,7 @@ enum Target {
 struct Row {
     title: &'static str,
     ours: &'static str,
-    /// Anchors; the smallest one counts, and an anchor that could not be measured is named.
+    /// Anchors of the figure. The smallest one is compared. The table lists an anchor that could not be measured.
     anchors: &'static [&'static str],
     target: Target,
     unit: &'static str,
@@ -262,8 +262,8 @@ pub fn targets() -> usize {
     ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
 }
 
-/// Prints every row, with the cause if its measurement failed; returns the number of missed targets. Measurements of a machine that is
-/// not `quiet` are not judged.
+/// Prints every row, with the cause if its measurement failed. Returns the number of missed targets. If the machine was not `quiet`,
+/// the measurements are not judged.
 pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
     println!("\n| figure | ours | anchor | ratio | target | met |\n|---|---|---|---|---|---|");
     let mut missed = 0;
@@ -276,7 +276,7 @@ pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
 }
 
 impl Row {
-    /// Returns the row of the table, and whether its target was missed.
+    /// Returns the row of the table, and true if its target was missed.
     fn judge(&self, figures: &Figures, failed: &Failed, quiet: bool) -> (String, bool) {
         let ours = figures.get(self.ours).copied();
         let anchor = self
@@ -331,7 +331,7 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Every figure of the table exists, except those of one failed measurement.
+    /// All figures of the table exist, except those of one failed measurement.
     #[test]
     fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
         let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));
@@ -352,7 +352,7 @@ mod tests {
             }
         }
         assert!(gone > 0 && there > 20, "{gone} {there}");
-        // A figure that was not measured has not failed.
+        // A figure that was not measured does not miss its target.
         let (text, _) = ROWS[0].judge(&Figures::new(), &Failed::default(), true);
         assert!(text.ends_with("| not measured |"), "{text}");
     }

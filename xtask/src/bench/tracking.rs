@@ -47,7 +47,8 @@ mod tests {
         rows.iter().find(|(row, _)| row == name).map(|(_, figures)| *figures)
     }
 
-    /// The page calls a goal met only if its figures meet the goal, and names the joints that miss it, with the limiting quantity.
+    /// The page says that a goal is met only if its figures meet the goal. Otherwise it lists the joints that miss the goal, with
+    /// the limiting quantity.
     #[test]
     fn j62_the_page_of_tracking_judges_its_own_figures() {
         let (page, sections) = (page(), sections(&page()));
@@ -87,7 +88,7 @@ mod tests {
         }
     }
 
-    /// The existing law agrees with the existing firmware within a tenth, in each known figure of it.
+    /// Each known figure of the existing firmware agrees within a tenth with our implementation of its law.
     #[test]
     fn j62_the_existing_law_of_the_page_is_that_of_the_existing_firmware() {
         let sections = sections(&page());

@@ -1,4 +1,5 @@
-//! Trial of the packages: they are installed in a separate Debian, used, removed and purged, after which no file is left.
+//! Trial of the packages. They are installed in a separate Debian, used, removed and purged. After that no file may be
+//! left.
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,7 @@ use super::{assembled_twice, programs, write};
 use crate::shell::{self, run};
 use crate::tally::{Outcome, Tally};
 
-/// Runs the steps of `cargo xtask test`, with the programs that it has built.
+/// Runs the steps that belong to `cargo xtask test`, with the programs that it has built.
 pub fn steps(tally: &mut Tally) {
     tally.step("packages: assembled twice, installed, used, removed", || {
         if programs::own().is_err() || !Path::new("/var/lib/dpkg/status").exists() {
@@ -58,7 +59,7 @@ fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     run(root.dpkg().args(["--verify", "jtc", "ucom"]))?;
     used(root)?;
     units(root)?;
-    // Files that an agent leaves.
+    // Creates files like those that an agent leaves.
     let state = root.path().join("var/lib/jtc/cell1");
     fs::create_dir_all(&state)?;
     fs::write(state.join("tokens.toml"), "")?;
@@ -142,7 +143,7 @@ fn units(root: &Root) -> Result<()> {
     }
     let users = fs::read_to_string(root.path().join("etc/passwd"))?;
     ensure!(users.lines().any(|line| line.starts_with("jtc:")), "the user jtc was not made");
-    // First checks that the method finds a mistake in a broken unit.
+    // First checks with a broken unit that the method finds a mistake.
     let broken = root.path().join("etc/systemd/system/jtc-broken.service");
     fs::write(&broken, "[Service]\nExecStart=/usr/bin/no-such-program\nNoSuchKey=1\n")?;
     let found = complaints(root, "jtc-broken.service")?;

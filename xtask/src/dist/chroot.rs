@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use super::tree::sha256;
 use crate::shell::{self, Scratch, apt_install, run, works};
 
-/// Folders that are not compared: dpkg's own records, and files that are lost at a reboot.
+/// Folders that are not compared, because they contain dpkg's own records, or files that are lost at a reboot.
 const UNCOMPARED: [&str; 6] = ["var/lib/dpkg", "var/log", "var/cache", "proc", "tmp", "run"];
 /// Backups written by the programs that change users.
 const BACKUPS: [&str; 7] = [
@@ -28,10 +28,10 @@ const WANTED: [&str; 3] = ["passwd", "systemd", "man-db"];
 const LEFT_OUT: [&str; 5] =
     ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
 
-/// Folder of the system; it is removed on drop.
+/// Folder of the system. It is removed on drop.
 pub struct Root(Scratch);
 
-/// Package of this computer, as dpkg knows it.
+/// Package of this computer, according to dpkg.
 struct Installed {
     essential: bool,
     /// Names of its dependencies: for each dependency a list of alternatives.
@@ -77,7 +77,7 @@ impl Root {
         self.0.path()
     }
 
-    /// Writes dpkg's records of the new system: those of this computer for the copied packages.
+    /// Writes dpkg's records of the new system. They are copies of this computer's records of the copied packages.
     fn remember(&self, packages: &BTreeSet<String>) -> Result<()> {
         let to = self.path().join("var/lib/dpkg");
         for folder in ["info", "updates", "triggers", "alternatives"] {
@@ -143,7 +143,8 @@ impl Root {
         chroot
     }
 
-    /// Returns a command that runs dpkg on the system and installs manual pages, too, which some containers tell dpkg to leave out.
+    /// Returns a command that runs dpkg on the system. It also installs manual pages, which dpkg is configured to leave out in some
+    /// containers.
     pub fn dpkg(&self) -> Command {
         let mut dpkg = shell::command("dpkg");
         dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");
@@ -151,7 +152,7 @@ impl Root {
         dpkg
     }
 
-    /// Returns everything that packages could have left: kind, mode, owner and content by path.
+    /// Returns all files that packages could have left, by path, with kind, mode, owner and content.
     pub fn files(&self) -> Result<BTreeMap<String, String>> {
         let mut found = BTreeMap::new();
         let mut waiting = vec![self.path().to_owned()];
@@ -203,7 +204,7 @@ fn installed() -> Result<BTreeMap<String, Installed>> {
         packages.insert(name.to_owned(), Installed { essential: essential == "yes", depends });
         provided.extend(provides.split(',').flat_map(names).map(|other| (other, name.to_owned())));
     }
-    // A name that a package provides counts as a package that depends on the providing one.
+    // A name that a package provides is treated as a package that depends on the providing package.
     for (other, by) in provided {
         packages.entry(other).or_insert(Installed { essential: false, depends: vec![vec![by]] });
     }
@@ -241,7 +242,7 @@ fn shell_architecture() -> Result<&'static str> {
     Ok(super::programs::own()?.debian)
 }
 
-/// Copies a file, link or folder unchanged; skips names of a package that this computer does not have.
+/// Copies a file, link or folder unchanged. Skips a path of a package that does not exist on this computer.
 fn copy(from: &Path, to: &Path) -> Result<()> {
     let Ok(data) = from.symlink_metadata() else { return Ok(()) };
     if let Some(folder) = to.parent() {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::shell::root;
 
-/// Libraries whose scripts are part of the built files. The other entries of web/package.json are needed only for the build and the tests.
+/// Libraries whose scripts are part of the built files. Other entries of web/package.json are used only by the build and the tests.
 const NAMES: [&str; 4] = ["clsx", "svelte", "three", "uplot"];
 
 /// Library of the dashboard.

@@ -1,4 +1,5 @@
-//! Format of Debian packages (deb(5)), reproducible byte for byte. The sums of their files are left to dpkg, which makes them.
+//! Format of Debian packages (deb(5)), reproducible byte for byte. The packages do not contain the sums of their files,
+//! because dpkg makes them itself.
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result, ensure};

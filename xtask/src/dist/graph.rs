@@ -17,7 +17,7 @@ pub struct Crate {
     pub version: String,
     /// Licence as an SPDX expression; `None` if its manifest has none.
     pub licence: Option<String>,
-    /// Source of the crate; `None` for the project's own.
+    /// Source of the crate; `None` for the project's own crates.
     pub source: Option<String>,
     /// Authors, as listed in its manifest.
     pub authors: Vec<String>,
@@ -38,12 +38,12 @@ pub struct Graph {
     pub uses: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// Kinds of dependencies that count.
+/// Kinds of dependencies to include.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Kind {
     /// Dependencies that become a part of a program, or generate a part of it during compilation.
     Shipped,
-    /// Dependencies of build scripts and tests, too.
+    /// All dependencies, including those of build scripts and tests.
     All,
 }
 

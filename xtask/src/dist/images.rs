@@ -8,8 +8,8 @@ use crate::firmware;
 
 /// First address of flash.
 const FLASH: u64 = 0x0800_0000;
-/// Bytes from there to the stored arm, which has the last two sectors of bank 2 and which no image may overwrite. The few words for the
-/// second core of an H745 are at the start of bank 2, so the images of these boards contain a gap of erased flash.
+/// Number of bytes from there to the stored arm, which no image may overwrite. The stored arm is in the last two sectors of bank 2. The
+/// few words for the second core of an H745 are at the start of bank 2, so the images of these boards contain a gap of erased flash.
 const ROOM: u64 = (2048 - 2 * 128) * 1024;
 /// Value of flash that is not written.
 const ERASED: u8 = 0xff;
@@ -22,8 +22,8 @@ pub struct Image {
     pub bin: Vec<u8>,
 }
 
-/// Builds the programs of all boards. The contents of flash are the same in every build folder; the names in the ELF files, which
-/// debuggers read, are not, so the ELF files do not belong to a release.
+/// Builds the programs of all boards. The contents of flash are the same in every build folder. The names in the ELF files, which
+/// debuggers read, are not the same, so a release does not contain the ELF files.
 pub fn build() -> Result<Vec<Image>> {
     let image = |board| {
         let path = firmware::build(board)?;
@@ -43,7 +43,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         if bytes.is_empty() {
             continue;
         }
-        // The load address, which differs from the run address.
+        // This is the load address, which differs from the run address.
         let address = u64::from(segment.elf_program_header().p_paddr.get(file.endian()));
         let end = address + bytes.len() as u64;
         ensure!(
@@ -55,7 +55,8 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         bin.resize(bin.len().max(to), ERASED);
         bin[from..to].copy_from_slice(bytes);
     }
-    // The vector table: the initial stack pointer in RAM, then the address of the first instruction, which is odd for Thumb.
+    // The vector table begins with the initial stack pointer in RAM and the address of the first instruction, which is odd
+    // for Thumb code.
     let word = |at: usize| bin.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
     let (stack, start) = (word(0).context("the image is empty")?, word(4).context("the image is empty")?);
     ensure!(

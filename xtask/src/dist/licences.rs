@@ -14,7 +14,7 @@ const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"
 /// Folders of a crate that are not shipped in a program.
 const NOT_SHIPPED: [&str; 7] = ["tests", "test", "examples", "benches", "fuzz", "target", "node_modules"];
 
-/// Returns an SPDX expression; old manifests have `/` instead of `OR`.
+/// Returns a licence as an SPDX expression. Old manifests contain `/` instead of `OR`.
 pub fn expression(licence: &str) -> String {
     licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
 }
@@ -89,7 +89,7 @@ impl Texts {
         }
     }
 
-    /// Adds the texts in the source of a crate; if it has none, adds the standard text.
+    /// Adds the licence texts in the source of a crate. If it has none, adds the standard text.
     fn of(&mut self, found: &Crate, label: &str) -> Result<()> {
         let files = files(&found.folder)?;
         for file in &files {
@@ -139,7 +139,7 @@ fn files(source: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Returns true for source code, because programs about licences have names that begin in the same way.
+/// Returns true for source code, because source files about licences can have names that begin in the same way.
 fn is_code(path: &Path) -> bool {
     path.extension()
         .is_some_and(|ending| ["rs", "py", "c", "h", "sh", "toml"].iter().any(|code| ending == *code))

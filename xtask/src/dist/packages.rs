@@ -13,10 +13,10 @@ use crate::shell::root;
 /// The revision of the Debian packages of one version.
 const REVISION: u32 = 1;
 
-/// Rules of udev; both packages install them, under different names.
+/// udev rules. Both packages install them, under different names.
 const RULES: &str = include_str!("../../packaging/serial.rules");
 
-/// Findings of lintian that are intended, with the reasons.
+/// Intended findings of lintian, with the reasons.
 const OVERRIDES: &str = "\
 # One program for every distribution.
 NAME: statically-linked-binary
@@ -116,7 +116,7 @@ impl Release {
         tree.put("THIRD-PARTY.txt", &*self.third_party);
         tree.put("udev/70-openjtc.rules", RULES);
         if name == "jtc" {
-            // The program searches for the images there, next to its own folder.
+            // The program searches for the images at this path, next to its own folder.
             images::install(&self.images, &self.version, "share/openjtc/firmware", &mut tree)?;
         }
         let folder = format!("{name}-{}-{}-linux", self.version, platform.machine);
@@ -125,7 +125,7 @@ impl Release {
     }
 }
 
-/// The project has no mail address: problems are reported in its repository.
+/// Maintainer field. The project has no mail address, because problems are reported in its repository.
 const MAINTAINER: &str = "The openjtc contributors <openjtc@noreply.invalid>";
 
 const JTC: &str = "\

@@ -1,4 +1,4 @@
-//! Manual pages and completions, as printed by the programs.
+//! Manual pages and completions, which the programs print.
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
@@ -19,7 +19,8 @@ impl Pages {
     /// Returns the pages of the program with this name in `folder`.
     pub fn of(folder: &Path, name: &str) -> Result<Self> {
         let program = folder.join(name);
-        // Options that this user has set through environment variables do not belong in the packages.
+        // The environment variables of `jtc` and `ucom` are removed, because options that this user has set must not
+        // get into the packages.
         let ask = || {
             let mut ask = shell::command(&program);
             ask.env_clear();

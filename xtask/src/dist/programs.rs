@@ -1,4 +1,5 @@
-//! Programs of a release: static, stripped, and with the same bytes for every location of the checkout and of cargo's folders.
+//! Programs of a release: static and stripped. Their bytes do not depend on the location of the checkout and of cargo's
+//! folders.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -46,7 +47,7 @@ pub fn own() -> Result<Platform> {
     own.with_context(|| format!("there are no packages for computers like this ({machine}), which would have to run their programs"))
 }
 
-/// Adds the compiler's target if rustup manages the toolchain. `Err`: the target is not available here.
+/// Adds the compiler's target if rustup manages the toolchain. Returns an error if the target is not available here.
 pub fn add_target(triple: &str) -> Result<()> {
     let installed = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))?;
     if installed.lines().any(|target| target == triple) {
@@ -55,7 +56,7 @@ pub fn add_target(triple: &str) -> Result<()> {
     run(shell::command("rustup").args(["target", "add", triple]))
 }
 
-/// Returns the Unix time that all archives contain, s: that of the last commit, or `SOURCE_DATE_EPOCH`.
+/// Returns the Unix time that all archives contain, s. It is the time of the last commit, or `SOURCE_DATE_EPOCH`.
 pub fn time() -> Result<u64> {
     let time = match std::env::var("SOURCE_DATE_EPOCH") {
         Ok(time) => time,
@@ -72,10 +73,10 @@ pub fn tools() -> Result<PathBuf> {
     Ok(python.parent().context("an interpreter in no folder")?.to_owned())
 }
 
-/// Adds to a cargo command the switches for `triple` that keep paths of this computer out of the output.
+/// Adds switches for `triple` to a cargo command that keep paths of this computer out of the output.
 pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
-    // For C and its assembler.
+    // The same for C code and its assembler code.
     let folders = paths::folders()?;
     let maps: Vec<String> =
         folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();

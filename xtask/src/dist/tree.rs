@@ -11,10 +11,10 @@ use sha2::{Digest as _, Sha256};
 #[derive(Clone, Default, Debug, PartialEq)]
 pub struct Tree(BTreeMap<String, File>);
 
-/// File: content and kind.
+/// File with its content and kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct File {
-    /// Its bytes.
+    /// Content of the file.
     pub bytes: Vec<u8>,
     /// `true` if the file is executable.
     pub runs: bool,
@@ -43,8 +43,8 @@ impl Tree {
         self.0.iter().map(|(path, file)| (path.as_str(), file))
     }
 
-    /// Returns a tar archive: sorted, of root, each file of `time` (Unix time, s), with the path prefix `prefix` (`./` or `name/`).
-    /// Contains folders, too.
+    /// Returns a tar archive with sorted paths. All files belong to root and have the time `time` (Unix time, s). `prefix` (`./` or
+    /// `name/`) is put before each path. The archive also contains the folders.
     pub fn tar(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         let mut tar = tar::Builder::new(Vec::new());
         let mut folders = BTreeSet::new();
@@ -91,7 +91,8 @@ pub fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
     compress(bytes, Compression::best())
 }
 
-/// Compresses without a time and a name. For a program the best level takes three times as long as the default and saves 1 %.
+/// Compresses without a time and a name in the header. For a program the best level would take three times as long as the
+/// default and save 1 %.
 fn compress(bytes: &[u8], by: Compression) -> Result<Vec<u8>> {
     let mut gzip = GzBuilder::new().mtime(0).operating_system(3).write(Vec::new(), by);
     gzip.write_all(bytes)?;
@@ -106,7 +107,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 /// Name of the list that `sha256sum --check` reads.
 pub const SUMS: &str = "SHA256SUMS";
 
-/// Writes this list into a folder, for all other files of the folder.
+/// Writes the list into a folder, with the sums of all other files of the folder.
 pub fn write_sums(folder: &Path) -> Result<()> {
     let mut lines = BTreeMap::new();
     for entry in std::fs::read_dir(folder)? {

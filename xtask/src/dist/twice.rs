@@ -9,7 +9,7 @@ use crate::shell::{self, run};
 
 /// Makes the release of `first` again elsewhere. If files differ, returns an error that lists them and keeps both releases.
 pub fn compare(first: &Path, quick: bool) -> Result<()> {
-    // Not in the folder for temporary files, which some systems keep in memory: this needs gigabytes.
+    // The folder for temporary files is not used, because some systems keep it in memory, and this needs gigabytes.
     let folder = shell::target().join("made-again-in-a-folder-with-a-longer-name");
     if folder.exists() {
         fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -22,7 +22,7 @@ pub fn compare(first: &Path, quick: bool) -> Result<()> {
     if quick {
         again.arg("--quick");
     }
-    // Only the checkout selects the toolchain.
+    // Variables of cargo are removed, so that only the checkout selects the toolchain.
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARGO") && name != "CARGO_HOME") {
         again.env_remove(name);
     }

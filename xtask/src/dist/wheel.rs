@@ -13,10 +13,10 @@ pub fn folder() -> Option<PathBuf> {
     Some(shell::root().join("crates/openjtc-py")).filter(|folder| folder.join("pyproject.toml").exists())
 }
 
-/// Text about third-party parts, at the place that `license-files` of pyproject.toml names.
+/// Text about third-party parts. `license-files` in pyproject.toml contains this path.
 const THIRD_PARTY: &str = "LICENSE-THIRD-PARTY.txt";
 
-/// Builds the wheel; it runs with every glibc from 2.17 on.
+/// Builds the wheel. It works with every glibc from 2.17 on.
 pub fn build(platform: Platform, time: u64, third_party: &str) -> Result<Made> {
     let folder = folder().context("crates/openjtc-py is not there")?;
     programs::add_target(platform.library)?;

@@ -73,7 +73,8 @@ fn what_is_not_called_does_not_count() {
     assert_eq!((report.functions, report.instructions), (2, 5));
 }
 
-/// Returns the report of a `tick` at 0 to 8 that returns, followed by two halfwords of data or code; the panic is at 8.
+/// Returns the report for a program whose `tick`, at 0 to 8, contains a return and then two halfwords of data or code.
+/// The panic is at 8.
 fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
@@ -93,7 +94,7 @@ fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
 fn data_between_code_is_no_code() {
     assert_eq!(behind_return("$t", call(4, 8)).paths.len(), 1);
     assert!(behind_return("$d", call(4, 8)).paths.is_empty());
-    // The address of a function in the data counts as a call.
+    // The address of a function in the data is treated as a call.
     assert_eq!(behind_return("$d", [9, 0]).paths, ["tick (0x4) > core::panicking::panic_fmt"]);
 }
 

@@ -1,19 +1,19 @@
-//! Thumb-2 code, as far as it decides the next address (ARMv7-M Architecture Reference Manual, A7.7).
+//! Decodes the Thumb-2 instructions that affect the next address (ARMv7-M Architecture Reference Manual, A7.7).
 
 /// Effect of an instruction on the flow of control and on the formation of addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// B, `B<cc>`, CBZ, CBNZ or BL to an address.
+    /// Branch to an address: B, `B<cc>`, CBZ, CBNZ or BL.
     Direct(u32),
-    /// BX, BLX, MOV or LDR to the program counter: an address that is known only when it runs.
+    /// BX, BLX, MOV or LDR to the program counter. The address is known only at run time.
     Indirect(u8),
-    /// MOVW: the lower half of a register, the upper one becomes 0.
+    /// MOVW: sets the lower half of a register. The upper half becomes 0.
     Low(u8, u16),
-    /// MOVT: the upper half of a register.
+    /// MOVT: sets the upper half of a register.
     High(u8, u16),
     /// UDF: an abort.
     Trap,
-    /// Anything else; returns, too.
+    /// Any other instruction, including returns.
     Other,
 }
 
@@ -22,7 +22,7 @@ pub fn len(first: u16) -> u32 {
     if first >> 11 >= 0b11101 { 4 } else { 2 }
 }
 
-/// Decodes the instruction at `address`; `second` is used only for instructions of four bytes.
+/// Decodes the instruction at `address`. `second` is used only for instructions of four bytes.
 pub fn flow(address: u32, first: u16, second: u16) -> Flow {
     if len(first) == 4 { wide(address, first.into(), second.into()) } else { narrow(address, first.into()) }
 }
@@ -63,7 +63,8 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
             to(signed(offset, 25))
         }
-        // UDF; B with a condition. 14 and 15 are not conditions, but barriers and similar instructions.
+        // UDF, and B with a condition. The values 14 and 15 are not conditions. They encode barriers and similar
+        // instructions.
         (0xF000, 0x8000) if first & 0xFFF0 == 0xF7F0 && second & 0xF000 == 0xA000 => Flow::Trap,
         (0xF000, 0x8000) if first >> 7 & 7 != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | (first & 0x3F) << 12 | (second & 0x7FF) << 1;

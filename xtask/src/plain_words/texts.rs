@@ -1,11 +1,11 @@
-//! Prose of a file: comments and strings of a program, paragraphs of a page.
+//! Extracts the prose of a file: comments and strings of a program, or paragraphs of a page.
 use ra_ap_rustc_lexer::{FrontmatterAllowed, LiteralKind, TokenKind, tokenize};
 
-/// Comment, string or paragraph, in one line.
+/// Comment, string or paragraph, joined into one line.
 #[derive(Debug, Default, PartialEq)]
 pub struct Text {
     pub words: String,
-    /// Beginning of each line of the file in `words`, with the number of the line.
+    /// Position in `words` at which each line of the file begins, with the number of the line.
     lines: Vec<(usize, usize)>,
 }
 

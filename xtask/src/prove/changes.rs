@@ -1,4 +1,4 @@
-//! Changes since a run of mutants: only changed parts run again, the other results are kept.
+//! Changes since a run of mutants. Only the mutants in changed parts run again, and the other results are kept.
 use std::collections::BTreeMap;
 use std::fs::{read_to_string, write};
 use std::path::Path;
@@ -25,11 +25,11 @@ impl Changes {
         Ok(Self { pieces: diff.lines().filter_map(piece).collect(), diff })
     }
 
-    /// Returns the present number of an old line; `None`: the line was changed or removed.
+    /// Returns the present number of an old line. `None`: the line was changed or removed.
     fn now(&self, line: u64) -> Option<u64> {
         let mut shifted = line;
         for &(first, old, new) in &self.pieces {
-            // A piece without old lines comes after the named line.
+            // A piece without old lines is inserted after the given line.
             let first = if old == 0 { first + 1 } else { first };
             if line < first {
                 break;
@@ -51,7 +51,7 @@ fn piece(line: &str) -> Option<(u64, u64, u64)> {
     Some((old.split(',').next()?.parse().ok()?, count(old)?, count(new)?))
 }
 
-/// Returns the changes of the files of a report, which contains their sources; deleted files are left out.
+/// Returns the changes of the files in a report. The report contains their sources. Deleted files are left out.
 pub(super) fn changes(results: &Path, report: &Value) -> Result<BTreeMap<String, Changes>> {
     let old = results.join("old.rs");
     let mut all = BTreeMap::new();
@@ -65,7 +65,7 @@ pub(super) fn changes(results: &Path, report: &Value) -> Result<BTreeMap<String,
     Ok(all)
 }
 
-/// Adds the unchanged results of the previous report to a report of the changes.
+/// Completes a report about changed parts with the results of unchanged parts from the previous report.
 pub(super) fn complete(part: &mut Value, before: Value, changes: &BTreeMap<String, Changes>) -> Result<()> {
     let Value::Object(files) = &mut part["files"] else { return Ok(()) };
     for (file, changes) in changes {

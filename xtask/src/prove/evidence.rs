@@ -1,4 +1,4 @@
-//! docs/evidence.md: generated tables between marks, and written explanations of mutants that no test can detect.
+//! docs/evidence.md. It contains generated tables between marks, and explanations of mutants that no test can detect.
 use std::collections::BTreeSet;
 use std::fs::{read_to_string, write};
 
@@ -27,7 +27,7 @@ pub fn table(page: &str, name: &str) -> Result<String> {
     Ok(parts(page, name)?.1.0.trim().to_owned())
 }
 
-/// Splits the page: up to the end of the first mark, between the marks, from the last mark on.
+/// Splits the page into three parts: up to the end of the first mark, between the marks, and from the second mark on.
 fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))> {
     let (open, close) = (format!("<!-- {name} -->"), format!("<!-- end of {name} -->"));
     let missing = || format!("{PAGE} lacks `{open}` … `{close}`");
@@ -36,7 +36,7 @@ fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))>
     Ok((&page[..start], (&page[start..end], &page[end..])))
 }
 
-/// Mutant, named independently of its line number: file, its line of source without indentation, change.
+/// Mutant, identified without its line number: by the file, the line of source without indentation, and the change.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Named {
     /// Path from the root of the workspace.
@@ -47,7 +47,8 @@ pub struct Named {
     pub change: String,
 }
 
-/// Returns the mutants that the page explains as equivalent: below a heading `### FILE` the items ``- `LINE` → `CHANGE`: sentence``.
+/// Returns the mutants that the page explains as equivalent. These are the items ``- `LINE` → `CHANGE`: sentence`` below a heading
+/// `### FILE`.
 pub fn explained(page: &str) -> BTreeSet<Named> {
     let mut file = "";
     let mut explained = BTreeSet::new();

@@ -12,13 +12,14 @@ use crate::shell::{self, command, root, run, works};
 
 const RUNS: &str = "20000000";
 const PORTION: u64 = 500_000;
-/// Executions of a target that are guided by comparisons as well, which finds keywords and constants; the others are
-/// guided only by the reached code, which is two to three times as fast.
+/// Number of executions of a target that are also guided by comparisons, which finds keywords and constants. All others
+/// are guided only by the reached code, which is two to three times as fast.
 const COMPARING: u64 = 1_000_000;
 /// Name of the table in docs/evidence.md.
 const TABLE: &str = "fuzz";
 
-/// Longer inputs only repeat the contents of shorter ones, and are slow; kept inputs must be readable and small enough for git.
+/// Option that limits the length of inputs. Longer inputs only repeat the contents of shorter ones, and are slow. Kept inputs
+/// must be readable and small enough for git.
 const LENGTH: &str = "-max_len=4096";
 
 /// Returns a command of the nightly toolchain, without the variables of the pinned toolchain.
@@ -51,7 +52,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         let directories: Vec<&str> = directories.iter().map(String::as_str).collect();
         let mut done = done;
         while done < wanted {
-            // In portions, so that finished portions count when the run is interrupted.
+            // The executions run in portions, so that finished portions are counted even if the run is interrupted.
             let portion = (wanted - done).min(PORTION);
             let build = if done < COMPARING { &COMPARISONS[..] } else { &COVERAGE[..] };
             run(&mut fuzz(&target, build, &directories, &[&format!("-runs={portion}"), LENGTH]))?;
@@ -59,7 +60,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             done += portion;
         }
         if keep {
-            // The merge ignores how often code is reached, and keeps few inputs.
+            // The merge ignores how often code is reached, so that it keeps few inputs.
             let merge = ["-set_cover_merge=1", "-use_counters=0", LENGTH];
             run(&mut fuzz(&target, &COMPARISONS, &[directories[1], directories[0]], &merge))?;
         }
@@ -78,9 +79,9 @@ fn install() -> Result<()> {
     Ok(())
 }
 
-/// Returns the folders of inputs: found ones, kept ones, and regressions if there are any.
+/// Returns the folders of inputs: found inputs, kept inputs, and regressions if there are any.
 fn directories(target: &str) -> Result<Vec<String>> {
-    // The found inputs accumulate in the build folder, outside git. Git has the kept inputs.
+    // Found inputs accumulate in the build folder, outside git. Kept inputs are in git.
     let mut directories = vec![format!("fuzz/target/corpus/{target}"), format!("fuzz/corpus/{target}")];
     for directory in &directories {
         let path = root().join(directory);
@@ -93,7 +94,7 @@ fn directories(target: &str) -> Result<Vec<String>> {
     Ok(directories)
 }
 
-/// Adds `portion` executions of the checked-out commit to the page, unless the tested code is in no commit.
+/// Adds `portion` executions of the checked-out commit to the page, unless the tested code has uncommitted changes.
 fn count(target: &str, portion: u64) -> Result<()> {
     let changed =
         shell::read(command("git").args(["status", "--porcelain", "--", "crates", "fuzz/fuzz_targets"]))?;
@@ -136,8 +137,8 @@ const COMPARISONS: [&str; 0] = [];
 /// Arguments of the build that is guided only by coverage, in a separate folder so that neither build is repeated.
 const COVERAGE: [&str; 2] = ["--no-trace-compares", "--target-dir=fuzz/target/coverage"];
 
-/// Returns the fuzzer on `directories`; new inputs are written to the first one. The address sanitizer is off, because the code has no
-/// `unsafe` and the fuzzer is several times as fast without it.
+/// Returns the command that runs the fuzzer on `directories`. New inputs are written to the first one. The address sanitizer is off,
+/// because the code has no `unsafe` and the fuzzer is several times as fast without it.
 fn fuzz(target: &str, build: &[&str], directories: &[&str], options: &[&str]) -> Command {
     let mut fuzz = nightly(&["cargo", "fuzz", "run", "-s", "none"]);
     fuzz.args(build).arg(target).args(directories).arg("--").args(options);
@@ -169,7 +170,8 @@ mod tests {
         assert_eq!((executions(&table, "stream_parser"), executions(&table, "bus_frame")), (521, 0));
     }
 
-    /// Every test run executes each target with its kept inputs, and all kept inputs belong to a target.
+    /// Checks that every test run executes each target with its kept inputs, and that all kept inputs belong to a
+    /// target.
     #[test]
     fn every_target_is_built_and_tested() {
         let manifest = read_to_string(root().join("fuzz/Cargo.toml")).unwrap();

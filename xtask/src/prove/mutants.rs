@@ -13,23 +13,23 @@ use super::changes::{changes, complete};
 use super::evidence::{self, Named};
 use crate::shell::{self, cargo, command, run, target, works};
 
-/// Version of cargo-gamma; reports of other versions may differ.
+/// Version of cargo-gamma. Reports of other versions may differ.
 const VERSION: &str = "0.4.0";
 const REPORT: &str = "gamma-report.json";
-/// File with the commit of the report.
+/// File with the commit that the report is about.
 const COMMIT: &str = "commit";
-/// Crates that run on a board, those with the quickest tests first.
+/// Crates that run on a board. The crates with the fastest tests come first.
 const PACKAGES: [&str; 5] = ["jtc-bus", "jtc-dynamics", "jtc-wire", "ucom", "jtc-core"];
-/// Crates whose tests judge the mutants of `ucom`: its board is also tested from the PC's side.
+/// Crates whose tests are run on the mutants of `ucom`. Its board is also tested from the PC's side.
 const JUDGES_OF_UCOM: [&str; 3] = ["ucom", "ucom-sim", "ucom-host"];
-/// Largest share of a crate's mutants that may survive, explained or not.
+/// Largest share of a crate's mutants that may survive, including explained ones.
 const SURVIVING_MAX: f64 = 0.03;
 
 /// Results of the mutants of a crate.
 #[derive(Default)]
 struct Tally {
     killed: usize,
-    /// Number of mutants that made a test run without end, which counts as a failure of the test.
+    /// Number of mutants with which a test ran without end. This is treated as a failure of the test.
     endless: usize,
     equivalent: usize,
     unexplained: Vec<String>,
@@ -134,7 +134,7 @@ fn results(package: &str) -> PathBuf {
     target().join("mutants").join(package)
 }
 
-/// Runs cargo-gamma for one crate; its exit code depends on the mutants and is judged from its report.
+/// Runs cargo-gamma for one crate. Its exit code depends on the mutants, so the result is judged from its report.
 fn campaign(package: &str, which: Which) -> Result<()> {
     let results = results(package);
     create_dir_all(&results).with_context(|| format!("cannot create {}", results.display()))?;
@@ -169,7 +169,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     }
     println!("== {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
-    // Exit code 2: too many mutants survived.
+    // Exit code 2 means that too many mutants survived. This is not an error here.
     ensure!(
         matches!(status.code(), Some(0 | 2)),
         "cargo-gamma ended with {status}; go on with `cargo xtask prove mutants --package {package} --resume`"
@@ -189,7 +189,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Copies the outcomes of the mutants that were run again.
+/// Copies the outcomes of the mutants that were run again into the whole report.
 fn update(whole: &mut Value, part: &Value) {
     let mut statuses = BTreeMap::new();
     for mutant in part["files"].as_object().into_iter().flatten().flat_map(|(_, file)| mutants(file)) {
@@ -257,7 +257,7 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Returns the table with a row for each crate. A crate without results on this computer keeps its row of the page.
+/// Returns the table with a row for each crate. A crate without results on this computer keeps its present row.
 fn table(tallies: &BTreeMap<&str, (Tally, String)>, before: &str) -> String {
     let mut table = String::from(
         "| crate | mutants | killed | never ended | equivalent | unexplained | alive | commit |\n\
@@ -283,7 +283,7 @@ fn table(tallies: &BTreeMap<&str, (Tally, String)>, before: &str) -> String {
     table
 }
 
-/// Returns the tested commit.
+/// Returns the name of the tested commit.
 pub(super) fn commit() -> Result<String> {
     Ok(shell::read(command("git").args(["rev-parse", "--short=9", "HEAD"]))?.trim().to_owned())
 }

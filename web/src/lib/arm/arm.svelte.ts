@@ -11,15 +11,15 @@ import { freeNumber } from './numbers.ts';
 import type { ArmEntry, Controller, InfoObject, JobObject, PayloadObject, Points, Pose, ProblemObject, Status, TrajectoryObject } from './types.ts';
 import { eventWords, isMoving, isPaused, jobWords, stateWords, type StateWords, whatStopDid } from './words.ts';
 
-/** Columns of the history: time, then six of each quantity. */
+/** First column of each quantity in the history. Column 0 is the time, and each quantity has six columns. */
 export const COLUMN = { position: 1, velocity: 7, torque: 13, temperature: 19, commanded: 25, error: 31 } as const;
 const COLUMNS = 37;
 /** Number of stored rows: ten minutes at 25 Hz. */
 const ROWS = 15_000;
-/** Shortest period of displayed text, ms. */
+/** Shortest interval between two updates of displayed text, ms. */
 const READ_MS = 120;
 
-/** A job as its events report it. */
+/** A job, according to its events. */
 export interface Course {
   number: number;
   what: string;
@@ -84,9 +84,9 @@ export class ArmPage {
   /** Joint under the pointer, from 1. */
   pointed = $state<number | undefined>(undefined);
   explained = $state<string | undefined>(undefined);
-  /** The page asks for the arm, before it recovers. */
+  /** True while the page asks which arm this is, before it recovers the arm. */
   asksArm = $state(false);
-  /** An opened arm file, to be compared and given. */
+  /** An arm file that the user has opened, to compare it or to send it to the controller. */
   armFile = $state.raw<{ name: string; text: string } | undefined>(undefined);
   /** Result of the last Stop that was sent. */
   #did = $state('');
@@ -106,7 +106,7 @@ export class ArmPage {
     return stateWords(this.controller, course, this.info?.missing ?? []);
   });
   readonly canCommand = $derived(this.session.role === 'operator' && this.session.fresh);
-  /** The controller lacks friction, gains or model. */
+  /** True if the controller lacks friction, gains or model. */
   readonly lacksArm = $derived((this.info?.missing.length ?? 0) > 0);
   readonly isRunning = $derived(this.course !== undefined && this.course.stage !== 'ended');
 
@@ -120,7 +120,7 @@ export class ArmPage {
     this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';
   }
 
-  /** Called with each status, and with undefined without a current status. */
+  /** Calls `handler` with each status, and with undefined if there is no current status. */
   onFrame(handler: (controller: Controller | undefined) => void): () => void {
     this.#frames.push(handler);
     return () => this.#frames.splice(this.#frames.indexOf(handler), 1);
@@ -144,7 +144,7 @@ export class ArmPage {
   }
 
   async stop(): Promise<void> {
-    // Before all other steps; the messages follow.
+    // The Stop is sent before all other steps. The messages follow.
     const sent = this.session.stop();
     const controller = this.latest;
     const moved = isMoving(controller) || isPaused(controller) || this.words?.tone === 'move';
@@ -172,7 +172,7 @@ export class ArmPage {
   #take(status: Status): void {
     if (status.agent !== this.#agent) {
       this.#agent = status.agent;
-      // The new agent has other jobs; the current one is requested.
+      // The new agent has other jobs, so the current job is requested.
       this.course = undefined;
       this.#stop = undefined;
       void this.refresh();
@@ -195,7 +195,7 @@ export class ArmPage {
   #lose(): void {
     this.latest = undefined;
     this.controller = undefined;
-    // A gap in the plots instead of a line.
+    // The plots show a gap instead of a line.
     if (this.history.length > 0) this.history.push([Date.now() / 1000, ...new Array<number>(COLUMNS - 1).fill(NaN)]);
     for (const frame of this.#frames) frame(undefined);
   }
@@ -256,7 +256,7 @@ export class ArmPage {
       if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
       else if (outcome === 'finished') this.session.toast({ tone: 'good', title: jobWords(job.what), text: 'Finished.' });
     } catch {
-      // The log has the event; the figures come with the next request for the job.
+      // An error is ignored: the log has the event, and the figures come with the next request for the job.
     }
   }
 
@@ -311,7 +311,8 @@ export class ArmPage {
     });
   }
 
-  /** Returns a free number for a new trajectory; with `new` the agent refuses it if another client has used it meanwhile. */
+  /** Returns a free number for a new trajectory. If the request contains `new`, the agent refuses the number if another
+   * client has used it meanwhile. */
   async freeNumber(): Promise<number> {
     await this.readTrajectories();
     return freeNumber(this.trajectories);

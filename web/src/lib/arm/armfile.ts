@@ -3,13 +3,13 @@ import { parse, type Table, type Value } from './toml.ts';
 
 /** A difference between two arm files. */
 export interface Difference {
-  /** "joint 2, pid.kp": joints counted from 1. */
+  /** Place in the file, such as "joint 2, pid.kp". Joints are counted from 1. */
   place: string;
   board: string;
   file: string;
 }
 
-/** The controller's numbers have single precision: closer values count as equal. */
+/** Relative difference below which two values are equal, because the controller's numbers have single precision. */
 const SAME = 2e-6;
 const NAMED = new Set(['joint', 'link']);
 
@@ -69,10 +69,11 @@ function compare(board: Value | undefined, file: Value | undefined, place: strin
   out.push({ place: place.replaceAll(/ (\d+)\./g, ' $1, '), board: shown(board), file: shown(file) });
 }
 
-/** Keys that never reach the controller: a difference in them is not a difference of the arm. */
+/** Keys that are never sent to the controller. A difference in them is not a difference of the arm. */
 const NOT_GIVEN = new Set(['poses', 'format']);
 
-/** Returns the differences between two arm files in the data of the controller. Throws TomlError for invalid TOML. */
+/** Returns the differences between two arm files in the data that the controller uses. Throws TomlError for invalid
+ * TOML. */
 export function differences(board: string, file: string): Difference[] {
   const [a, b] = [parse(board), parse(file)];
   for (const key of NOT_GIVEN) {
@@ -101,7 +102,7 @@ export function gainsOf(text: string): Gains[] {
   });
 }
 
-/** Returns the file with other gains of a joint (from 1); all other text is unchanged, comments included. */
+/** Returns the file with other gains of a joint (from 1). All other text is unchanged, including comments. */
 export function withGains(text: string, joint: number, gains: Gains): string {
   const parts = text.split(/^(?=\[\[joint\]\])/m);
   // The text before the first joint is a separate part, unless it is empty.

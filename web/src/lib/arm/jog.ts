@@ -1,18 +1,19 @@
-// Jogging with a dead man's switch: rates are sent while a key is held, zeros when the key is released by any cause.
+// Jogging with a dead man's switch: rates are sent while a key is held, and zeros when the key is released for any
+// reason.
 
-/** Period of sent rates, ms: a rate holds for 200 ms. */
+/** Interval of sent rates, ms. A rate acts for 200 ms. */
 export const PERIOD_MS = 90;
 /** Longest wait for the answer to a request, ms. */
 const LATE_MS = 1000;
-/** Suspension of the page above which the state of the key is unknown, ms. */
+/** Duration of a suspension of the page above which the state of the key is unknown, ms. */
 const ASLEEP_MS = 450;
 
 export interface JogLine {
-  /** Sends rates; resolves when the agent has accepted them. Zeros end a jog, and are accepted from every client. */
+  /** Sends rates. Resolves when the agent has accepted them. Zeros end a jog and are accepted from every client. */
   send(rates: number[]): Promise<unknown>;
-  /** The request was refused, and is not repeated; `after`: the key had been released by then. */
+  /** Called if the request was refused. It is not repeated. `after`: the key had been released by then. */
   refused(error: unknown, after: boolean): void;
-  /** The page was suspended while a key was held; the key counts as released. */
+  /** Called if the page was suspended while a key was held. The key is treated as released. */
   slept(): void;
   every(act: () => void, ms: number): unknown;
   never(handle: unknown): void;
@@ -38,7 +39,7 @@ export class Jogger {
     return this.#rates !== undefined;
   }
 
-  /** Presses a key: one joint, rad/s. */
+  /** Presses a key, which moves one joint at `rate` (rad/s). */
   press(joint: number, rate: number): void {
     this.release();
     const rates = new Array<number>(6).fill(0);
@@ -50,7 +51,8 @@ export class Jogger {
     this.#timer = this.#line.every(() => this.#tick(), PERIOD_MS);
   }
 
-  /** Releases the key: also if the pointer, the window or the connection is lost. Without a pressed key no request is sent. */
+  /** Releases the key. Also called if the pointer, the window or the connection is lost. Without a pressed key no request is
+   * sent. */
   release(): void {
     if (!this.#rates) return;
     this.#end();
@@ -58,7 +60,7 @@ export class Jogger {
   }
 
   #zeros(): void {
-    // At most one request, and another one after it, because it may have been overtaken.
+    // At most one request with zeros is open. Another one follows, because rates may have overtaken the first one.
     if (this.#ending) {
       this.#again = true;
       return;
@@ -68,7 +70,7 @@ export class Jogger {
     this.#line
       .send(new Array<number>(6).fill(0))
       .catch(() => {
-        // Rates hold for 200 ms only: without an answer the arm stops by itself.
+        // An error is ignored: rates act only for 200 ms, so without further requests the arm stops by itself.
       })
       .finally(() => {
         this.#ending = false;
@@ -96,7 +98,8 @@ export class Jogger {
   #send(): void {
     const rates = this.#rates;
     if (!rates) return;
-    // At most one request: the agent refuses a second one, and a slow line does not fill with old ones.
+    // At most one request with rates is open. The agent refuses a second one, and a slow line must not fill up with old
+    // requests.
     if (this.#open > 0 && this.#line.now() - this.#sentAt < LATE_MS) return;
     const turn = this.#turn;
     this.#open += 1;
@@ -104,7 +107,8 @@ export class Jogger {
     this.#line.send(rates).then(
       () => {
         this.#open -= 1;
-        // Released while these rates were on their way: zeros may have overtaken them, or were refused because of them.
+        // The key was released while these rates were being sent. The zeros may have overtaken them, or were refused
+        // because of them, so zeros are sent again.
         if (turn !== this.#turn && !this.#rates) this.#zeros();
       },
       (error: unknown) => {

@@ -1,4 +1,5 @@
-// The arm's geometry: from joint positions to frames. Frames are URDF's: origin in the parent, rpy about fixed axes, joints turn about z.
+// The arm's geometry: computes frames from joint positions. Frames are defined like in a URDF: origin in the parent frame, and rpy about
+// fixed axes. Joints rotate about z.
 
 export interface JointModel {
   joint: number;
@@ -44,7 +45,7 @@ export function multiply(a: Frame, b: Frame): Frame {
   return out;
 }
 
-/** Rz(yaw) · Ry(pitch) · Rx(roll), at xyz. */
+/** Returns the frame with the rotation Rz(yaw) · Ry(pitch) · Rx(roll) and the origin xyz. */
 export function frameOf(xyz: Vector, [roll, pitch, yaw]: Vector): Frame {
   const [cr, sr, cp, sp, cy, sy] = [
     Math.cos(roll), Math.sin(roll), Math.cos(pitch), Math.sin(pitch), Math.cos(yaw), Math.sin(yaw),
@@ -71,7 +72,7 @@ export function transform(frame: Frame, [x, y, z]: Vector): Vector {
   return [row(0), row(1), row(2)];
 }
 
-/** Frames of the joints, turned, and of the flange, in that of the base. */
+/** Returns the frames of the rotated joints and of the flange, in the frame of the base. */
 export function forward(model: ArmModel, q: readonly number[]): Frame[] {
   const frames: Frame[] = [];
   let frame = frameOf([0, 0, 0], [0, 0, 0]);
@@ -88,7 +89,7 @@ export function flange(model: ArmModel, q: readonly number[]): Frame {
   return frames[frames.length - 1] ?? frameOf([0, 0, 0], [0, 0, 0]);
 }
 
-/** Roll, pitch, yaw of a frame about fixed axes, rad. */
+/** Returns roll, pitch and yaw of a frame about fixed axes, rad. */
 export function rpy(frame: Frame): Vector {
   const [r00, r10, r20, r21, r22] = [frame[0] ?? 1, frame[4] ?? 0, frame[8] ?? 0, frame[9] ?? 0, frame[10] ?? 1];
   const pitch = Math.atan2(-r20, Math.hypot(r00, r10));
@@ -96,11 +97,11 @@ export function rpy(frame: Frame): Vector {
   return [Math.atan2(r21, r22), pitch, Math.atan2(r10, r00)];
 }
 
-/** Orientation of a frame as a quaternion: x, y, z, w, with w not negative. */
+/** Returns the orientation of a frame as a quaternion x, y, z, w. w is not negative. */
 export function quaternion(frame: Frame): [number, number, number, number] {
   const at = (r: number, c: number) => frame[4 * r + c] ?? 0;
   const trace = at(0, 0) + at(1, 1) + at(2, 2);
-  // From the largest of its parts, so that no small one is divided by (Shepperd 1978).
+  // The computation begins with the largest component, so that it never divides by a small one (Shepperd 1978).
   const parts = [at(0, 0), at(1, 1), at(2, 2), trace];
   const k = parts.indexOf(Math.max(...parts));
   const q: [number, number, number, number] = [0, 0, 0, 0];
@@ -117,13 +118,13 @@ export function quaternion(frame: Frame): [number, number, number, number] {
   return q.map((value) => value / length) as [number, number, number, number];
 }
 
-/** Approximate reach of the arm, m: the sum of its links. */
+/** Returns the approximate reach of the arm, m: the sum of its link lengths. */
 export function reach(model: ArmModel): number {
   const lengths = [...model.joints.map((joint) => joint.origin_xyz_m), model.flange.origin_xyz_m].map((xyz) => Math.hypot(...xyz));
   return lengths.reduce((sum, length) => sum + length, 0);
 }
 
-/** Distance of a joint from the nearer limit: 0 at the limit, 1 in the middle of its range. */
+/** Returns the distance of a joint from the nearer limit: 0 at the limit, 1 in the middle of its range. */
 export function room(joint: JointModel, q: number): number {
   const half = (joint.position_max_rad - joint.position_min_rad) / 2;
   return Math.min(q - joint.position_min_rad, joint.position_max_rad - q) / half;

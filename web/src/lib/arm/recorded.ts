@@ -1,4 +1,4 @@
-// The flight recorder's data for plots: 1000 rows a second.
+// The flight recorder's data for plots: 1000 rows per second.
 import type { LogValues } from './types.ts';
 
 const COLUMNS = { position: 'position_rad', velocity: 'velocity_rad_s', torque: 'torque_nm', error: 'error_rad' } as const;
@@ -10,7 +10,8 @@ export function isRecorded(quantity: string): quantity is Recorded {
   return quantity in COLUMNS;
 }
 
-/** Time, then a column for each joint, from 1; then the commanded values, if requested. Each value times `scale`. */
+/** Returns the columns of a plot: the time, then a column for each joint (from 1), then the commanded values if
+ * requested. All values are multiplied by `scale`. */
 export function columnsOf(log: LogValues, quantity: Recorded, joints: readonly number[], scale: number, commanded: boolean): (number | null)[][] {
   const scaled = (column: readonly (number | null)[] | undefined) => (column ?? []).map((value) => (value === null ? null : value * scale));
   const of = (key: keyof LogValues['joints'][number]) => joints.map((joint) => scaled(log.joints[joint - 1]?.[key]));

@@ -1,4 +1,4 @@
-// Rows of waypoint files: written in the columns, the units and the separator of the file's own header, as the agent reads them.
+// Rows of waypoint files. They have the columns, units and separator of the file's header, so that the agent can read them.
 import { type ArmModel, flange, place, quaternion, rpy } from './kinematics.ts';
 
 /** A pose to add as a row. */
@@ -9,9 +9,9 @@ export interface Waypoint {
   pose?: string | undefined;
 }
 
-/** A row, or the reason why the file cannot take it. */
+/** A row, or the reason why it cannot be added to the file. */
 export type Row = { row: string } | { problem: string };
-/** The file with the row, or the reason why it cannot take it. */
+/** The file with the row, or the reason why the row cannot be added. */
 export type Added = { text: string; row: string } | { problem: string };
 
 const JOINTS = ['q1', 'q2', 'q3', 'q4', 'q5', 'q6'];
@@ -22,7 +22,7 @@ const ANGLES = new Set([...JOINTS, ...RPY]);
 /** Other names of columns. */
 const ALSO = new Map([['t', 't'], ['t_s', 't'], ['time', 't'], ['time_s', 't'], ['pose', 'pose'], ['name', 'pose'], ['leg', 'leg']]);
 const LENGTHS = new Set([...XYZ, ...QUATERNION]);
-/** A number as in a file, not the name of a column. */
+/** Pattern of a number in a file, in contrast to the name of a column. */
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
 interface Column {
@@ -30,7 +30,7 @@ interface Column {
   unit: 'rad' | 'deg' | undefined;
 }
 
-/** The first line that is neither blank nor a comment. */
+/** Returns the first line that is neither blank nor a comment. */
 function first(text: string): string | undefined {
   return text
     .replace(/^\uFEFF/, '')
@@ -52,7 +52,7 @@ function column(cell: string): Column | undefined {
   return ANGLES.has(name) ? { name, unit: unit as Column['unit'] } : undefined;
 }
 
-/** Returns `true` if the header names the unit of an angle: the switch for degrees then does not apply. */
+/** Returns `true` if the header contains the unit of an angle. In this case the switch for degrees has no effect. */
 export function namesUnits(text: string): boolean {
   if (isJson(text)) return /"(q[1-6]|roll|pitch|yaw)_deg"/.test(text);
   return cells(first(text) ?? '').some((cell) => column(cell)?.unit !== undefined);
@@ -62,7 +62,8 @@ function isJson(text: string): boolean {
   return /^[\s\uFEFF]*[[{]/.test(text);
 }
 
-/** The waypoint as a row below the header of `text`. `degrees`: numbers whose unit the header does not name are degrees. `model`: for poses of the flange. */
+/** Returns the waypoint as a row below the header of `text`. `degrees`: numbers without a unit in the header are degrees. `model`: needed
+ * for poses of the flange. */
 export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model?: ArmModel): Row {
   if (isJson(text)) return { problem: 'These waypoints are JSON. Rows can be added to a table (CSV) only.' };
   const header = first(text);
@@ -76,7 +77,8 @@ export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model
     if (columns.some((each) => each.name === found.name)) return { problem: `The header has the column ${found.name} twice.` };
     columns.push(found);
   }
-  // Cells of t and leg stay empty: no time, and the leg as set by the switch for straight lines.
+  // The cells of `t` and `leg` stay empty. An empty `t` means no time. For an empty `leg`, the switch for straight
+  // lines decides.
   const filled = valuesFor(new Set(columns.map((each) => each.name)), waypoint, model);
   if ('problem' in filled) return filled;
   const out = columns.map(({ name, unit }) => {
@@ -85,12 +87,12 @@ export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model
     const inDegrees = ANGLES.has(name) && (unit === undefined ? degrees : unit === 'deg');
     return (inDegrees ? (value * 180) / Math.PI : value).toFixed(6);
   });
-  // Cells between spaces cannot be empty.
+  // With spaces as separator, a cell cannot be empty, so commas are used.
   const separator = /[;,]\s*/.exec(header)?.[0].replace(/\s+/, ' ') ?? (out.includes('') ? ',' : ' ');
   return { row: out.join(separator).trim() };
 }
 
-/** Numbers for the columns: joint positions, else the pose by its name, else the pose of the flange. */
+/** Returns the values for the columns: the joint positions, else the name of the pose, else the pose of the flange. */
 function valuesFor(has: Set<string>, waypoint: Waypoint, model: ArmModel | undefined): { values: Record<string, number | string> } | { problem: string } {
   const lacks = (names: readonly string[]) => names.filter((name) => !has.has(name));
   const any = (names: readonly string[]) => lacks(names).length < names.length;
@@ -114,7 +116,7 @@ function valuesFor(has: Set<string>, waypoint: Waypoint, model: ArmModel | undef
   return { values: Object.fromEntries([...XYZ, ...orientation].map((name, i) => [name, numbers[i] ?? NaN])) };
 }
 
-/** The file with a row for the waypoint as its last. A file without a header gets one. */
+/** Returns the file with a row for the waypoint as its last row. A file without a header gets one. */
 export function withRow(text: string, waypoint: Waypoint, degrees: boolean, model?: ArmModel): Added {
   const made = rowFor(text, waypoint, degrees, model);
   if ('problem' in made) return made;

@@ -1,4 +1,4 @@
-// Scene of the arm. Drawn only after a change; loaded only when shown.
+// 3D scene of the arm. It is drawn only after a change, and loaded only when it is shown.
 import {
   AmbientLight, ArrowHelper, BufferGeometry, CircleGeometry, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line,
   LineBasicMaterial, LineDashedMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D, PCFShadowMap, PerspectiveCamera, RingGeometry, Scene,
@@ -28,17 +28,17 @@ export interface Shown {
   limits: boolean;
   trail: boolean;
   path: boolean;
-  /** Limits of all joints, and the direction of gravity. */
+  /** True: shows the limits of all joints, and the direction of gravity. */
   all: boolean;
 }
 
-/** Renderer of the scene: a test has no WebGL. */
+/** Renderer of the scene. Tests replace it, because they have no WebGL. */
 export type Renderer = Pick<WebGLRenderer, 'render' | 'setPixelRatio' | 'setSize' | 'dispose' | 'shadowMap'>;
 
 const TRAIL = 400;
 /** Distance between commanded and measured position above which the ghost is shown, rad. */
 const APART_RAD = 0.004;
-/** Share of half its range: a joint that is closer to a limit has its range shaded. */
+/** Distance to a limit, as a share of half the range. The range of a joint that is closer to a limit is shaded. */
 const NEAR = 0.12;
 
 export class ArmScene {
@@ -63,7 +63,7 @@ export class ArmScene {
   readonly #payload = new Mesh(new SphereGeometry(1, 32, 20), new MeshStandardMaterial({ transparent: true, opacity: 0.75, roughness: 0.5 }));
   #trailPoints: Vector[] = [];
   #q: number[] = [];
-  /** Joint positions of the ghost, and its visibility: a new body takes them over. */
+  /** Joint positions of the ghost, and its visibility. They are kept for a new body. */
   #ghostQ: number[] = [];
   #ghostShown = false;
   #palette: Palette;
@@ -72,7 +72,7 @@ export class ArmScene {
   #pointed: number | undefined;
   #asked = false;
   #lost = false;
-  /** Number of drawn pictures: for tests of idleness. */
+  /** Number of drawn pictures, for tests that no picture is drawn without a change. */
   drawn = 0;
 
   constructor(canvas: HTMLCanvasElement, palette: Palette, renderer: Renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' })) {
@@ -96,7 +96,7 @@ export class ArmScene {
     this.view('home');
   }
 
-  /** Draws in the next frame, once for any number of requests. */
+  /** Requests a picture in the next frame. Several requests give one picture. */
   ask(): void {
     if (this.#asked) return;
     this.#asked = true;
@@ -112,7 +112,7 @@ export class ArmScene {
     this.#renderer.setPixelRatio(Math.min(ratio, 2));
     this.#renderer.setSize(width, height, false);
     this.#camera.aspect = width / height;
-    // A tall picture shows the whole width of the arm, too.
+    // In a tall picture the field of view is larger, so that it shows the whole width of the arm.
     this.#camera.fov = width < height ? 32 * Math.min(1.8, height / width) : 32;
     this.#camera.updateProjectionMatrix();
     this.ask();
@@ -132,7 +132,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** By keys: turns the camera around the arm. */
+  /** Rotates the camera around the arm, when keys are pressed. */
   turn(across: number, up: number, zoom = 1): void {
     const offset = this.#camera.position.clone().sub(this.#controls.target);
     const radius = offset.length() / zoom;
@@ -194,7 +194,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Turns the joints of both bodies to the known positions. */
+  /** Rotates the joints of both bodies to the known positions. */
   #pose(): void {
     this.#body?.joints.forEach((joint, i) => (joint.rotation.z = this.#q[i] ?? 0));
     if (!this.#ghost) return;
@@ -202,7 +202,7 @@ export class ArmScene {
     this.#ghost.root.visible = this.#ghostShown;
   }
 
-  /** Measured positions; undefined: unknown, the arm is drawn faint in its last pose. */
+  /** Sets the measured positions. Undefined: the positions are unknown, and the arm is drawn faint in its last pose. */
   setMeasured(q: readonly number[] | undefined): void {
     if ((q === undefined) !== this.#lost) {
       this.#lost = q === undefined;
@@ -223,7 +223,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Target pose of the arm: drawn if it differs from the current pose. */
+  /** Sets the ghost, which shows the target pose. It is drawn if it differs from the current pose. */
   setGhost(q: readonly number[] | undefined, always = false): void {
     const apart = q?.some((value, i) => Math.abs(value - (this.#q[i] ?? value)) > APART_RAD) ?? false;
     const visible = q !== undefined && (apart || always);
@@ -246,7 +246,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Path of the flange, and places of problems on it. */
+  /** Sets the path of the flange, and the places of problems on it. */
   setPath(points: readonly Vector[] | undefined, places: readonly { at: Vector; warning: boolean }[] = []): void {
     this.#path.geometry.dispose();
     this.#path.geometry = new BufferGeometry().setFromPoints((points ?? []).map((point) => new Vector3(...point)));
@@ -263,7 +263,7 @@ export class ArmScene {
 
   setPayload(mass_kg: number, com_m: readonly number[]): void {
     this.#payload.visible = mass_kg > 0;
-    // As large as a ball of that mass with a density of 2.7 kg a litre.
+    // The payload is drawn as large as a ball of its mass with a density of 2.7 kg per litre.
     this.#payload.scale.setScalar(Math.cbrt((3 * Math.max(mass_kg, 1e-3)) / (4 * Math.PI * 2700)));
     this.#payload.position.set(com_m[0] ?? 0, com_m[1] ?? 0, com_m[2] ?? 0);
     this.ask();
@@ -275,7 +275,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Joint angles of the bodies as drawn, rad, and the centre of the payload in the frame of the base, m: for tests. */
+  /** For tests: joint angles of the drawn bodies, rad, and the centre of the payload in the frame of the base, m. */
   get posed(): { measured: number[]; ghost: number[]; ghostShown: boolean; lost: boolean; payload: Vector } {
     const angles = (body: Body | undefined) => body?.joints.map((joint) => joint.rotation.z) ?? [];
     const payload = this.#payload.getWorldPosition(new Vector3()).toArray() as Vector;
@@ -326,7 +326,7 @@ export class ArmScene {
     this.#scene.add(floor);
   }
 
-  /** Range of each joint as a sector about its axis, with a needle at its position. */
+  /** Draws the range of each joint as a sector about its axis, with a needle at its position. */
   #shadeLimits(model: ArmModel): void {
     this.#limits = [];
     this.#needles = [];
@@ -356,7 +356,7 @@ export class ArmScene {
     });
   }
 
-  /** Colours and visibility, by the pose of the arm. */
+  /** Sets colours and visibility according to the pose of the arm. */
   #dress(): void {
     const model = this.#model;
     if (!model) return;

@@ -1,4 +1,5 @@
-// The arm's body, drawn from its kinematic chain alone: housings about the joint axes, links between them. No meshes.
+// The arm's body, drawn only from its kinematic chain, without meshes: housings about the joint axes, and links between
+// them.
 import {
   BufferGeometry, CapsuleGeometry, CylinderGeometry, Group, LatheGeometry, type Material, Matrix4, Mesh, Quaternion, SphereGeometry, TorusGeometry, Vector2,
   Vector3,
@@ -11,7 +12,7 @@ export interface Materials {
   link: Material;
   ring: (joint: number) => Material;
   metal: Material;
-  /** Covers of the housings' ends. */
+  /** Material of the covers at the ends of the housings. */
   cap: Material;
 }
 
@@ -19,12 +20,12 @@ export function matrix(frame: Frame): Matrix4 {
   return new Matrix4().set(...(frame as Parameters<Matrix4['set']>));
 }
 
-/** Radius of a joint's housing, m: gears of more torque are larger. */
+/** Returns the radius of a joint's housing, m. Gears for a higher torque are larger. */
 export function housingRadius(torque_nm: number): number {
   return 0.0122 * Math.cbrt(Math.max(torque_nm, 8));
 }
 
-/** A cylinder with rounded edges along z, from `low` to `high`. */
+/** Returns a cylinder with rounded edges along z, from `low` to `high`. */
 function rounded(radius: number, low: number, high: number): BufferGeometry {
   const edge = Math.min(radius * 0.28, (high - low) / 2);
   const profile = [new Vector2(0, low)];
@@ -40,7 +41,7 @@ function rounded(radius: number, low: number, high: number): BufferGeometry {
   return new LatheGeometry(profile, 40).rotateX(Math.PI / 2);
 }
 
-/** A tube from one place to another, with round ends; its radius changes from one value to the other. */
+/** Returns a tube with round ends from one place to another. Its radius changes from `radius` to `thin`. */
 function tube(from: Vector3, to: Vector3, radius: number, thin: number, material: Material): Group {
   const group = new Group();
   const way = to.clone().sub(from);
@@ -63,17 +64,17 @@ function tube(from: Vector3, to: Vector3, radius: number, thin: number, material
   return group;
 }
 
-/** All parts that move with the joints, as nested groups: joint groups are turned about z. */
+/** All parts that move with the joints, as nested groups. The groups of joints are rotated about z. */
 export interface Body {
   root: Group;
-  /** Turned about z by the joint's position. */
+  /** Groups that are rotated about z by the position of their joint. */
   joints: Group[];
-  /** Frame of a joint before it turns: its limits are drawn here. */
+  /** Frame of each joint before its rotation. The limits are drawn in this frame. */
   mounts: Group[];
   flange: Group;
 }
 
-/** The body of an arm. `plain`: without rings and plates, for ghosts. */
+/** Returns the body of an arm. `plain`: without rings and plates, for ghosts. */
 export function bodyOf(model: ArmModel, materials: Materials, plain = false): Body {
   const root = new Group();
   const [joints, mounts]: [Group[], Group[]] = [[], []];
@@ -99,7 +100,7 @@ export function bodyOf(model: ArmModel, materials: Materials, plain = false): Bo
     const radius = radii[i] ?? 0.04;
     const thin = radii[i + 1] ?? radius * 0.8;
     const aside = asideOf(model, i, to);
-    // The housing reaches from the joint's own place to the plane of the link.
+    // The housing extends from the origin of the joint to the plane of the link.
     const [low, high] = [Math.min(0, aside) - radius * 0.85, Math.max(0, aside) + radius * 0.85];
     turned.add(new Mesh(rounded(radius, low, high), materials.housing));
     if (!plain) {
@@ -130,7 +131,8 @@ export function bodyOf(model: ArmModel, materials: Materials, plain = false): Bo
   return { root, joints, mounts, flange };
 }
 
-/** Offset of a link from its axis' origin, m along the axis: the offset of its mass, for a link between parallel axes. */
+/** Returns the offset of a link from the origin of its joint along the axis, m. For a link between parallel axes, this is
+ * the offset of its centre of mass. */
 function asideOf(model: ArmModel, i: number, to: Vector3): number {
   const across = Math.hypot(to.x, to.y);
   const com = model.links[i + 1]?.com_xyz_m ?? [0, 0, 0];
@@ -141,14 +143,14 @@ function linkOf(parent: Group, to: Vector3, aside: number, radius: number, thin:
   const across = Math.hypot(to.x, to.y);
   if (to.length() < 0.02) return;
   if (across > 0.2) {
-    // Two axes side by side: a straight tube in the plane of the masses, and a housing at its far end.
+    // For two parallel axes: a straight tube in the plane of the masses, and a housing at its far end.
     const [from, end] = [new Vector3(0, 0, aside), new Vector3(to.x, to.y, aside)];
     parent.add(tube(from, end, radius * 0.8, Math.max(thin * 0.86, radius * 0.62), material));
     const back = new Mesh(rounded(thin * 0.96, Math.min(aside, to.z) - thin * 0.78, Math.max(aside, to.z) + thin * 0.78), material);
     back.position.set(to.x, to.y, 0);
     parent.add(back);
   } else {
-    // Along the axis first, then across: an elbow.
+    // The link is an elbow: first along the axis, then across.
     const r = Math.min(radius, thin) * 0.9;
     const knee = new Vector3(0, 0, to.z);
     if (Math.abs(to.z) > 0.01) parent.add(tube(new Vector3(0, 0, 0), knee, radius * 0.86, r, material));

@@ -1,13 +1,15 @@
-// Points recorded while the arm was guided by hand, and their reduction to few points.
+// Points that were recorded while the arm was guided by hand, and their reduction to few waypoints.
 
 export interface Sample {
   t: number;
   q: number[];
 }
 
-/** Largest distance of a joint between a sample and the nearest place on the line between two others, rad. */
+/** Returns the largest distance of a joint, rad, between a sample and the nearest place on the line between two other
+ * samples. */
 function aside(sample: Sample, from: Sample, to: Sample): number {
-  // By the nearest place on the line in joint space, not by time: the speed of a hand is irrelevant for the path.
+  // The nearest place on the line in joint space is used, not the place at the same time, because the speed of the hand
+  // is irrelevant for the path.
   const way = to.q.map((value, i) => value - (from.q[i] ?? 0));
   const length = way.reduce((sum, value) => sum + value * value, 0);
   const along = sample.q.reduce((sum, value, i) => sum + (value - (from.q[i] ?? 0)) * (way[i] ?? 0), 0);
@@ -38,7 +40,7 @@ export function thin(samples: readonly Sample[], tolerance: number): Sample[] {
   return samples.filter((_, i) => keep[i]);
 }
 
-/** Removes repeated samples while the arm stood still. */
+/** Removes the repeated samples of an arm at rest. */
 export function moved(samples: readonly Sample[], least = 0.002): Sample[] {
   const out: Sample[] = [];
   for (const sample of samples) {

@@ -1,5 +1,5 @@
 // The part of TOML that arm files use: tables, arrays of tables, inline tables, arrays over several lines, comments.
-// For display and comparison; the agent decides how the controller uses an arm file.
+// It is used for display and comparison only. The agent itself reads the arm files that are sent to the controller.
 
 export type Value = string | number | boolean | Value[] | Table;
 export interface Table {
@@ -34,7 +34,7 @@ class Reader {
     return this.text.charAt(this.at);
   }
 
-  /** Skips blanks and comments; line ends too, if the value continues on the next line. */
+  /** Skips blanks and comments. If the value continues on the next line, also skips line ends. */
   skip(lines: boolean): void {
     for (; !this.end; this.at += 1) {
       const c = this.peek();
@@ -146,7 +146,7 @@ function descend(table: Table, keys: readonly string[]): Table {
   return at;
 }
 
-/** Reads TOML. Throws TomlError with the line. */
+/** Parses TOML. Throws a TomlError that contains the line. */
 export function parse(text: string): Table {
   const reader = new Reader(text);
   const root: Table = {};

@@ -1,4 +1,4 @@
-// Tests of gains: a joint moves a step and back; its errors meanwhile, next to those of earlier tests.
+// Tests of gains. A joint moves by a step and back, and its errors are compared with the errors of earlier tests.
 import type { Gains } from './armfile.ts';
 import type { JointResult } from './types.ts';
 
@@ -10,22 +10,23 @@ export interface Figures {
 export interface Trial {
   joint: number;
   gains: Gains;
-  /** s since 1970. */
+  /** Start of the test, s since 1970. */
   start: number;
   times: number[];
-  /** rad; null if unknown. */
+  /** Errors, rad; null if unknown. */
   errors: (number | null)[];
   figures: Figures | undefined;
 }
 
-/** The worse of two motions. */
+/** Returns the worse figures of two motions. */
 export function figuresOf(result: JointResult | undefined, before: Figures | undefined): Figures | undefined {
   const [max, rms] = [result?.max_error_mrad, result?.rms_error_mrad];
   if (typeof max !== 'number' || typeof rms !== 'number') return before;
   return { max: Math.max(max, before?.max ?? 0), rms: Math.max(rms, before?.rms ?? 0) };
 }
 
-/** The errors of several tests over the time since each one's first motion, mrad, as columns with one time. */
+/** Returns the errors of several tests in mrad, as columns with a common time. The time counts from the first motion of
+ * each test. */
 export function overlay(trials: readonly Trial[]): (number | null)[][] {
   const rows = new Map<number, (number | null)[]>();
   trials.forEach((trial, k) => {
@@ -33,7 +34,7 @@ export function overlay(trials: readonly Trial[]): (number | null)[][] {
     trial.times.forEach((time, i) => {
       const error = trial.errors[i];
       if (error == null) return;
-      // At least 40 ms apart: rounded to that, tests share their times.
+      // Samples are at least 40 ms apart. Times are rounded to 40 ms, so that the tests have common times.
       const at = Math.round((time - first) / 0.04) * 0.04;
       const row = rows.get(at) ?? new Array<number | null>(trials.length).fill(null);
       row[k] = error * 1000;

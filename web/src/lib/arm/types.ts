@@ -1,4 +1,4 @@
-// Objects of the agent's API with the names of the page.
+// Objects of the agent's API, under the names that the page uses.
 import type { ControllerObject, Happening, PageObject, PointsObject, PoseObject, StatusObject } from './api-types.ts';
 import type { Entry } from '../connection.ts';
 
@@ -9,7 +9,7 @@ export type {
 
 export type Controller = ControllerObject;
 export type Status = StatusObject;
-/** Points of a stored trajectory; a trajectory that only this page has is without a digest. */
+/** Points of a trajectory. A trajectory that is not stored on the agent has no digest. */
 export type Points = Omit<PointsObject, 'digest'> & { digest?: string };
 export type Pose = PoseObject;
 export type Page = PageObject;

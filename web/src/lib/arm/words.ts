@@ -7,7 +7,7 @@ export type Step = 'recover' | 'acknowledge' | 'which-arm' | 'resume' | 'teach-o
 
 export interface Cause {
   words: string;
-  /** For `explain`. */
+  /** Code that `explain` accepts. */
   code: string;
 }
 
@@ -26,21 +26,22 @@ function sentence(words: string): string {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
-/** Current errors, the most specific first: the cause of a held stop, then the error bits. `explain` accepts each unchanged. */
+/** Returns the current errors, the most specific first: the cause of a held stop, then the error bits. `explain` accepts each
+ * of them unchanged. */
 export function causesOf(controller: Controller): Cause[] {
   const stop = controller.held_stop;
   const found = stop ? [{ words: sentence(stop.text), code: stop.code }] : [];
   return [...found, ...controller.causes.map((words) => ({ words: sentence(words), code: words }))];
 }
 
-/** Next step after a held stop, in the words of the agent. */
+/** Returns the next step after a held stop, in the words of the agent. */
 function afterHeldStop({ held_stop: stop }: Controller): string {
   if (!stop) return 'Remove what it met, or set its payload, then acknowledge. Nothing moves until then.';
   const remedy = sentence(stop.remedy);
   return stop.kind === 'encoder-jump' ? `${remedy}.` : `${remedy}, then acknowledge. Nothing moves until then.`;
 }
 
-/** Joints that are set absent: under torque no other drive is in Start. */
+/** Returns the joints that are declared absent. Under torque, only drives of absent joints are in Start. */
 export function absent(controller: Controller): number[] {
   const powered = ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
   return powered ? controller.joints.filter((joint) => joint.state === 'Start').map((joint) => joint.joint) : [];
@@ -50,22 +51,22 @@ export function hasTorque(controller: Controller | null | undefined): boolean {
   return controller != null && ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
 }
 
-/** Drives that are not enabled yet, from 1: the controller holds its position with the enabled ones. */
+/** Returns the drives that are not enabled yet, from 1. The controller holds the position with the enabled drives. */
 export function enabling(controller: Controller): number[] {
   return controller.joints.filter((joint) => joint.state !== 'OperationEnable' && joint.state !== 'Start').map((joint) => joint.joint);
 }
 
-/** The controller stopped the arm because of an error, and holds it under torque (J-69). */
+/** Returns true if the controller has stopped the arm because of an error and holds it under torque (J-69). */
 export function isHeldStop(controller: Controller): boolean {
   return hasTorque(controller) && controller.error_codes.join() === 'internal-joint-error';
 }
 
-/** The arm can be guided by hand from here, also in a held stop. */
+/** Returns true if teaching can begin in this state. A held stop is such a state. */
 export function canBeTaught(controller: Controller | null | undefined): boolean {
   return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0;
 }
 
-/** Every present joint is held: a motion can begin. */
+/** Returns true if a motion can begin, because every joint that is not absent is held. */
 export function isHeld(controller: Controller | null | undefined): boolean {
   return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0 && controller.errors.length === 0;
 }
@@ -78,13 +79,14 @@ export function isPaused(controller: Controller | null | undefined): boolean {
   return controller != null && controller.trajectory === 'Pause';
 }
 
-/** Reason why no joint can be jogged; empty: jogging is possible. `job` is the running job and its stage. */
+/** Returns the reason why no joint can be jogged. Empty: jogging is possible. `job` is the running job and its stage.
+ * */
 export function noJog(controller: Controller | undefined, job?: { what: string; stage: 'begun' | 'uploading' | 'executing' }): string {
   if (!controller) return 'The state of the arm is not known.';
   if ((controller.state === 'HoldPos' || controller.state === 'Operate') && controller.errors.length === 0) {
     const stop = 'or press Stop';
     if (isPaused(controller)) return `A motion is paused. Resume it and wait until it has ended, ${stop}.`;
-    // TransNullToStop: only older controllers report it.
+    // Only older controllers report TransNullToStop.
     if (job?.stage === 'uploading' || controller.trajectory === 'TransNullToStop') return `A motion is being uploaded. Wait until it has ended, ${stop}.`;
     if (job) return `${jobWords(job.what)} is ${job.stage === 'begun' ? 'being prepared' : 'running'}. Wait until it has ended, ${stop}.`;
     if (isMoving(controller)) return `A motion is running. Wait until it has ended, ${stop}.`;
@@ -94,7 +96,8 @@ export function noJog(controller: Controller | undefined, job?: { what: string; 
   return `Jogging needs the arm to hold position. ${word}: ${next || detail}`;
 }
 
-/** Question before a controller without parameters uses its defaults: their origin, and the risk if the arm is another. */
+/** Returns the question that is asked before a controller without parameters uses its defaults. It explains the origin of
+ * the defaults, and the risk if the arm is a different one. */
 export function defaultsWords(info: Pick<InfoObject, 'arm' | 'defaults_stored'> | undefined, simulated: boolean): { question: string; used: string; risk: string; button: string } {
   const name = info?.arm || 'the built-in arm';
   const [stored, known] = [info?.defaults_stored ?? false, name === info?.arm];
@@ -110,14 +113,15 @@ export function defaultsWords(info: Pick<InfoObject, 'arm' | 'defaults_stored'> 
   };
 }
 
-/** Fastest joint, rad/s. */
+/** Returns the speed of the fastest joint, rad/s. */
 export function fastest(controller: Controller): number {
   return Math.max(...controller.joints.map((joint) => Math.abs(joint.velocity_rad_s ?? 0)));
 }
 
 const MOVES_RAD_S = 0.01;
 
-/** `job` is the current job as text; `missing` are parameters that the controller lacks. */
+/** Returns the texts of a state. `job` is the current job as text. `missing` are the parameters that the controller
+ * lacks. */
 export function stateWords(controller: Controller, job: string | undefined, missing: readonly string[]): StateWords {
   const causes = causesOf(controller);
   const base = { causes, next: '' };
@@ -186,7 +190,7 @@ export function stateWords(controller: Controller, job: string | undefined, miss
   }
 }
 
-/** Effect of Stop, from the state when it was touched and the current state. */
+/** Returns the effect of a Stop as text, from the state when the user touched Stop and the current state. */
 export function whatStopDid(before: string | undefined, wasMoving: boolean, now: Controller | undefined | null, tookMs: number): string {
   const took = `${(tookMs / 1000).toFixed(1)} s`;
   if (!now) return 'Stop was sent. No status has come since.';
@@ -196,12 +200,12 @@ export function whatStopDid(before: string | undefined, wasMoving: boolean, now:
   return isMoving(now) ? 'Stop was sent: the arm decelerates on its path.' : `Stopped on the path in ${took}; ${held}.`;
 }
 
-/** Returns a sentence for the event's name of a job, such as "recover". */
+/** Returns a sentence for the name of a job in events, such as "recover". */
 export function jobWords(what: string): string {
   return sentence(what);
 }
 
-/** Returns an event as text; undefined for events without a line. */
+/** Returns an event as text. Undefined: the event is not shown. */
 export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {
   const of = 'job' in event ? `job ${event.job}` : '';
   const line = (text: string, tone: EventTone = 'info', whose = of) => ({ text, tone, of: whose });

@@ -9,9 +9,9 @@ import { boardWords, busWords, type BusWords, eventWords, jobResult, jobWords, s
 
 /** Number of stored rows of a board's outputs: two minutes at 25 Hz. */
 const ROWS = 3000;
-/** Shortest period of displayed text, ms. */
+/** Shortest interval between two updates of displayed text, ms. */
 const READ_MS = 120;
-/** Age above which outputs count as outdated, ms; the agent reports it from half a second on. */
+/** Age above which outputs are shown as outdated, ms. The agent reports ages above half a second. */
 const OLD_MS = 900;
 const TICK_MS = 250;
 
@@ -26,19 +26,19 @@ const DRIVEN: Driven = {
   left: 'When this browser goes (closed, hidden for 10 s, network gone), boards that it has started',
 };
 
-/** A job as its events report it. */
+/** A job, according to its events. */
 export interface Course {
   number: number;
   what: string;
   client: string;
   own: boolean;
   over: boolean;
-  /** For an update: boards that get the image now, and the progress. */
+  /** For an update: the boards that receive the image now, and the progress. */
   progress: { boards: number[]; attempt: number; cycle: number; bytes: number; total: number } | undefined;
   notes: string[];
 }
 
-/** A board, its time of reception, and the time of its last heartbeat, by this browser's clock. */
+/** A board, the time at which this state was received, and the time of its last heartbeat, by this browser's clock. */
 export interface BoardView {
   board: BoardObject;
   at: number;
@@ -50,7 +50,7 @@ export type Tab = 'boards' | 'board' | 'update' | 'doctor' | 'jobs' | 'log';
 /** Questions before a command. */
 export type Question = { what: 'init' } | { what: 'run' } | { what: 'reset'; board: number };
 
-/** States of boards that are safe without a lease holder. */
+/** States in which a board is safe even if no client holds the lease. */
 const AT_REST = new Set(['exloader', 'programming']);
 
 const KEY = Symbol('chain');
@@ -62,13 +62,13 @@ export class ChainPage {
   tab = $state<Tab>('boards');
   chosen = $state<number | undefined>(undefined);
   views = $state.raw<BoardView[]>([]);
-  /** The shown boards are current. */
+  /** True if the shown boards are current. */
   known = $state(false);
-  /** The newest values of each board; replaced a few times a second. */
+  /** The newest values of each board. The map is replaced a few times a second. */
   values = $state.raw<ReadonlyMap<number, { values: Values; at: number }>>(new Map());
   course = $state<Course | undefined>(undefined);
   jobs = $state.raw<JobObject[]>([]);
-  /** Result of the last Stop that was sent: confirmed by the boards or not. */
+  /** Result of the last Stop that was sent, with or without confirmation of the boards. */
   #did = $state<{ text: string; failed: boolean }>({ text: '', failed: false });
   readonly stopWords = $derived.by(() => {
     const { phase, text } = this.session.stopState;
@@ -76,18 +76,18 @@ export class ChainPage {
   });
   readonly stopFailed = $derived(this.session.stopState.phase === 'failed' || (this.session.stopState.phase !== 'sending' && this.#did.failed));
   question = $state<Question | undefined>(undefined);
-  /** performance.now(), a few times a second: for ages. */
+  /** Value of performance.now(), updated a few times a second. Ages are computed with it. */
   now = $state(performance.now());
-  /** Counts Stops of all clients: waiting values are dropped. */
+  /** Number of Stops of all clients. When it changes, waiting values are dropped. */
   halts = $state(0);
-  /** A result of a scan or of numbering that is not closed yet. */
+  /** Result of a scan or of numbering that the user has not closed yet. */
   found = $state.raw<JobObject | undefined>(undefined);
 
   readonly #newest = new Map<number, { values: Values; at: number }>();
   readonly #traces = new Map<number, { names: string; history: History; last: number }>();
   #read = 0;
   #agent = '';
-  /** This agent has sent its boards. */
+  /** True if this agent has sent its boards. */
   #boardsKnown = false;
   #stop: { at: number; ran: boolean } | undefined;
   #stopTimer: ReturnType<typeof setTimeout> | undefined;
@@ -112,7 +112,8 @@ export class ChainPage {
     this.session.onMissed(() => void this.readJobs());
     // A lost board may be running.
     this.session.isAtRest = () => this.known && this.#boardsKnown && !this.isRunning && this.boards.every((board) => AT_REST.has(board.state));
-    // Boards of this page stop when its lease expires: the lease lasts while the boards run and the page is visible.
+    // Boards that this page has started stop when its lease expires. So the page renews the lease while the boards run
+    // and the page is visible.
     this.session.isBusy = () => this.session.leasePhase === 'held' && (this.runs || ((this.course?.own ?? false) && !this.course?.over));
   }
 
@@ -137,15 +138,16 @@ export class ChainPage {
     return !this.known || !of || of.values.stale || (of.values.age_s ?? Infinity) * 1000 + (this.now - of.at) > OLD_MS;
   }
 
-  /** The last minutes of the outputs of a board: time, then one column each. */
+  /** Returns the last minutes of the outputs of a board: the time, then a column for each output. */
   trace(number: number): History | undefined {
     return this.#traces.get(number)?.history;
   }
 
-  /** Sends a command; a refusal is a message on the page. `ends`: moves no board, and is executed after a Stop, too. */
+  /** Sends a command. A refusal is shown as a message. `ends`: the command moves no board and is executed even after a
+   * Stop. */
   async command<T = unknown>(what: string, method: string, path: string, body?: unknown, ends = false): Promise<{ value: T } | undefined> {
-    // Boards answer in sequence, and a running job first ends its own operation.
-    // After a Stop that this page had not yet shown, a command has no effect, even if it arrives late.
+    // The timeout is long, because boards answer in sequence and a running job first ends its own operation. After a
+    // Stop that this page had not yet shown, a command has no effect, even if it arrives late.
     return this.session.command<T>(what, method, path, { ...(body === undefined ? {} : { body }), moves: !ends, ends, within: 30_000 });
   }
 
@@ -159,7 +161,7 @@ export class ChainPage {
   }
 
   async stop(): Promise<void> {
-    // Before all other steps; the messages follow.
+    // The Stop is sent before all other steps. The messages follow.
     const sent = this.session.stop();
     const at = this.session.stopState.at;
     this.halts += 1;
@@ -221,7 +223,7 @@ export class ChainPage {
     this.views = boards.map((board) => {
       const beat = board.heartbeat_age_s == null ? undefined : at - board.heartbeat_age_s * 1000;
       const last = before.get(board.number)?.beat;
-      // The same heartbeat, received twice: the times differ by the delay of the messages.
+      // If the times differ only by the delay of the messages, this is the same heartbeat, received twice.
       return { board, at, beat: beat !== undefined && last !== undefined && Math.abs(beat - last) < BEAT_MS ? last : beat };
     });
     if (this.chosen === undefined || !boards.some((board) => board.number === this.chosen)) this.chosen = boards[0]?.number;
@@ -246,7 +248,7 @@ export class ChainPage {
       this.#traces.set(values.board, trace);
     }
     const row = values.outputs.map((output) => (typeof output.value === 'number' ? output.value : typeof output.value === 'boolean' ? Number(output.value) : NaN));
-    // A delayed message does not put a value before an earlier one.
+    // The times always increase, so that a delayed message does not put a value before an earlier one.
     trace.last = Math.max(trace.last + 0.001, Date.now() / 1000 - (values.age_s ?? 0));
     trace.history.push([trace.last, ...row]);
   }
@@ -255,7 +257,7 @@ export class ChainPage {
   #lose(): void {
     this.known = false;
     this.halts += 1;
-    // A gap in the plots instead of a line.
+    // The plots show a gap instead of a line.
     for (const trace of this.#traces.values()) {
       const row = new Array<number>(trace.history.channels).fill(NaN);
       row[0] = trace.last = Math.max(trace.last + 0.001, Date.now() / 1000);
@@ -301,7 +303,7 @@ export class ChainPage {
         break;
       }
       case 'state': {
-        // Inputs and outputs of another start are invalid for this one.
+        // Inputs and outputs from before a restart are no longer valid.
         const view = this.view(event.board);
         if (view && event.state === 'exloader' && this.#newest.delete(event.board)) this.values = new Map(this.#newest);
         break;
@@ -315,7 +317,8 @@ export class ChainPage {
     if (!job) return;
     if (job.chain) this.found = job;
     const own = this.course?.number === number && this.course.own;
-    // A user already knows of a cancelled job, and the outcome of an update is shown on the update page.
+    // No message is shown for a cancelled job, which the user already knows about, or for an update while the update
+    // page shows its outcome.
     if (!own || job.stage === 'cancelled' || (job.update && this.tab === 'update')) return;
     if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
     else if (job.stage === 'finished' && !job.chain) this.session.toast({ tone: 'good', title: jobWords(job.what), text: jobResult(job) });
@@ -331,7 +334,7 @@ export class ChainPage {
     }
   }
 
-  /** Reads the values of a board that sends none: a board with unknown names is asked itself. */
+  /** Reads the values of a board that sends none. If the agent does not know its names, it asks the board itself. */
   async readValues(number: number): Promise<void> {
     await this.session.attempt(`Values of board ${number}`, async () => {
       const values = await this.session.api.get<Values>(`/api/boards/${number}/values`);
@@ -340,7 +343,7 @@ export class ChainPage {
     });
   }
 
-  /** Shows inputs and parameters at once, as confirmed by the agent. */
+  /** Shows inputs and parameters at once when the agent has confirmed them. */
   confirm(number: number, list: 'inputs' | 'parameters', value: Values['inputs'][number]): void {
     const old = this.#newest.get(number);
     if (!old) return;
@@ -349,7 +352,7 @@ export class ChainPage {
     this.values = new Map(this.#newest);
   }
 
-  /** Returns the state of a board as text; an unknown state is shown as unknown. */
+  /** Returns the state of a board as text. An outdated state is shown as unknown. */
   boardWords(board: BoardObject): ReturnType<typeof boardWords> {
     return this.known ? boardWords(board) : { tone: 'lost', word: 'Not known', detail: 'Nothing is received from the agent.' };
   }

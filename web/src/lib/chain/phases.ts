@@ -1,8 +1,8 @@
-// Progress of an update: an image is transferred twice, is checked, written, and read back.
+// Progress of an update. The image is transferred twice: to check it and to write it. Then it is read back.
 import type { Course } from './chain.svelte.ts';
 
 export interface Phase {
-  /** 0: checked, 1: written, 2: read back. */
+  /** Current phase. 0: the image is checked, 1: it is written, 2: it is read back. */
   at: number;
   /** Share of the whole transfer to these boards, 0 to 1. */
   share: number;

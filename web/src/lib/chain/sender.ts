@@ -1,4 +1,4 @@
-// Sends an input while a slider is moved: the newest value, at a limited rate, one request at a time.
+// Sends an input while a slider is moved. Sends the newest value at a limited rate, one request at a time.
 
 export interface Wires<T> {
   send(value: T): Promise<void>;
@@ -30,7 +30,7 @@ export class Sender<T> {
     this.#go();
   }
 
-  /** Drops the waiting value: after a Stop, and if the state is unknown. */
+  /** Drops the waiting value. Called after a Stop, and if the state is unknown. */
   drop(): void {
     this.#next = undefined;
     this.#wires.never(this.#timer);
@@ -54,13 +54,13 @@ export class Sender<T> {
     void this.#wires
       .send(value)
       .catch((error: unknown) => {
-        // The rest of the same drag would be refused as well.
+        // Later values of the same drag would be refused as well.
         this.#next = undefined;
         this.#wires.refused(error);
       })
       .finally(() => {
         this.#sending = false;
-        // Counted from its end: the first request may have taken the lease before.
+        // The interval begins at the end of the request, because the first request may have taken the lease before.
         this.#sent = this.#wires.now();
         if (!this.#next) this.#wires.changed(false);
         this.#go();

@@ -2,27 +2,27 @@
 import { number, parse } from '../format.ts';
 import type { Value } from './types.ts';
 
-/** "position [0.01 deg]": boards put the step of the word in brackets. */
+/** Splits a name such as "position [0.01 deg]". Boards put the step of the word in brackets. */
 export function nameParts(name: string): { name: string; step: string } {
   const found = /^(.*?)\s*\[([^\]]*)\]\s*$/.exec(name);
   return found ? { name: found[1] ?? name, step: found[2] ?? '' } : { name, step: '' };
 }
 
-/** The unit of a value, by the signal table, or the step of its word as the board names it. */
+/** Returns the unit of a value from the signal table, or else the step of its word that the board has sent. */
 export function unitWords(value: Value): string {
   if (value.unit) return value.unit;
   const { step } = nameParts(value.name);
   return step === '' ? '' : /^[\d.]/.test(step) ? `× ${step}` : step;
 }
 
-/** A number in a text of the agent, with a true minus sign. */
+/** Returns a number from a text of the agent with a true minus sign. */
 export function minus(text: string): string {
   return text.replace(/^-(?=[\d.])/, '\u2212');
 }
 
 export type Form = 'number' | 'switch' | 'word';
 
-/** Returns how a value is set: bits of the signal table are not a number. */
+/** Returns the form in which a value is set. Bits of the signal table are not a number. */
 export function formOf(value: Value): Form {
   if (typeof value.value === 'boolean') return 'switch';
   return typeof value.value === 'string' ? 'word' : 'number';
@@ -44,7 +44,8 @@ export function stepOf(min: number, max: number, whole: boolean): number {
 
 const WORD = { min: -32768, max: 65535 };
 
-/** Range of a slider. Without a table it is a small part of the range of a word, so that a touch does not send the largest value. */
+/** Returns the range of a slider. Without a signal table it is a small part of the range of a word, so that a touch does not send
+ * the largest value. */
 export function rangeOf(value: Value, chosen: { min: number; max: number } | undefined): Range {
   const whole = !value.unit;
   const of = (min: number, max: number, by: Range['by']): Range => ({ min, max, step: stepOf(min, max, whole), by });
@@ -59,18 +60,19 @@ export function digitsOf(step: number): number {
   return Math.max(0, Math.min(6, -Math.floor(Math.log10(step) + 1e-9)));
 }
 
-/** A number with its unit, for people. */
+/** Returns a number with its unit, for display. */
 export function text(value: number, step: number, unit: string | null | undefined): string {
   return `${number(value, digitsOf(step))}${unit ? ` ${unit}` : ''}`;
 }
 
-/** Returns a number as the agent expects it: with its unit, if there is one, because a bare number could mean another value. */
+/** Returns a number in the form that the agent expects. If there is a unit it is included, because a number without a unit
+ * could mean another value. */
 export function given(value: number, step: number, unit: string | null | undefined): number | string {
   const plain = value.toFixed(digitsOf(step));
   return unit ? `${plain} ${unit}` : Number(plain);
 }
 
-/** Parses typed text: a number, or any other text that the agent understands, as 0x05DC, 15deg, on. */
+/** Parses typed text: a number, or any other text that the agent understands, such as 0x05DC, 15deg or on. */
 export function typed(input: string, unit: string | null | undefined): number | string | undefined {
   const trimmed = input.trim();
   if (trimmed === '') return undefined;

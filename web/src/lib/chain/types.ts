@@ -1,5 +1,4 @@
-// Types of a chain's agent: those of its OpenAPI description, and the messages of its stream, which OpenAPI does not
-// cover.
+// Types of a chain's agent, from its OpenAPI description, and the messages of its stream, which OpenAPI does not cover.
 import type { Entry } from '../connection.ts';
 import type { SessionStatus } from '../session.svelte.ts';
 import type { BoardObject, Happening, StatusObject, ValueObject } from './api-types.ts';

@@ -1,4 +1,4 @@
-// The form of an update: kept while another tab is shown.
+// The form of an update. Its contents are kept while another tab is shown.
 import type { UpdateRequest } from './types.ts';
 
 export interface Picked {
@@ -7,7 +7,7 @@ export interface Picked {
   base64: string;
 }
 
-/** Largest image that the agent accepts, bytes; its base64 is a third larger. */
+/** Largest image that the agent accepts, bytes. The base64 text is a third larger. */
 export const SIZE_MOST = 1 << 20;
 
 export async function pick(file: File): Promise<Picked> {
@@ -17,12 +17,13 @@ export async function pick(file: File): Promise<Picked> {
   return { name: file.name, size: bytes.length, base64: btoa(text) };
 }
 
-/** Raw bytes are accepted only from a file with this ending: a text is never flashed as bytes by mistake. */
+/** Returns the format of a file. Raw bytes are accepted only with the ending `.bin`, so that a text is never flashed as
+ * raw bytes by mistake. */
 export function formatOf(name: string): UpdateRequest['format'] {
   return /\.bin$/i.test(name) ? 'bin' : undefined;
 }
 
-/** Parses a number, 0x4B3F or 19263; undefined if invalid. */
+/** Parses a number such as 0x4B3F or 19263. Undefined: the text is invalid. */
 export function word(text: string): number | undefined {
   const trimmed = text.trim();
   if (!/^(0x[0-9a-f]{1,4}|\d{1,5})$/i.test(trimmed)) return undefined;
@@ -32,7 +33,7 @@ export function word(text: string): number | undefined {
 
 class UpdateForm {
   boards = $state<number[]>([]);
-  /** Flash numbers of these boards when they were chosen: the boards with these numbers must still have them when the update is sent. */
+  /** Flash numbers of the boards when they were chosen. The boards must still have the same flash numbers when the update is sent. */
   #flash = new Map<number, number>();
   image = $state.raw<Picked | undefined>(undefined);
   second = $state.raw<Picked | undefined>(undefined);

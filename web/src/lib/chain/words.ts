@@ -7,7 +7,7 @@ export function hex(value: number | null | undefined, digits = 2): string {
   return value == null ? '–' : `0x${value.toString(16).toUpperCase().padStart(digits, '0')}`;
 }
 
-/** "board 3", "boards 1, 2 and 7". */
+/** Returns a list of boards as text, such as "board 3" or "boards 1, 2 and 7". */
 export function boardList(numbers: readonly number[]): string {
   if (numbers.length === 0) return 'no board';
   if (numbers.length === 1) return `board ${numbers[0]}`;
@@ -58,7 +58,7 @@ export interface BusWords {
   step?: Step;
 }
 
-/** The bus and its boards, the worst first. */
+/** Returns the state of the bus and its boards as text. The worst problem takes precedence. */
 export function busWords(status: Status, boards: readonly BoardObject[], job: string | undefined): BusWords {
   const controller = status.controller;
   if (controller?.bus_off) {
@@ -165,7 +165,7 @@ export const OUTCOMES: Record<string, string> = {
   running: 'The application runs',
 };
 
-/** Result of a job, in one sentence. */
+/** Returns the result of a job in one sentence. */
 export function jobResult(job: JobObject): string {
   if (job.error) return job.error.message;
   if (job.stage === 'cancelled') return 'Cancelled.';
@@ -188,12 +188,12 @@ export function jobResult(job: JobObject): string {
   return job.stage === 'finished' ? 'Finished.' : job.stage === 'running' ? 'Goes on.' : 'Failed.';
 }
 
-/** Result of a Stop, as confirmed by boards. */
+/** Returns the result of a Stop, according to the confirmations of the boards. */
 export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran = true): { text: string; failed: boolean; why: string } {
   const { boards, not_stopped } = event;
   const done = boards.length === 0 ? '' : ran ? `Stopped: ${boardList(boards)} confirmed it.` : `Stop was sent. No board was running; ${boardList(boards)} confirmed it.`;
   if (not_stopped.length > 0) {
-    // The reasons are long, and the next step comes first.
+    // Only the boards are listed, because the reasons are long and the next step must come first.
     const which = not_stopped.map((each) => /^(board \d+):/.exec(each)?.[1] ?? each);
     const rest = boards.length === 0 ? 'No board confirmed it.' : `${count(boards.length, 'board')} confirmed it.`;
     return { text: `NOT STOPPED: ${which.join(', ')}. Use the emergency stop. ${rest}`, failed: true, why: not_stopped.join('; ') };
@@ -201,7 +201,7 @@ export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran
   return { text: done || 'Stop was sent. No board was running.', failed: false, why: '' };
 }
 
-/** Returns an event as text; undefined for events without a line. */
+/** Returns an event as text. Undefined: the event is not shown. */
 export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {
   const line = (text: string, tone: EventTone, of: string) => ({ text, tone, of });
   switch (event.kind) {

@@ -1,6 +1,7 @@
 //! Compares deny.toml, the file of cargo-deny with rules for licences, sources and bans, with cargo's resolution.
 //!
-//! cargo-deny itself takes minutes to install, too long for every test run; `cargo xtask dist` runs it. The checks here read the same file.
+//! The installation of cargo-deny takes minutes, which is too long for every test run. `cargo xtask dist` runs it. The checks here read the
+//! same file.
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

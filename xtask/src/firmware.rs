@@ -160,7 +160,7 @@ pub fn tests() -> Result<Outcome> {
     Ok(Outcome::Counted(counts, String::new()))
 }
 
-/// `arguments`: names of boards; without a name all boards.
+/// `arguments`: names of boards. Without a name, all boards are built.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let boards: Vec<&str> = match arguments {
         [] => BOARDS.to_vec(),

@@ -59,7 +59,7 @@ impl Shared {
     }
 }
 
-/// Marks the port as lost on drop, also after a panic of its thread.
+/// Marks the port as lost on drop, even after a panic of its thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {

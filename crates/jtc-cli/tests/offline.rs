@@ -35,7 +35,7 @@ fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
 }
 
-/// Options of every command may stand anywhere.
+/// Options that every command has may be typed anywhere.
 #[test]
 fn the_port_may_stand_before_the_command() {
     for words in [

@@ -114,7 +114,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm stands; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
-    // The message tells what the program may still do.
+    // The message tells which requests the program may still make.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
@@ -349,7 +349,7 @@ fn the_socket_of_a_program_that_was_killed_is_passed_over() {
     cell.stops(child);
 }
 
-/// The program is suspended (SIGSTOP): no frame can be sent, and the message names the emergency stop.
+/// The program is suspended (SIGSTOP): no frame can be sent, and the message mentions the emergency stop.
 #[test]
 fn a_program_that_does_not_answer_is_named() {
     let cell = Cell::held();

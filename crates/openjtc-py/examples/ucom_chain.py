@@ -1,6 +1,7 @@
 """Chain of UCoM boards: numbers the boards, examines them, drives them by name, and records a table.
 
-Without an argument the chain is a simulated head; an argument names a bus, such as socketcan:can0. **Joints move.**
+Without an argument the chain is a simulated head; an argument is the URL of a bus, such as socketcan:can0. **Joints
+move.**
 """
 
 import math

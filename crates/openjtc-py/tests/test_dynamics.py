@@ -173,7 +173,7 @@ def test_other_threads_run_meanwhile(arm):
 
 
 def right_angles(urdf):
-    """Rounds joint angles close to a right angle to that angle, as the package does."""
+    """Rounds joint angles close to a right angle to that angle, like the package."""
 
     def snap(text):
         angles = np.array([float(x) for x in text.split()])

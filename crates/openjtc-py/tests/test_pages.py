@@ -64,7 +64,7 @@ def run(source: str, names: dict[str, object], mode: str) -> tuple[str, bool]:
 
 
 def same(shown: str, printed: str, varying: bool) -> bool:
-    """Returns True if the output matches the page. ``[...]`` in the page stands for any text."""
+    """Returns True if the output matches the page. ``[...]`` in the page matches any text."""
 
     def prepared(text: str) -> str:
         if varying:

@@ -177,7 +177,7 @@ def test_the_plant_of_a_seed_is_the_arm_of_its_simulator():
     simulator.write(b"".join(encode.use_defaults()))
     while np.array_equal(simulator.position, about["start"]):
         simulator.step()
-    # The millisecond in which the drives were enabled is over, as in a new plant.
+    # The millisecond in which the drives were enabled is over, like in a new plant.
     plants = [Plant(Arm.avena(), seed=seed, **about) for seed in (11, 12)]
     for _ in range(500):
         simulator.step()

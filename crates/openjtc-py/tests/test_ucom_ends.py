@@ -34,7 +34,7 @@ SILENT_S = 2.5
 
 @pytest.fixture
 def patient(tmp_path: Path) -> Path:
-    """Returns a profile in which a board counts as lost only after 20 s of silence."""
+    """Returns a profile in which a board is considered lost only after 20 s of silence."""
     profile = tmp_path / "patient.toml"
     profile.write_text("alive.dsp_lost = 20000\n")
     return profile

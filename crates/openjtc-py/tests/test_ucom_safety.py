@@ -114,7 +114,8 @@ def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, 
         child.send_signal(signal.SIGINT)
     assert child.wait(30) == (-signal.SIGINT if how == "monitor" else 0)
     child.stdout.close()
-    # The program has stopped the boards: their applications have ended, too. Missing heartbeats would only end the control loops.
+    # The program itself has stopped the boards, because their applications have ended. Missing heartbeats would only end the
+    # control loops.
     assert not numbered_bus.started(1) and not numbered_bus.started(2)
     numbered_bus.wait(lambda: numbered_bus.came(ADMIN_TO + 1, ACTIVE, before))
     ran = numbered_bus.frames.index((ADMIN_TO + 1, ACTIVE), before)

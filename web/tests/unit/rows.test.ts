@@ -21,7 +21,7 @@ const model: ArmModel = {
   flange: { origin_xyz_m: [0, 0, 0.08], origin_rpy_rad: [0.2, 0, 0] },
 };
 
-/** Returns the cells of a row in their order, as the agent reads them. */
+/** Returns the cells of a row in their order, read in the same way as by the agent. */
 function read(row: string, separator: string): (number | string)[] {
   const cells = separator === ' ' ? row.trim().split(/\s+/) : row.split(separator).map((cell) => cell.trim());
   return cells.map((cell) => (cell === '' || Number.isNaN(Number(cell)) ? cell : Number(cell)));

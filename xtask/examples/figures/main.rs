@@ -1,7 +1,9 @@
-//! Measures figures that need several crates and prints lines `name value`, which `cargo xtask bench` adds to those of the crates.
+//! Measures figures that need several crates and prints lines `name value`, which `cargo xtask bench` adds to the figures of the
+//! crates.
 //!
 //! Run `figures [libm|tick|line|tracking|ucom|recording]` for all groups, or for one. Figures in virtual time are the same in every run.
-//! `figures recording-file FILE SECONDS` writes a recording like that of `recording`, of any length.
+//! `figures recording-file FILE SECONDS` writes a recording of any length, with the same contents as for the group
+//! `recording`.
 
 mod libm;
 mod line;

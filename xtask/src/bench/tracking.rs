@@ -1,4 +1,5 @@
-//! `cargo xtask bench tracking`: compares the control law with that of the existing firmware, and writes docs/tracking.md.
+//! `cargo xtask bench tracking`: compares our control law with the control law of the existing firmware, and writes
+//! docs/tracking.md.
 use std::process::ExitCode;
 
 use anyhow::Result;

@@ -47,7 +47,7 @@ pub enum Kind {
     All,
 }
 
-/// Returns the crates in the programs, the Python package and the boards' programs. The features are those of the whole workspace, so the
+/// Returns the crates in the programs, the Python package and the boards' programs. The features of the whole workspace are used, so the
 /// graph may contain more crates than a program, but never fewer.
 pub fn shipped() -> Result<Graph> {
     let mut graph = Graph::default();

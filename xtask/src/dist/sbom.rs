@@ -1,4 +1,4 @@
-//! Contents of a release, as a machine-readable bill of materials (CycloneDX 1.5, JSON).
+//! Machine-readable bill of materials of a release (CycloneDX 1.5, JSON).
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
 

@@ -54,7 +54,7 @@ pub struct Turn(#[expect(dead_code, reason = "held until it is over")] OwnedSema
 /// Reason why the session of a client cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unable {
-    /// The session is in use. The number is that of the job that uses it, if there is one.
+    /// The session is in use. Contains the number of the job that uses it, if there is one.
     Busy(Option<u64>),
     /// The line was lost, or the client was disconnected.
     Gone,

@@ -1,4 +1,4 @@
-//! Sending a complete arm to the controller, as a job.
+//! The job that sends a complete arm to the controller.
 use agent_kit::api::Problem;
 use jtc_host::session::{ArmPart, PushReport};
 use jtc_host::{Arm, Error, LinkError, Session};

@@ -169,7 +169,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         before_motion(self.task, &error)
     }
 
-    /// A Stop before the motion begins cancels the run, too: the person wants the arm to stay at rest.
+    /// A Stop before the motion begins also cancels the run, because the person wants the arm to stay at rest.
     fn is_cancelled(&mut self) -> bool {
         self.task.is_halted()
     }

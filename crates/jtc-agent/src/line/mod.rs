@@ -196,8 +196,8 @@ impl SharedLine {
             other.halts.stops += u64::from(command == ExecCommand::Stop);
         }
         self.halts.ask(asker, command);
-        // After a Stop the arm must hold its position. In Teaching it would be compliant, also if Teaching begins as soon as the
-        // arm is at rest.
+        // After a Stop the arm must hold its position. In Teaching it would be compliant. Teaching may also begin as soon as the
+        // arm is at rest, so it is ended in both cases.
         if self.moving.may_teach(self.status.as_ref()) {
             self.moving.end_teaching(now);
         }

@@ -12,7 +12,7 @@ use super::{LineEvent, POLICY, Policy, SharedLine};
 pub enum Moves {
     /// Upload of a trajectory. The arm is at rest, and a motion usually follows.
     Upload,
-    /// Motion, also a paused one.
+    /// Motion, including a paused motion.
     Motion,
     /// Teaching. The arm is led by hand, or may be led by hand soon.
     Teaching,

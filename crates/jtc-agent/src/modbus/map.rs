@@ -21,7 +21,7 @@ pub const FRESH: Duration = Duration::from_secs(1);
 /// Period of the heartbeat counter.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 
-/// Lease holder, as a connection sees it.
+/// Lease holder from the point of view of a connection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Holder {

@@ -88,7 +88,7 @@ impl Disk {
         self.send(Message::Begin(Box::new(info)), 0);
     }
 
-    /// Queues a sample; counts it as lost if the queue is full.
+    /// Queues a sample. If the queue is full, the sample is counted as lost.
     pub fn write(&mut self, sample: &Sample) {
         if !self.send(Message::Sample(Box::new(*sample)), RESERVED) {
             self.lost += 1;

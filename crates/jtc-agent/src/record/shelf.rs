@@ -319,8 +319,8 @@ mod tests {
         assert!(shelf.make_room(5000).is_empty() && others.exists());
     }
 
-    /// Whatever the computer's clock does, also between two agents, the oldest recording is removed first, and no
-    /// number is used twice.
+    /// Even if the computer's clock is changed, during an agent or between two agents, the oldest recording is removed
+    /// first and no number is used twice.
     #[test]
     fn the_oldest_are_those_that_were_made_first_whatever_the_clock_shows() {
         let dir = tempfile::tempdir().unwrap();

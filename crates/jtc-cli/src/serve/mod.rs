@@ -175,7 +175,7 @@ impl Server {
         self.world.limit_host_silence(silence.map(|silence| silence.as_micros() as u64));
     }
 
-    /// Passes statuses to the host. Without a host they are lost, as on a line with an open end.
+    /// Passes statuses to the host. Without a host they are lost, like on a line with an open end.
     fn give_output(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let mut buffer = [0; 1024];
         loop {

@@ -71,7 +71,7 @@ __all__ = [
 
 
 def example(name: str) -> Trajectory:
-    """Returns an example trajectory by its name: ``motion``, ``lines`` …. ``jtc example`` lists the names.
+    """Returns an example trajectory by its name: ``motion``, ``lines`` …; ``jtc example`` lists the names.
 
     Raises:
         UsageError: The name is unknown; the message lists the names.

@@ -77,9 +77,9 @@ def connect(
 ) -> Robot:
     """Connects to a controller.
 
-    The end of the program stops its motions, also at SIGTERM and SIGHUP: if the program has no handler for these signals, the first
-    connection in the main thread installs handlers that raise `SystemExit`. SIGKILL and a loss of power cannot be handled: on a serial
-    line the motion continues, but an agent stops the motion of a program that has disconnected.
+    The end of the program stops its motions. This includes an end by SIGTERM or SIGHUP: if the program has no handler for these
+    signals, the first connection in the main thread installs handlers that raise `SystemExit`. SIGKILL and a loss of power cannot be
+    handled: on a serial line the motion continues, but an agent stops the motion of a program that has disconnected.
 
     Args:
         target: ``sim:`` for a simulated controller, drives and arm in this process, which hold the arm at once; ``/dev/ttyUSB0`` for a

@@ -86,7 +86,7 @@ class Dynamics:
         return self._native.mass_matrix(q)
 
     def friction(self, qd: ArrayLike, temperature: ArrayLike = 25.0) -> Floats:
-        """Computes friction torques against the motion, as the controller compensates them.
+        """Computes the friction torques against the motion that the controller compensates.
 
         Args:
             qd: Velocities, rad/s.

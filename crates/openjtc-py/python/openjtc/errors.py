@@ -13,12 +13,15 @@ class Error(Exception):
 
     Attributes:
         message: The failed request, its place, value and limit.
-        code: Short name for programs. It is the same as in ``jtc``, if ``jtc`` has the same error. joint: Joint,
-        counted from 1; None if the error is not about one joint. point: Point of the trajectory, counted from 0; during
-        a motion the time on its path, ms. value: Value that was found, in the unit of the message. limit: Allowed
-        value, in the same unit. cause: Usual cause; empty if unknown. next: Next step that helps; empty if unknown.
-        board: Number of the UCoM board; None if the error is not about a single board. run: Run of a motion that ended
-        in this error; None for any other error.
+        code: Short name for programs. It is the same as in ``jtc``, if ``jtc`` has the same error.
+        joint: Joint, counted from 1; None if the error is not about one joint.
+        point: Point of the trajectory, counted from 0; during a motion the time on its path, ms.
+        value: Value that was found, in the unit of the message.
+        limit: Allowed value, in the same unit.
+        cause: Usual cause; empty if unknown.
+        next: Next step that helps; empty if unknown.
+        board: Number of the UCoM board; None if the error is not about a single board.
+        run: Run of a motion that ended in this error; None for any other error.
     """
 
     run: Run | None = None

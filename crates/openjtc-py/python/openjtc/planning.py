@@ -27,12 +27,15 @@ class Planner:
 
     Args:
         arm: The arm; None: the built-in one.
-        speed: Percent of the limits, 1 to 100. blend: Distance from a waypoint within which its corner may be rounded, rad of the joint
-        that is furthest away, 0.5 at most; 0: the arm stops at each waypoint. `through` also takes a blend in degrees. blend_m: Like
-        `blend`, for corners between lines and arcs of the flange, m, 0.5 at most. line: Moves the flange along a straight line to each
-        waypoint that does not set this itself. jerk: Also limits the jerk. temperature: Lowest bearing temperature for which friction
-        torque is planned, °C; None: 20, for a cold hall. payload: Payload at the flange. margin: Torque to leave for masses and friction
-        that the model does not know, percent of each limit, 0 to 50; None: 15.
+        speed: Percent of the limits, 1 to 100.
+        blend: Distance from a waypoint within which its corner may be rounded, rad of the joint that is furthest away, 0.5 at most; 0: the
+            arm stops at each waypoint. `through` also takes a blend in degrees.
+        blend_m: Like `blend`, for corners between lines and arcs of the flange, m, 0.5 at most.
+        line: Moves the flange along a straight line to each waypoint that does not set this itself.
+        jerk: Also limits the jerk.
+        temperature: Lowest bearing temperature for which friction torque is planned, °C; None: 20, for a cold hall.
+        payload: Payload at the flange.
+        margin: Torque to leave for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
     """
 
     def __init__(

@@ -264,14 +264,14 @@ class Robot(Connected):
         self._link.pause()
 
     def resume(self) -> None:
-        """Resumes after a pause, also after a pause by another program or by the controller. **The arm moves.**
+        """Resumes after a pause, even if another program or the controller has paused the motion. **The arm moves.**
 
         The end of the connection stops a motion that no thread of this program waits for any more.
         """
         self._link.resume()
 
     def stop(self) -> None:
-        """Stops the arm on its path and waits until it is at rest, also if another program moves it.
+        """Stops the arm on its path and waits until it is at rest, even if another program moves it.
 
         Earlier requests of all threads of this program are discarded. Teaching that was switched on here ends. The Stop is sent before
         all other frames. Stopping an arm that is already at rest is not an error.

@@ -116,16 +116,21 @@ class Simulator:
     """Simulated system of host line, real controller, joint bus, drives and arm, starting at power-on.
 
     Args:
-        arm: The arm; the controller has it stored if its file is complete. None: the built-in arm, and a new controller. seed: Seed of
-        all random numbers. payload: True payload of the arm. The controller does not know it until :func:`openjtc.control.encode.payload`
-        sends it. model_error: Difference between the true arm and its file; None: no difference. start: Positions at the start, rad;
-        None: 0, or near its limit for a joint that cannot reach 0. friction: Gives the joints the friction of the arm's file.
+        arm: The arm; the controller has it stored if its file is complete. None: the built-in arm, and a new controller.
+        seed: Seed of all random numbers.
+        payload: True payload of the arm. The controller does not know it until :func:`openjtc.control.encode.payload` sends it.
+        model_error: Difference between the true arm and its file; None: no difference.
+        start: Positions at the start, rad; None: 0, or near its limit for a joint that cannot reach 0.
+        friction: Gives the joints the friction of the arm's file.
         gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the
-        motor. over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit. support:
-        Support of the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they are first enabled, or ``"none"``.
-        baud: Rate of the serial line, bit/s; None: bytes take no time. answer_jitter_ms: Largest random delay of the drives' answers, ms.
-        faults: Faults and their times, as the text of a fault file (``jtc help faults``). watch: Keeps the inputs and outputs of the
-        controller for :attr:`inputs` and :attr:`outputs`.
+            motor.
+        over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
+        support: Support of the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they are first enabled, or
+            ``"none"``.
+        baud: Rate of the serial line, bit/s; None: bytes take no time.
+        answer_jitter_ms: Largest random delay of the drives' answers, ms.
+        faults: Faults and their times, as the text of a fault file (``jtc help faults``).
+        watch: Keeps the inputs and outputs of the controller for :attr:`inputs` and :attr:`outputs`.
 
     Raises:
         UsageError: An argument is not valid.

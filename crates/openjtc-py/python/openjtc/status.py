@@ -48,11 +48,17 @@ class Status:
     Attributes:
         state: State of the controller: ``Init``, ``HoldPos``, ``Operate``, ``Teaching``, ``Error`` …
         trajectory: State of its trajectory: ``Null``, ``Stop``, ``Pause``, ``Execute``, ``Finish`` …
-        point: Time on the path, ms. position: Measured positions (6,), rad. velocity: Measured velocities (6,), rad/s. torque:
-        Torques that the drives report (6,), N·m. temperature: Bearing temperatures (6,), °C. joint_states: State of each
-        drive. errors: Present errors, in words. warnings: Warnings of the drives. waiting_for: Present action or wait of the
-        controller, in one line. next: Next step that helps. held_stop: Present held stop with its cause; None: the arm is not
-        in a held stop, or the controller does not report it.
+        point: Time on the path, ms.
+        position: Measured positions (6,), rad.
+        velocity: Measured velocities (6,), rad/s.
+        torque: Torques that the drives report (6,), N·m.
+        temperature: Bearing temperatures (6,), °C.
+        joint_states: State of each drive.
+        errors: Present errors, in words.
+        warnings: Warnings of the drives.
+        waiting_for: Present action or wait of the controller, in one line.
+        next: Next step that helps.
+        held_stop: Present held stop with its cause; None: the arm is not in a held stop, or the controller does not report it.
     """
 
     state: str

@@ -70,7 +70,7 @@ pub struct Machine {
     pub named: bool,
     pub shared: Arc<Shared>,
     pub tape: Rc<Tape>,
-    /// `true` if time passes by itself, as on a real controller.
+    /// `true` if time passes by itself, like on a real controller.
     time_passes: bool,
     /// `true` if this connection switched teaching on, or may have done so.
     pub teaching: bool,

@@ -236,7 +236,7 @@ impl Link {
         })
     }
 
-    /// Stops the arm on its path, also if another program moves it, and waits for standstill. Discards all earlier requests.
+    /// Stops the arm on its path, even if another program moves it, and waits for standstill. Discards all earlier requests.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.worker.shared.stop();
         self.worker.call_always(py, Machine::stop)

@@ -15,7 +15,7 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// Starts recording, also to a sink if there is one. Earlier samples are kept.
+    /// Starts recording. If there is a sink, the samples are also passed to it. Earlier samples are kept.
     pub fn record(&self, sink: Option<SampleSink>) {
         self.on.set(true);
         self.zero.set(None);

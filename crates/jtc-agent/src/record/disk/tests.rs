@@ -89,7 +89,7 @@ fn recordings_stay_within_their_limit() {
     assert!(warned.len() == 1 && warned[0].contains("3 samples are missing"), "{warned:?}");
 }
 
-/// A full disk is reported once, and recording continues when there is space again, also in the middle of a motion.
+/// A full disk is reported once. When there is space again, recording continues, even in the middle of a motion.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_reported_once_and_recording_goes_on() {

@@ -67,7 +67,7 @@ pub(super) fn push(
     Ok(())
 }
 
-/// Describes what was sent.
+/// Describes a parameter that was sent.
 fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }

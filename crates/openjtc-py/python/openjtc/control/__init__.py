@@ -53,7 +53,7 @@ class Inputs:
         safety_input: Level of the safety input; True means no error.
         status_free: True if the serial transmitter can take a status.
         ticked: True if the tick occurs. False: the timer is late by a whole tick, so the controller only reads the bytes of the
-        host. After ten missing ticks in a row the watchdog resets the controller.
+            host. After ten missing ticks in a row the watchdog resets the controller.
     """
 
     bus: Sequence[Frame] = ()
@@ -89,7 +89,7 @@ class Controller:
 
     Args:
         arm: Stored arm of the controller, which :func:`openjtc.control.encode.use_defaults` selects. If the file of the arm is
-        incomplete, only the limits are set. None: a new controller, with the built-in arm.
+            incomplete, only the limits are set. None: a new controller, with the built-in arm.
     """
 
     def __init__(self, arm: Arm | None = None) -> None:

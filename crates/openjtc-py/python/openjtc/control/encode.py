@@ -29,8 +29,8 @@ __all__ = [
 
 
 def use_defaults() -> list[bytes]:
-    """Makes three frames that select the friction, model and gains of the controller's stored arm, or without one of
-    ``Arm.avena()``.
+    """Makes three frames that select the friction, model and gains of the controller's stored arm. Without a stored
+    arm, the values of ``Arm.avena()`` are used.
 
     Without parameters the controller does not power an arm.
     """

@@ -81,12 +81,14 @@ class BoardValues:
 
     Attributes:
         board: Number of the board.
-        time_s: Time at which its outputs arrived, s since the chain was opened; None: no outputs have arrived. age_s: Age of its
-        outputs, s; None: no outputs have arrived. stale: True if its outputs are outdated, because no outputs arrive or its
-        heartbeats are missing. outputs: Sensor outputs, in the order of the buffer. inputs: Inputs that were set last, or the
-        initial inputs of the board; None if neither is known. parameters: Parameters that this chain has written, because a board
-        cannot return its parameters. None: not written since the application started. units: Units by name, for signals whose
-        unit is in a signal table.
+        time_s: Time at which its outputs arrived, s since the chain was opened; None: no outputs have arrived.
+        age_s: Age of its outputs, s; None: no outputs have arrived.
+        stale: True if its outputs are outdated, because no outputs arrive or its heartbeats are missing.
+        outputs: Sensor outputs, in the order of the buffer.
+        inputs: Inputs that were set last, or the initial inputs of the board; None if neither is known.
+        parameters: Parameters that this chain has written, because a board cannot return its parameters. None: not written since the
+            application started.
+        units: Units by name, for signals whose unit is in a signal table.
     """
 
     board: int

@@ -147,7 +147,7 @@ class Chain(ValuesByName):
         board with its confirmation.
 
         The stop interrupts a call of another thread on this chain, which ends with the error ``cancelled``; an update continues.
-        Stopping is always allowed, also with another PC on the bus.
+        Stopping is always allowed, even with another PC on the bus.
 
         Args:
             boards: Boards to stop; ``all`` by broadcast.
@@ -189,10 +189,11 @@ class Chain(ValuesByName):
 
         Args:
             init: Also measures points that can be observed only while boards are numbered. This resets and numbers the
-            chain. alive: Starts a control loop with safe outputs to find out which heartbeats a board accepts, and
-            stops it again. image: Image of a board's present application, to find the checksum algorithm of Program
-            IDs. force: Continues even if another PC is on the bus, or if ``init`` or ``alive`` ends running control
-            loops.
+                chain.
+            alive: Starts a control loop with safe outputs to find out which heartbeats a board accepts, and stops it
+                again.
+            image: Image of a board's present application, to find the checksum algorithm of Program IDs.
+            force: Continues even if another PC is on the bus, or if ``init`` or ``alive`` ends running control loops.
 
         Raises:
             RefusedError: Control loops run (``running``), and ``init`` or ``alive`` would end them.
@@ -265,15 +266,17 @@ class Chain(ValuesByName):
             raw: Reads a file of any name as raw bytes; never records, and text only from a ``.bin``.
             addresses: Unit of the addresses in records, if the file does not show it.
             fill_gaps: Fills gaps between records with FF.
-            date: Flash date; None: today, UTC. A board that already has the program keeps its date. expect_program_id:
-            Program ID that the boards must show at the end. name_target: Writes the board into the header, so that any
-            other board refuses the image. group: Updates all boards with one transfer, by broadcast. start: Starts the
-            application at the end; closing the chain stops the application, as after `start`. dry_run: Only runs the
-            checks; no frame that changes a board is sent. unverified: Accepts boards that cannot be verified, also
-            ``program-up-to-date``. force: Continues even if boards run, another PC is on the bus, or the board already
-            has the program. rewrite: Updates a board that already has the program. All checks are still made. check:
-            Raises an error if a board was not updated; False: the failure is only in the report. progress: Function
-            that is called with each `Progress`; True: a line on a terminal's stderr.
+            date: Flash date; None: today, UTC. A board that already has the program keeps its date.
+            expect_program_id: Program ID that the boards must show at the end.
+            name_target: Writes the board into the header, so that any other board refuses the image.
+            group: Updates all boards with one transfer, by broadcast.
+            start: Starts the application at the end; closing the chain stops the application, as after `start`.
+            dry_run: Only runs the checks; no frame that changes a board is sent.
+            unverified: Accepts boards that cannot be verified, also ``program-up-to-date``.
+            force: Continues even if boards run, another PC is on the bus, or the board already has the program.
+            rewrite: Updates a board that already has the program. All checks are still made.
+            check: Raises an error if a board was not updated; False: the failure is only in the report.
+            progress: Function that is called with each `Progress`; True: a line on a terminal's stderr.
 
         Raises:
             RefusedError, NoLinkError, DeviceError: No board was erased.

@@ -46,7 +46,8 @@ class RunReport:
     Attributes:
         boards: Numbers of the boards whose control loops were started.
         active: True if their outputs are enabled: things move.
-        load_percent: Predicted bus load, % of the bit rate. load_limit_percent: Bus load that the profile allows, %.
+        load_percent: Predicted bus load, % of the bit rate.
+        load_limit_percent: Bus load that the profile allows, %.
     """
 
     boards: tuple[int, ...]
@@ -95,9 +96,10 @@ class Event:
         number: Number of the event, from 1.
         time_s: Time of the event, s since the chain was opened.
         kind: Heartbeats: ``late``, ``lost``, ``back``, ``rebooted``. Control loops: ``left-loop``, ``stopped-by-policy``,
-        ``in-loop``. Board: ``error``, ``text``. Bus: ``competing-master``, ``foreign``, ``number-shared``. Others:
-        ``updated``, with the result of an update for a board, and ``note``. board: Number of the board; None if the event is
-        about no board. text: Event in words.
+            ``in-loop``. Board: ``error``, ``text``. Bus: ``competing-master``, ``foreign``, ``number-shared``. Others:
+            ``updated``, with the result of an update for a board, and ``note``.
+        board: Number of the board; None if the event is about no board.
+        text: Event in words.
     """
 
     number: int
@@ -160,11 +162,14 @@ class UpdateResult:
         flash_number: Flash number of the board; None: the board did not answer.
         outcome: ``not-started``, ``cancelled``, ``up-to-date``, ``program-up-to-date``, ``incomplete``, ``unknown``, ``written``,
             ``verified`` or ``running``.
-        note: Remark about a board that already had the program; empty for any other board. verified: True if the board shows the
-        Program ID and date of the image, and exactly this image was written to this address: in this update, or in an earlier
-        one that the inventory records. before: Program ID and flash date before the update. Each is None without a valid
-        application or an answer. after: Program ID and flash date now. attempts: Number of attempts. time_s: Time from the
-        reset into the exloader to the last answer, s. error: Reason of the failure; empty after a success.
+        note: Remark about a board that already had the program; empty for any other board.
+        verified: True if the board shows the Program ID and date of the image, and exactly this image was written to this address:
+            in this update, or in an earlier one that the inventory records.
+        before: Program ID and flash date before the update. Each is None without a valid application or an answer.
+        after: Program ID and flash date now.
+        attempts: Number of attempts.
+        time_s: Time from the reset into the exloader to the last answer, s.
+        error: Reason of the failure; empty after a success.
     """
 
     board: int
@@ -188,8 +193,8 @@ class UpdateReport:
         program_id: Program ID that the boards must show; None: the Program ID is not known.
         flash_date: Flash date of the image, ``YYYY-MM-DD``; None: no header has a date.
         bytes: Bytes of both cycles.
-        unverifiable: Reason why the written image cannot be verified; None: the image is verified. boards: Results in
-        the order of board numbers.
+        unverifiable: Reason why the written image cannot be verified; None: the image is verified.
+        boards: Results in the order of board numbers.
     """
 
     dry_run: bool
@@ -221,8 +226,9 @@ class ProbeRow:
         key: Key of the profile.
         unknown: The open point.
         published: Statement of the published description about it.
-        observed: Observed behaviour of the boards. decision: Value in the profile. measured: True if the observation
-        decides the value; otherwise the earlier value is kept.
+        observed: Observed behaviour of the boards.
+        decision: Value in the profile.
+        measured: True if the observation decides the value; otherwise the earlier value is kept.
     """
 
     key: str
@@ -257,8 +263,9 @@ class ConformanceTest:
         board: Number of the board; None: the chain as a whole.
         expected: Expected behaviour.
         verdict: ``pass``, ``fail`` or ``skipped``.
-        why: Observed behaviour after a failure, or the reason why the test was skipped. sent: Sent frames, in the
-        format of candump. came: Received frames, at most 64.
+        why: Observed behaviour after a failure, or the reason why the test was skipped.
+        sent: Sent frames, in the format of candump.
+        came: Received frames, at most 64.
     """
 
     id: str

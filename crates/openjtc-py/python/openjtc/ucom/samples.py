@@ -22,9 +22,10 @@ class Sample:
     """All outputs of a board at one time.
 
     Attributes:
-        time_s: Time at which the last output arrived, s since the chain was opened. board: Number of the board.
-        outputs: Outputs by name, in the order of the buffer, in units if a signal table has them. missed: Number of
-        incomplete sets of outputs that were dropped since the previous sample.
+        time_s: Time at which the last output arrived, s since the chain was opened.
+        board: Number of the board.
+        outputs: Outputs by name, in the order of the buffer, in units if a signal table has them.
+        missed: Number of incomplete sets of outputs that were dropped since the previous sample.
     """
 
     time_s: float
@@ -58,7 +59,8 @@ class Monitor(Iterator[Sample]):
 
     Raises:
         FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); raised only
-        once. NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is lost.
+            once.
+        NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is lost.
     """
 
     def __init__(self, native: ChainSamples, seconds: float | None, count: int | None) -> None:

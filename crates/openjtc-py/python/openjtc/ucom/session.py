@@ -131,7 +131,8 @@ class Session:
 
         Args:
             path: File: ``.log`` for the format of candump, ``.fzi`` for FZI-CAN, ``.mcap`` for MCAP. The profile is written into the file
-            or next to it. overwrite: Overwrites an existing file.
+                or next to it.
+            overwrite: Overwrites an existing file.
         """
         if not overwrite and Path(path).exists():
             raise UsageError(f"{os.fspath(path)}: is there already", "exists", next="overwrite=True writes over it")

@@ -91,10 +91,11 @@ class ValuesByName(Session):
         them when its application ends.
 
         Args:
-            name: ``BOARD.NAME``, in upper or lower case, or the name alone if only one board has this signal. value: A
-            number, ``"15.5 deg"``, a word ``"0x05DC"``, or a switch. unit: Unit of the value. A signal with a unit in
-            the signal table refuses bare numbers. kind: Selects the input or the parameter if both have the same name;
-            None: the input. force: Continues even if another PC is on the bus.
+            name: ``BOARD.NAME``, in upper or lower case, or the name alone if only one board has this signal.
+            value: A number, ``"15.5 deg"``, a word ``"0x05DC"``, or a switch.
+            unit: Unit of the value. A signal with a unit in the signal table refuses bare numbers.
+            kind: Selects the input or the parameter if both have the same name; None: the input.
+            force: Continues even if another PC is on the bus.
 
         Returns:
             The value that was sent, in the unit of the signal, rounded to the nearest word.
@@ -126,7 +127,7 @@ class ValuesByName(Session):
         Raises:
             FaultError: A board was lost, or has left its control loop by itself.
             NoLinkError: A board has sent no outputs at all (``no-outputs``), or none for 0.5 s (``stale``), with
-            ``.board``.
+                ``.board``.
         """
         self.check()
         boards = [BoardValues._of(value) for value in self._native.running()]
@@ -147,8 +148,8 @@ class ValuesByName(Session):
         it.
 
         Args:
-            boards: Boards to read, also boards that another program runs. None: the boards that this chain runs, or all boards if it runs
-                none. ``all`` leaves out boards without names, because their applications are not started.
+            boards: Boards to read, including boards that another program runs. None: the boards that this chain runs, or all boards if it
+                runs none. ``all`` leaves out boards without names, because their applications are not started.
             seconds: Time after which the iterator ends, s.
             count: Number of samples after which the iterator ends.
         """

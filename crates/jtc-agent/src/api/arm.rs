@@ -1,4 +1,4 @@
-//! The complete arm of the controller: read as an arm file, and written as a whole.
+//! The complete arm of the controller. It is read as an arm file, and always written as a whole.
 use agent_kit::api::{Problem, Refusals};
 use agent_kit::gate::{Asker, plain};
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -123,7 +123,7 @@ pub(super) async fn put_arm(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // The body is read only for the holder of the lease.
+    // The body of the request is read only if the client holds the lease.
     agent.commander(&asker)?;
     let (arm, store) = read(&agent, request, |ArmRequest { text, store }| Ok((taken(&text)?, store))).await?;
     let (commander, turn) = agent.mover(&asker, after)?;
@@ -135,7 +135,7 @@ pub(super) async fn put_arm(
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }
 
-/// Returns the arm of a text if a controller would accept it.
+/// Returns the arm in a text. Returns an error if a controller would not accept the arm.
 pub(super) fn taken(text: &str) -> Result<Arm, Problem> {
     let arm = Arm::parse(text).map_err(|error| {
         let error = error.in_file("text".as_ref());

@@ -1,4 +1,4 @@
-//! Long request bodies: a limited number is read at the same time, and outside the threads that serve requests.
+//! Long request bodies. Only a limited number is read at the same time, outside the threads that serve requests.
 use agent_kit::api::Problem;
 use axum::Json;
 use axum::body::Bytes;
@@ -42,7 +42,7 @@ pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     .await?
 }
 
-/// Runs a slow function on a thread of its own, so that other requests are served meanwhile.
+/// Runs a slow function on a separate thread, so that other requests are served meanwhile.
 pub(super) async fn blocking<T: Send + 'static>(
     act: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Problem> {

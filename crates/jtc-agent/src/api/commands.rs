@@ -20,7 +20,7 @@ use super::objects::PayloadObject;
 use crate::jobs::{Commander, Turn, stopped};
 use crate::owner::ClientPort;
 
-/// Interval at which the lease of a client that waits for an answer is renewed.
+/// Interval at which the agent renews the lease of a client that waits for an answer.
 const RENEWED: Duration = Duration::from_millis(300);
 /// Slowest speed, % (J-57).
 const SPEED_MIN: u8 = 5;
@@ -102,7 +102,7 @@ impl Agent {
         loop {
             tokio::select! {
                 done = &mut acting => return done?,
-                // A client that waits for an answer is alive.
+                // A client that waits for an answer is alive, so its lease is renewed.
                 () = tokio::time::sleep(RENEWED) => self.line.with(|line, now| line.renew(client, now)),
             }
         }

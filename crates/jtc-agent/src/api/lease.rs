@@ -1,4 +1,4 @@
-//! Lease of clients without a connection of their own: each request shows that the holder is alive.
+//! Lease of clients without a connection of their own. Each request shows that the holder is alive.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -57,7 +57,7 @@ impl Halts for Agent {
 }
 
 impl Agent {
-    /// Returns the client of a lease key and renews its lease. Returns an error if it does not hold the lease.
+    /// Returns the client of a lease key and renews its lease. Returns an error if the client does not hold the lease.
     pub(super) fn commander(&self, asker: &Asker) -> Result<Arc<Commander>, Problem> {
         let (commander, lasts) = self.client(asker)?;
         let held = self.line.with(|line, now| line.take_lease(commander.client, Some(lasts), now));
@@ -65,9 +65,9 @@ impl Agent {
         Ok(commander)
     }
 
-    /// Like [`commander`](Self::commander), for requests that may move the arm. Refuses requests from before the last
-    /// Stop or Pause, and all requests for three seconds after one of another client. The turn is taken first, so that
-    /// requests that still wait for their turn are not permitted by this one.
+    /// Like [`commander`](Self::commander), for requests that may move the arm. Refuses requests that were made before
+    /// the last Stop or Pause, and all requests within three seconds after a Stop or Pause of another client. The turn
+    /// is taken first, so that this permission does not apply to requests that still wait for their turn.
     pub(super) fn mover(
         &self,
         asker: &Asker,
@@ -79,7 +79,7 @@ impl Agent {
         Ok((commander, turn))
     }
 
-    /// Returns the client of a lease key, and the duration of its lease without a request.
+    /// Returns the client of a lease key, and the time without a request after which its lease lapses.
     pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<Commander>, Duration), Problem> {
         asker.caller.operator()?;
         let key = asker.key().ok_or(lease::Denied::NoKey)?;
@@ -167,11 +167,11 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
     let (commander, _) = agent.client(&asker)?;
     let turn = match commander.turn() {
         Ok(turn) => Some(turn),
-        // Its thread has ended, so it runs no job.
+        // The thread of the client has ended, so no job of it runs.
         Err(Unable::Gone) => None,
         Err(busy) => return Err(busy.into()),
     };
-    // A client that only waits has no lease to release.
+    // If the client only waits for the lease, this has no effect.
     let _ = agent.line.with(|line, now| line.release_lease(commander.client, now));
     agent.line.wake();
     agent.note("left", json!({ "client": commander.client.0, "name": commander.name }));

@@ -1,4 +1,4 @@
-//! Objects that the API sends. The API description is made from these types.
+//! Objects that the API sends. The description of the API is generated from these types.
 use host_kit::{FrontEnd, Next};
 use jtc_host::explain::{self, Family};
 use jtc_host::held_stop::{self, HeldStop};
@@ -155,7 +155,7 @@ impl From<Payload> for PayloadObject {
 pub(super) struct Found {
     /// Cause and age in ms of the current held stop.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints whose encoder has jumped, one bit each.
+    /// Joints with an encoder jump, one bit each.
     pub jumped: u8,
 }
 

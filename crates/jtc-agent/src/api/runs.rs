@@ -237,7 +237,7 @@ pub(super) async fn begin_run(
     )
 }
 
-/// Returns the error for a number that has another trajectory by now.
+/// Returns the error for a number whose trajectory has been replaced.
 fn replaced(stored: &Stored) -> Problem {
     let Stored { number, name, digest, .. } = stored;
     let message = format!(
@@ -280,7 +280,7 @@ pub(super) async fn begin_move(
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {
-            // A client without permission gets no other answer.
+            // The permission is checked first, so that a client without it does not get another error.
             agent.commander(&asker)?;
             let arm = Arm { poses: agent.poses(), ..(*agent.identity().await.arm).clone() };
             let to = arm.pose(&name).map_err(|error| pose_error(&error))?;
@@ -331,7 +331,8 @@ fn begin(
     let job = agent.jobs.begin(&commander, turn, what.clone(), move |task, session| {
         let (done, error) = run(task, session, &order);
         task.line.with(|line, now| {
-            // If the result is uncertain, a motion that may continue keeps the policy of its start.
+            // If the result is uncertain and the motion may continue, the policy from the start of the motion stays in
+            // force.
             if error.is_none() || !line.may_move(now) {
                 line.set_policy(client, own);
             }

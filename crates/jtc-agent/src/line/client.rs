@@ -32,7 +32,7 @@ pub struct ClientId(pub u64);
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Policy {
-    /// The motion continues, like after a host's cable was pulled.
+    /// The motion continues, as it does when the cable of a host is pulled.
     #[default]
     Continue,
     /// The motion pauses on the path.

@@ -1,8 +1,8 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vite';
 
-// The agent's program contains the built files, so a build on any computer must give the same bytes: no source maps, which contain
-// paths, and names that depend only on contents.
+// The agent's program contains the built files, so a build on any computer must give the same bytes. Therefore the build makes no
+// source maps, which contain paths, and the names of files depend only on their contents.
 export default defineConfig({
   plugins: [svelte()],
   build: {

@@ -1,8 +1,8 @@
 //! Makes the HTML book from docs/: `openjtc-book ROOT OUT`.
 //!
 //! mdbook makes the book, but it does not know that docs/ is a part of a repository. So this program resolves links that lead out of docs/
-//! ([`outside`]): it copies pictures, and turns readable files into pages of the book's last part. It also adds the script that draws the
-//! diagrams ([`diagrams`]).
+//! ([`outside`]): it copies pictures, and turns readable files into pages of the book's last part. The program also adds the script that
+//! draws the diagrams ([`diagrams`]).
 #![forbid(unsafe_code)]
 
 mod diagrams;

@@ -66,7 +66,7 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
     dir,
     operator: token('operator'),
     viewer: token('viewer'),
-    /** Kills the agent. It closes nothing, like after a power failure. */
+    /** Kills the agent, which closes nothing, like after a power failure. */
     kill() {
       child.kill('SIGKILL');
       return gone;

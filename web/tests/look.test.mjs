@@ -18,7 +18,7 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 const on = staged(() => browser);
 
-/** All faults so far. They are reported together. */
+/** All faults so far, which are reported together at the end. */
 const wrong = [];
 function collect(found, what) {
   wrong.push(...found.map((each) => `${what}: ${each}`));

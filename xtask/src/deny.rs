@@ -83,7 +83,7 @@ pub fn with_cargo_deny() -> Result<()> {
         run(install.arg(&folder))?;
     }
     for manifest in SHIPPED {
-        // cargo-deny reads the sources for every target; builds for this computer have fetched only a part of them.
+        // cargo-deny reads the sources for every target, but builds for this computer have fetched only a part of them.
         run(&mut shell::cargo(&["fetch", "--quiet", "--locked", "--manifest-path", manifest]))?;
         let mut deny = shell::command(&program);
         deny.args(["--offline", "--manifest-path", manifest, "--config"]).arg(root().join("deny.toml"));

@@ -17,8 +17,8 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The boards, by the names of the features that select them.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Functions that run at the priority of the tick. The second function wakes the links. It is the only function that the tick calls
-/// through a register.
+/// Functions that run at the priority of the tick. The second function wakes the links, and is the only function that the tick
+/// calls through a register.
 const ROOTS: [&str; 2] = ["TIM7", "embassy_executor::raw::waker::wake"];
 
 /// Memories of the chip: name, first address, bytes.
@@ -75,7 +75,7 @@ pub fn build(board: &str) -> Result<PathBuf> {
     Ok(elf)
 }
 
-/// Rate of both lines in the program that [`build_fast`] builds, Bd. It is the highest rate of J-01.
+/// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest rate of J-01.
 const FAST: &str = "15000000";
 
 /// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. This build has
@@ -129,7 +129,7 @@ pub fn check(board: &str, elf: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Lints the board's code. Every `unsafe` block must be explained; prints their number.
+/// Lints the board's code. Every `unsafe` block must be explained. Prints the number of these blocks.
 pub fn lints() -> Result<()> {
     add_target()?;
     for board in BOARDS {

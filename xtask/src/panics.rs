@@ -172,7 +172,7 @@ impl<'a> Program<'a> {
             }
         }
         ensure!(!program.functions.is_empty(), "the program has no symbols of functions");
-        // Functions in assembly have no size. They are assumed to extend to the next function.
+        // Functions in assembly have no size, so they are assumed to extend to the next function.
         let starts: Vec<u32> = program.functions.keys().copied().collect();
         for (start, next) in starts.iter().zip(starts.iter().skip(1).map(Some).chain([None])) {
             let Some(function) = program.functions.get_mut(start) else { continue };

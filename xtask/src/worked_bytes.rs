@@ -11,7 +11,8 @@ fn bytes(line: &str) -> Vec<u8> {
         .collect()
 }
 
-/// Returns the CRC-16/XMODEM. It is calculated here, so that the page is not checked with the code that it describes.
+/// Returns the CRC-16/XMODEM. The CRC is calculated here, so that the page is not checked with the code that it
+/// describes.
 fn crc(bytes: &[u8]) -> u16 {
     let mut crc = 0u16;
     for byte in bytes {

@@ -674,8 +674,8 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
 fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
     use ControllerState::{HoldPos, Operate, Teaching};
     use TrajectoryState::{Execute, Finish, Pause, Stop};
-    // Timeout, ms; state of the controller; `true` if the holder's lease lapses; period of the holder's frames, ms, 0: none; `true` if the
-    // viewer's requests are sent.
+    // Each case has the timeout (ms), the state of the controller, `true` if the holder's lease lapses, the interval of the holder's
+    // frames (ms; 0: no frames), and `true` if the viewer's requests are sent.
     let cases = [
         (0, (Operate, Execute), true, 0, true),
         (1500, (Operate, Execute), true, 0, false),

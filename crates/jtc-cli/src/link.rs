@@ -1,5 +1,5 @@
-//! Link to the controller. It uses the port that the user has given, or the only port of the computer. If an agent owns
-//! the port, the link goes through the agent.
+//! Link to the controller. The link uses the port that the user has given, or the only port of the computer. If an
+//! agent owns the port, the link goes through the agent.
 use cli_kit::{ErrorKind, Failure};
 use jtc_agent::access::Tokens;
 use jtc_client::agents::{Registered, is_same_port, owner_of, registered};

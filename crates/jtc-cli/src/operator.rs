@@ -39,7 +39,7 @@ pub struct Operator<'a> {
     /// Events for programs.
     pub progress: Progress,
     stop: Stop,
-    /// Keyboard input. It exists only while the arm moves. At other times the terminal is unchanged.
+    /// Keyboard input. The keyboard is read only while the arm moves. At other times the terminal is unchanged.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,

@@ -50,8 +50,8 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     }
 }
 
-/// Parameters that a URDF cannot contain are unknown, not zero. They are not listed as differences to the controller,
-/// and a check without them reports this.
+/// Parameters that a URDF cannot contain are unknown, not zero. Such parameters are not listed as differences to the
+/// controller, and a check without them reports this.
 #[test]
 fn j55_what_a_urdf_cannot_say_is_not_given() {
     let dir = tempfile::tempdir().unwrap();
@@ -78,7 +78,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     assert!(output.err.contains("without friction, which"), "{}", output.err);
 }
 
-/// J-55: a URDF has neither friction nor gains. They are not replaced by the values of another arm.
+/// J-55: a URDF has neither friction nor gains. The missing values are not replaced by the values of another arm.
 #[test]
 fn j55_recover_refuses_an_arm_that_is_not_whole() {
     let dir = tempfile::tempdir().unwrap();

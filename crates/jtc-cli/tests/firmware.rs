@@ -206,7 +206,7 @@ mod with_a_board {
         let board = Board::new(H745, Path::new(&drive), image(H745).len());
         let words = [&["--json"], &words(&board, &drive, &new)[..], &["--yes"]].concat();
         let crc32 = format!("{:08x}", program_of(&image(H745)).crc32);
-        // The second time, a board already runs the image. It is not known if this is the board with the drive.
+        // The second time, a board already runs the image. The command cannot know if this is the board with the drive.
         for _ in 0..2 {
             let done = json(&jtc(&dir, &words).ends(0));
             assert_eq!((&done["written"], &done["proved"]), (&true.into(), &true.into()), "{done}");

@@ -87,8 +87,8 @@ fn a_line_is_straight_and_a_leg_in_joint_space_says_that_it_is_not() {
     let mm: f64 = note.split_once("by up to ").unwrap().1.split_once(" mm").unwrap().0.parse().unwrap();
     assert!((1e3 * furthest(&all) - mm).abs() < 0.5 && mm > 50.0, "{note}: {}", furthest(&all));
     assert!(note.contains("between waypoints 1 and 2") && note.contains("`--line`"), "{note}");
-    // A line can be requested by the option, by the column, and in JSON. It is planned at any speed, with and without
-    // jumps of the acceleration.
+    // A line can be requested by the option, by the column, and in JSON. The line is planned at any speed, with and
+    // without jumps of the acceleration.
     let column = TWO.replace("qw", "qw,leg").replace("0.3,0.4,0,0,0,1\n", "0.3,0.4,0,0,0,1,line\n");
     let json = r#"[{"x":0.6,"y":-0.3,"z":0.4,"qx":0,"qy":0,"qz":0,"qw":1},
         {"x":0.6,"y":0.3,"z":0.4,"qx":0,"qy":0,"qz":0,"qw":1,"leg":"line"}]"#;
@@ -143,8 +143,8 @@ fn corners_are_sharp_stops_or_rounded_within_the_blend() {
     assert!(durations[1] <= durations[0] && durations[2] < durations[1], "{durations:?}");
 }
 
-/// A quarter of a circle about the base's upright axis; the orientation of the point on the arc is ignored and may be
-/// omitted.
+/// The arc is a quarter of a circle about the upright axis of the base. The orientation of the point on the arc is
+/// ignored and may be omitted.
 #[test]
 fn an_arc_is_round() {
     let dir = Dir::new();

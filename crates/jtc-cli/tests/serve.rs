@@ -185,7 +185,7 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
     }
 }
 
-/// Modbus has no tokens. It is off by default, and refuses other computers unless their addresses are allowed.
+/// Modbus has no tokens. The server is off by default, and refuses other computers unless their addresses are allowed.
 #[test]
 fn modbus_is_there_for_those_who_are_named() {
     let dir = tempfile::tempdir().expect("a directory");

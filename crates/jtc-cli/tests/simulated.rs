@@ -302,8 +302,8 @@ at_point = 500
 for_s = 0.1
 "#;
 
-/// The example motion runs from the start position of the simulator; with the example faults its run ends when a drive
-/// falls silent, after the push and the noise were tolerated.
+/// The example motion runs from the start position of the simulator; with the example faults, the push and the noise
+/// are tolerated, and the run ends when a drive falls silent.
 #[test]
 fn the_examples_run_in_the_simulator() {
     let dir = tempfile::tempdir().unwrap();
@@ -323,7 +323,7 @@ fn the_examples_run_in_the_simulator() {
     assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", output.err);
 }
 
-/// The motion of a recording can run again, and is the same motion.
+/// A recorded motion can be run again, and the new recording shows the same motion.
 #[test]
 fn a_recording_is_looked_at_checked_and_run_again() {
     // The simulator runs in real time. At full speed, a loaded computer receives too few positions of the motion for
@@ -346,7 +346,7 @@ fn a_recording_is_looked_at_checked_and_run_again() {
 /// A host whose frame comes byte by byte does not delay the arm: statuses continue meanwhile.
 #[test]
 fn time_goes_on_while_a_frame_arrives() {
-    // One tick per byte would give too few statuses.
+    // A single tick per byte would give too few statuses.
     for (options, least) in [(&["--no-throttle"][..], 8), (&["--speed", "max", "--no-throttle"], 50)] {
         let sim = Sim::start(options);
         let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&sim.port).unwrap();

@@ -1,4 +1,4 @@
-//! `jtc stop` from a second terminal: the arm stops whatever the program that has the port is doing, and that program
+//! `jtc stop` from a second terminal: the arm stops in every phase of the program that has the port, and that program
 //! does not move the arm again.
 #![cfg(unix)]
 
@@ -106,7 +106,8 @@ fn a_run_is_stopped_from_a_second_terminal() {
     );
     let holder = &stopped["arms"][0]["holder"]["program"];
     assert_eq!(holder, "jtc traj run", "{stopped}");
-    // The same with text output, with another name of the port, and with another command that has the same effect.
+    // Repeats the test with text output, with another name of the port, and with another command that has the same
+    // effect.
     let child = cell.moving(&["run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     let real = std::fs::canonicalize(&cell.0.port).unwrap();
     let mut other = command();
@@ -454,7 +455,7 @@ fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     other.stands();
 }
 
-/// A hanging program does not delay the Stop of another arm. One JSON object reports all arms.
+/// A hanging program does not delay the Stop of another arm. A single JSON object reports all arms.
 #[test]
 fn a_program_that_hangs_delays_no_other_stop() {
     let two = Two::moving();

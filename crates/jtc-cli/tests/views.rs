@@ -68,7 +68,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         terminal.hang_up();
         assert_eq!(terminal.ends(&mut child), 0, "nohup: {nohup}");
     }
-    // Without a terminal the output is in lines. It ends when the reader has read enough.
+    // Without a terminal the output is in lines. The output ends when the reader has read enough.
     let mut child = sim.command(&["monitor"]);
     let mut child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut line = String::new();

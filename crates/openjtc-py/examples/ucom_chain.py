@@ -24,7 +24,7 @@ def main(bus: str) -> None:
         for signal in chain.boards[1].signals.inputs:
             print(f"  input {signal.text}, {signal.minimum:g} to {signal.maximum:g}")
 
-        # Control loops run under supervision until the end of the context. One step of a value is 0.01 degrees here.
+        # Control loops run under supervision until the end of the context. Here a step of a value is 0.01 degrees.
         report = chain.run([1, 2], active=True, inputs={"1.set_position": 0, "2.set_position": 0})
         print(f"boards {report.boards} run; {report.load_percent:.0f} % of the bus")
 

@@ -1,4 +1,4 @@
-//! Range checks of numbers from Python: a number out of range gives an error with value and limit. It is never changed
+//! Range checks of numbers from Python: a number out of range gives an error with value and limit, and is never changed
 //! silently.
 
 use std::ops::RangeInclusive;

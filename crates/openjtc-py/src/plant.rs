@@ -11,7 +11,7 @@ use crate::error::Failure;
 use crate::simulated::{SimulatedArm, pass};
 use crate::simulator::truth;
 
-/// Boot time of the drives, ms. It is long enough to fill the averaging window of their speed with samples.
+/// Boot time of the drives, ms. This time is long enough to fill the averaging window of their speed with samples.
 const BOOT_MS: u32 = 12;
 /// Longest time until the drives are enabled, ms.
 const BRING_UP_MS: u64 = 2_000;

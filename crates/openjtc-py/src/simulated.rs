@@ -13,7 +13,8 @@ use crate::error::Failure;
 /// Relative errors of masses and frictions, and factors instead of random errors, from Python.
 type ErrorNumbers = (f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>);
 
-/// Arguments of `openjtc.sim`; `model_error`: mass, friction, factors of the masses, factors of the frictions.
+/// Arguments of `openjtc.sim`. `model_error` has the errors of mass and friction, and the factors of the masses and
+/// frictions.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct SimulatedArm<'py> {

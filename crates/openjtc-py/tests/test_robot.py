@@ -352,7 +352,7 @@ def test_the_end_of_a_context_and_of_a_program_stops_what_moves(tmp_path: Path):
     with pytest.raises(openjtc.NoLinkError, match="closed"):
         robot.move(HOME)
     robot.close()
-    # The same is checked without a context manager.
+    # This is also checked without a context manager.
     program = (
         "import openjtc\n"
         "robot = openjtc.connect('sim:', speed=10.0)\n"

@@ -83,7 +83,7 @@ export function problemOf(status: number, text: string): Problem {
       return { ...(value as Problem), next: (value as Problem).next ?? '' };
     }
   } catch {
-    // The answer is not JSON. It comes from a proxy, or from a router without this path.
+    // The answer is not JSON, because it comes from a proxy, or from a router without this path.
   }
   if (status === 404) {
     return {

@@ -1,4 +1,4 @@
-// The stream of an agent. It is a WebSocket that is reopened after each loss and continues after the last event.
+// The stream of an agent: a WebSocket that is reopened after each loss and continues after the last event.
 
 /** Common part of every agent's status. */
 export interface BaseStatus {

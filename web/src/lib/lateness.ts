@@ -1,6 +1,6 @@
 // Delay of messages. If a network delays all messages by the same time, none is lost, but the displayed state is old.
 
-/** Length of a span, ms; times are kept for `SPANS` spans, after which two clocks may have drifted apart. */
+/** Length of a span, ms. Times are kept for `SPANS` spans. After a longer time, two clocks may have drifted apart. */
 const SPAN_MS = 60_000;
 const SPANS = 10;
 /** Smallest number of probes for a lower bound of the difference, because a single probe may have been delayed. */

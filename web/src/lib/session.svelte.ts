@@ -1,5 +1,5 @@
-// Parts that all pages share: connection, token, lease, Stop, messages, events. They do not depend on the agent's
-// device.
+// Parts that all pages share: connection, token, lease, Stop, messages, events. These parts do not depend on the
+// agent's device.
 import { getContext, setContext } from 'svelte';
 
 import { Api, ApiError, type Ask, type Problem } from './api.ts';
@@ -246,7 +246,7 @@ export class Session<S extends SessionStatus> {
       if (!document.hidden) this.connection.hurry();
     });
     addEventListener('pagehide', () => {
-      // If a job runs, the lease is not released. It then expires, and the chosen policy applies.
+      // If a job runs, the lease is not released. The lease then expires, and the chosen policy applies.
       if (this.lease.phase === 'waiting' || this.isAtRest()) void this.lease.release(true).catch(() => {});
     });
   }

@@ -1,4 +1,4 @@
-//! Load of the machine. It shows if the machine is idle enough to judge the measurements.
+//! Load of the machine, which shows if the machine is idle enough to judge the measurements.
 use std::time::Instant;
 
 /// Largest share of one processor that other programs may use while figures are judged.
@@ -34,7 +34,7 @@ fn busy() -> Option<(f64, f64)> {
     // All fields except the idle times: user, nice and system, then irq, softirq and steal.
     let all = sum(all.get(1..4)?)? + sum(all.get(6..9)?)?;
     let own = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // Fields 14 to 17 of the line are utime, stime, cutime and cstime. They are counted after the name, which may
+    // Fields 14 to 17 of the line are utime, stime, cutime and cstime. The fields are counted after the name, which may
     // contain spaces.
     let own: Vec<&str> = own.rsplit_once(')')?.1.split_whitespace().collect();
     let own = sum(own.get(11..15)?)?;

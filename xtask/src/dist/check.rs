@@ -1,5 +1,5 @@
-//! Trial of the packages. They are installed in a separate Debian, used, removed and purged. After that no file may be
-//! left.
+//! Trial of the packages. The packages are installed in a separate Debian, used, removed and purged. After that no file
+//! may be left.
 use std::fs;
 use std::path::{Path, PathBuf};
 

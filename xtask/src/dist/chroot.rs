@@ -28,7 +28,7 @@ const WANTED: [&str; 3] = ["passwd", "systemd", "man-db"];
 const LEFT_OUT: [&str; 5] =
     ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
 
-/// Folder of the system. It is removed on drop.
+/// Folder of the system, which is removed on drop.
 pub struct Root(Scratch);
 
 /// Package of this computer, according to dpkg.
@@ -77,7 +77,8 @@ impl Root {
         self.0.path()
     }
 
-    /// Writes dpkg's records of the new system. They are copies of this computer's records of the copied packages.
+    /// Writes dpkg's records of the new system. The records are copies of this computer's records of the copied
+    /// packages.
     fn remember(&self, packages: &BTreeSet<String>) -> Result<()> {
         let to = self.path().join("var/lib/dpkg");
         for folder in ["info", "updates", "triggers", "alternatives"] {
@@ -143,8 +144,8 @@ impl Root {
         chroot
     }
 
-    /// Returns a command that runs dpkg on the system. It also installs manual pages, which dpkg is configured to leave out in some
-    /// containers.
+    /// Returns a command that runs dpkg on the system. The command also installs manual pages, which dpkg is configured to leave
+    /// out in some containers.
     pub fn dpkg(&self) -> Command {
         let mut dpkg = shell::command("dpkg");
         dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");

@@ -56,7 +56,7 @@ pub fn add_target(triple: &str) -> Result<()> {
     run(shell::command("rustup").args(["target", "add", triple]))
 }
 
-/// Returns the Unix time that all archives contain, s. It is the time of the last commit, or `SOURCE_DATE_EPOCH`.
+/// Returns the Unix time that all archives contain, s. This is the time of the last commit, or `SOURCE_DATE_EPOCH`.
 pub fn time() -> Result<u64> {
     let time = match std::env::var("SOURCE_DATE_EPOCH") {
         Ok(time) => time,
@@ -76,7 +76,7 @@ pub fn tools() -> Result<PathBuf> {
 /// Adds switches for `triple` to a cargo command that keep paths of this computer out of the output.
 pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
-    // The same for C code and its assembler code.
+    // C code and its assembler code need these options.
     let folders = paths::folders()?;
     let maps: Vec<String> =
         folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();

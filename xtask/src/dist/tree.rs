@@ -153,7 +153,7 @@ mod tests {
                 (path, header.mode().unwrap())
             })
             .collect();
-        // The archiver leaves out a `./` before a name; dpkg and tar accept both forms.
+        // The archiver leaves out a `./` before a name. dpkg and tar accept both forms.
         let expected = [
             ("./", 0o755),
             ("etc/", 0o755),

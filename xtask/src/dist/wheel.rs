@@ -16,7 +16,7 @@ pub fn folder() -> Option<PathBuf> {
 /// Text about third-party parts. `license-files` in pyproject.toml contains this path.
 const THIRD_PARTY: &str = "LICENSE-THIRD-PARTY.txt";
 
-/// Builds the wheel. It works with every glibc from 2.17 on.
+/// Builds the wheel, which works with every glibc from 2.17 on.
 pub fn build(platform: Platform, time: u64, third_party: &str) -> Result<Made> {
     let folder = folder().context("crates/openjtc-py is not there")?;
     programs::add_target(platform.library)?;

@@ -63,8 +63,8 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
             to(signed(offset, 25))
         }
-        // UDF, and B with a condition. The values 14 and 15 are not conditions. They encode barriers and similar
-        // instructions.
+        // UDF, and B with a condition. The values 14 and 15 are not conditions. These values encode barriers and
+        // similar instructions.
         (0xF000, 0x8000) if first & 0xFFF0 == 0xF7F0 && second & 0xF000 == 0xA000 => Flow::Trap,
         (0xF000, 0x8000) if first >> 7 & 7 != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | (first & 0x3F) << 12 | (second & 0x7FF) << 1;

@@ -1,4 +1,5 @@
-//! docs/evidence.md. It contains generated tables between marks, and explanations of mutants that no test can detect.
+//! docs/evidence.md, which contains generated tables between marks, and explanations of mutants that no test can
+//! detect.
 use std::collections::BTreeSet;
 use std::fs::{read_to_string, write};
 

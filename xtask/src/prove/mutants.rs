@@ -29,7 +29,7 @@ const SURVIVING_MAX: f64 = 0.03;
 #[derive(Default)]
 struct Tally {
     killed: usize,
-    /// Number of mutants with which a test ran without end. This is treated as a failure of the test.
+    /// Number of mutants that made a test run without end. This is treated as a failure of the test.
     endless: usize,
     equivalent: usize,
     unexplained: Vec<String>,

@@ -1,4 +1,4 @@
-//! The complete arm of the controller. It is read as an arm file, and always written as a whole.
+//! The complete arm of the controller. The API returns the arm as an arm file, and accepts only a whole arm.
 use agent_kit::api::{Problem, Refusals};
 use agent_kit::gate::{Asker, plain};
 use agent_kit::halt::{AskedAfter, KnownHalt};

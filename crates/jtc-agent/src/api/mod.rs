@@ -88,7 +88,7 @@ pub struct Agent {
     line: Line,
     jobs: Arc<Jobs>,
     gate: Gate,
-    /// Number by which clients recognise this run of the agent.
+    /// Number that identifies this run of the agent to clients.
     id: Arc<str>,
     port: Arc<str>,
     simulated: bool,

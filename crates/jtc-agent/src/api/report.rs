@@ -9,8 +9,8 @@ use super::body::blocking;
 use super::runs::found;
 use crate::jobs::Stage;
 
-/// Content security policy of a report. It permits the report's own script and style, and no access to this agent or
-/// any other server.
+/// Content security policy of a report. The policy permits the report's own script and style, and no access to this
+/// agent or any other server.
 const PAGE_POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; frame-ancestors 'self'";
 
 /// Page that a browser opens without other files.

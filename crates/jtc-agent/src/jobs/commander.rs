@@ -89,7 +89,7 @@ impl Commander {
         self.moves.store(true, Ordering::Release);
     }
 
-    /// Marks the end of a motion. Drops the requests that came too late, together with their result channels; so their
+    /// Marks the end of a motion. Drops the requests that came too late, together with their result channels. So their
     /// clients learn that the motion has ended.
     pub fn motion_ended(&self, wishes: &Receiver<Wish>) {
         let _job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
@@ -154,7 +154,7 @@ impl Commander {
         result.await.map_err(|_| Unable::Gone)
     }
 
-    /// Runs a function in the given turn without a waiting caller; has no effect if the line was lost.
+    /// Runs a function in the given turn, without a waiting caller. Has no effect if the line was lost.
     pub fn tell(&self, turn: Turn, act: impl FnOnce(&mut Session<ClientPort>) + Send + 'static) {
         let work: Work = Box::new(move |session| {
             act(session);

@@ -12,7 +12,7 @@ use super::{Job, Task};
 
 /// Largest number of jobs whose report is kept.
 const KEPT: usize = 16;
-/// Largest size of all kept reports, bytes; a motion of ten minutes or more takes some 20 MB.
+/// Largest size of all kept reports, bytes. The report of a motion of ten minutes or more takes some 20 MB.
 const BYTES_MAX: usize = 64 << 20;
 
 /// Data of a report about a motion.

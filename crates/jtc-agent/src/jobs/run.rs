@@ -1,4 +1,4 @@
-//! The job that runs a motion. It writes each step into the journal, and ends after a Stop of another client.
+//! The job that runs a motion. The job writes each step into the journal, and ends after a Stop of another client.
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;

@@ -65,7 +65,7 @@ impl SharedLine {
         self.outbox.handed_over(now);
     }
 
-    /// Returns the next frame; clients take turns.
+    /// Returns the next frame. The clients take turns.
     fn next_turn(&mut self, now: Duration) -> Option<Outgoing> {
         if let Some(frame) = self.moving.frame(now) {
             return Some(Outgoing { client: OWNER, frame });

@@ -76,9 +76,9 @@ impl SharedLine {
         self.lease.as_ref()
     }
 
-    /// Takes or renews the lease. `lasts` is the time without renewal after which the lease lapses. It also applies to
-    /// a lease that the client gets later, by a command or from another client. `None`: the lease lasts while the
-    /// client is connected.
+    /// Takes or renews the lease. `lasts` is the time without renewal after which the lease lapses. A lease that the
+    /// client gets later, by a command or from another client, also lasts for this time. `None`: the lease lasts while
+    /// the client is connected.
     ///
     /// # Errors
     ///

@@ -1,5 +1,5 @@
-//! Transmit queue of the line. It sends whole frames, one after the other, and hands their bytes to the operating
-//! system shortly before the line can send them.
+//! Transmit queue of the line. The queue sends whole frames, one after the other, and hands their bytes to the
+//! operating system shortly before the line can send them.
 //!
 //! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] bytes are queued there. A
 //! Stop does not wait for the remainder of a long frame. The frame is abandoned, and the controller detects this by the

@@ -46,8 +46,8 @@ impl Supervision {
         }
     }
 
-    /// Takes a status. If the status shows no torque, the controller may have restarted with other settings, so the
-    /// timeout is forgotten.
+    /// Takes a status. In Start and Init, the controller may have restarted with other settings, so the timeout is
+    /// forgotten.
     pub fn take_status(&mut self, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.timeout = None;

@@ -27,7 +27,7 @@ pub struct Order {
 ///
 /// A command must have the next sequence number after the last command. With any other number, no command is executed.
 /// So a write that is repeated after a lost answer has no effect. A PLC may repeat values that it has written before
-/// the agent was started. They have no effect either, because each agent starts with a different number.
+/// the agent was started. These values have no effect either, because each agent starts with a different number.
 #[derive(Clone, Debug)]
 pub struct Handshake {
     values: [u16; holding::COUNT],

@@ -10,8 +10,8 @@ use super::codes::{Outcome, error_number};
 use super::pdu::Exception;
 use crate::jobs::{Job, NUMBER_MAX, Stage};
 
-/// Version of this map. The version increases when the meaning of an address changes. It stays when entries are added at the
-/// end.
+/// Version of this map. The version increases when the meaning of an address changes. The version stays the same when
+/// entries are added at the end.
 pub const VERSION: u16 = 1;
 /// Register value that means "not known".
 pub const UNKNOWN: u16 = u16::MAX;

@@ -1,7 +1,7 @@
 //! Modbus TCP for a PLC: the arm as a map of registers.
 //!
-//! [`pdu`] contains the protocol and [`map`] the registers. [`handshake`] turns register writes into commands, each of
-//! which is executed once. [`plc`] decides which of several connections may command. `act` executes the commands with
+//! [`pdu`] contains the protocol and [`map`] the registers. [`handshake`] turns register writes into commands, and each
+//! command is executed once. [`plc`] decides which of several connections may command. `act` executes the commands with
 //! the same jobs as the API. [`server`] manages the connections. Modbus has no tokens, so [`allow`] lists the addresses
 //! that may connect.
 mod act;

@@ -185,7 +185,7 @@ async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start
     let mut request = Vec::new();
     loop {
         let Ok(Some(header)) = timeout(IDLE, read(&mut stream, &mut request)).await else { return };
-        // Per-connection rate limit: a fast client delays only itself.
+        // The rate is limited per connection, so that a fast client delays only itself.
         tokio::time::sleep(pace.wait(Instant::now())).await;
         seen.store(millis(start), Ordering::Relaxed);
         let response = header.respond(&gone.plc.respond(&gone.connection, &request));

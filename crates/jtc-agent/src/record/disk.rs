@@ -118,7 +118,7 @@ struct Writer {
     shelf: Shelf,
     notify: Notify,
     open: Option<Open>,
-    /// Current recording. It is kept even while it cannot be written.
+    /// Current recording, which is kept even while its file cannot be written.
     wanted: Option<Box<RecordingInfo>>,
     failed: Option<Instant>,
     /// Interval until the next attempt.
@@ -241,7 +241,7 @@ impl Writer {
     fn break_off(&mut self) -> Option<PathBuf> {
         let Open { recorder, begun } = self.open.take()?;
         let (path, samples) = (begun.path.clone(), recorder.samples());
-        // The drop tries to complete the file. If that fails, there is no consequence.
+        // The drop tries to complete the file. A failure has no consequence.
         drop(recorder);
         self.shelf.break_off(begun, samples);
         Some(path)

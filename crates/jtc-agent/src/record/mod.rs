@@ -235,7 +235,8 @@ impl Following {
                     self.follow(steps, &mut session);
                     return;
                 }
-                // The client was disconnected, for example because the computer was suspended. It connects again.
+                // The client was disconnected, for example because the computer was suspended. The recorder connects
+                // again.
                 (session, arrived) = connect(line);
             }
             self.take_seen();

@@ -22,7 +22,7 @@ const GONE_MAX: usize = 10_000;
 struct Own {
     /// Name without its ending.
     name: String,
-    /// Length in bytes, if it is known. A file of another length was changed from outside and is never removed.
+    /// Length in bytes; 0 if it is not known. A file of another length was changed from outside and is never removed.
     bytes: u64,
     /// `true` if the recording is incomplete or in progress.
     part: bool,

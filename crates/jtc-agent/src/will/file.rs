@@ -1,4 +1,5 @@
-//! File of a last will: each port has one. It is readable only by its owner, and written completely or not at all.
+//! File of a last will: each port has one. The file is readable only by its owner, and written completely or not at
+//! all.
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -102,8 +103,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Writes the file in one step. From then on the file is valid even if the agent is killed. It survives a loss of power
-/// as soon as the disk has stored it.
+/// Writes the file in one step. From then on the file is valid even if the agent is killed. After the disk has stored
+/// the file, the file also survives a loss of power.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };

@@ -1,4 +1,4 @@
-//! Keeper of the file of a last will. It updates the file as soon as the disk accepts a write.
+//! Keeper of the file of a last will. The keeper updates the file as soon as the disk accepts a write.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -1,5 +1,5 @@
-//! Last will of a killed agent: a small file with the client whose policy applies. It exists while the arm moves. The
-//! next agent at the same port reads it before it serves any client.
+//! Last will of a killed agent: a small file with the client whose policy applies. The file exists while the arm moves.
+//! The next agent at the same port reads it before it serves any client.
 //!
 //! A separate thread writes the file, so neither a Stop nor the line waits for the disk.
 mod apply;

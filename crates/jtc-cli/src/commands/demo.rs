@@ -21,7 +21,7 @@ use crate::failure::output_lost;
 use crate::progress::Progress;
 use crate::tape::Tape;
 
-/// Random seed of the demo. It is constant, so that every demo gives the same figures.
+/// Random seed of the demo. The seed is constant, so that every demo gives the same figures.
 const SEED: u64 = 1;
 /// Recorded time before and after the motion.
 const MARGIN: Duration = Duration::from_millis(400);

@@ -22,8 +22,8 @@ use crate::progress::Progress;
 
 /// Longest time for which a program does not listen after it has opened the port, or before it closes the port.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
-/// Like [`CHANGES_HANDS`], for a port at which a program of this user has listened. It may be waiting for the end of
-/// another Stop.
+/// Like [`CHANGES_HANDS`], for a port at which a program of this user has listened. Such a program may be waiting for
+/// the end of another Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Largest number of programs that may have the port in turn during one Stop.
 const OWNERS: usize = 16;
@@ -100,7 +100,7 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             let mut session = *session;
             progress.watch(&mut session);
             session.pause().map_err(|error| match error {
-                // The controller refuses the Pause if there is no motion to pause.
+                // The controller refuses the Pause if no motion is in progress.
                 Error::Link(LinkError::Refused { .. }) => error.into(),
                 error => unconfirmed(error).told(Halt::Pause),
             })?;
@@ -128,7 +128,7 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 }
 
 /// Returns the arms to stop. If the user has given a port, this is the arm at that port. Otherwise these are the arms
-/// of all agents and programs of this user, or, if there are none, the arm at the only port.
+/// of all agents and programs of this user, or, without agents and programs, the arm at the only port.
 fn arms(link: &LinkArgs) -> Vec<Arm> {
     if link.port.is_some() {
         return vec![Arm::Of { link: link.clone(), port: None }];
@@ -307,7 +307,7 @@ impl NotHalted {
 enum Reached {
     /// Separate connection to the line.
     Line(Box<Session<LinkPort>>),
-    /// Answer of the program that has the port. It has executed the request.
+    /// Answer of the program that has the port and has executed the request.
     Holder(Answer, Option<End>),
 }
 
@@ -422,7 +422,7 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     }
 }
 
-/// Stops through a separate connection. If the controller refuses the Stop, there is no motion to stop.
+/// Stops through a separate connection. If the controller refuses the Stop, no motion is in progress.
 fn directly(
     mut session: Session<LinkPort>,
     progress: &Progress,

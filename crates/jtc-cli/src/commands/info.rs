@@ -1,4 +1,4 @@
-//! `jtc info`: identity of the controller; `jtc disable`: torque off at rest.
+//! `jtc info` prints the identity of the controller. `jtc disable` switches the torque off at rest.
 
 use std::time::Duration;
 

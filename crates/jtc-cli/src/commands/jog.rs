@@ -61,8 +61,8 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     };
     // However the jog has ended, the arm is stopped now, without waiting for the controller's timeout.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // An error that has released the arm is the cause of all other failures, so it is reported first. It may also be
-    // the only failure.
+    // An error that has released the arm is the cause of all other failures, and may be the only one, so it is reported
+    // first.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
         // A held stop is the reason why a jog was refused.
@@ -113,7 +113,7 @@ fn rate_within(most: f64) -> usize {
     RATES[..=FIRST_MAX].iter().rposition(|rate| *rate <= most).unwrap_or(0)
 }
 
-/// Joint that the keys move, its rate, and the end time of its motion.
+/// Joint that the keys move, its rate, and its present motion.
 struct Held {
     joint: Joint,
     rate: usize,

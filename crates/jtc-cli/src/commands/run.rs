@@ -36,7 +36,7 @@ pub struct Course {
     pub words: String,
     /// Files that the command reads, which must not be outputs.
     pub inputs: Vec<PathBuf>,
-    /// `true` if the user has given an arm file. It must then match the controller's arm.
+    /// `true` if the user has given an arm file. The file must then match the controller's arm.
     pub arm_named: bool,
     /// `true`: if the arm is not at the first point, it is moved there first.
     pub approach: bool,

@@ -212,7 +212,7 @@ fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog
     keeper
 }
 
-/// Writes notices about recordings and policies to the command log; notices for users are printed too.
+/// Writes notices about recordings and policies to the command log. Notices for users are also printed.
 fn notices(log: &Arc<Mutex<CommandLog>>, out: &Output, kind: &'static str) -> Box<dyn FnMut(Notice) + Send> {
     let (log, out) = (log.clone(), *out);
     Box::new(move |notice| {

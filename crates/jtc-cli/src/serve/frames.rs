@@ -128,7 +128,7 @@ impl Incoming {
     }
 
     /// Returns how long the host has been silent within a frame, also at the moment when the silence ends. Returns
-    /// `None` outside a frame, or after a silence so long that the frame will not be completed.
+    /// `None` outside a frame, or after a silence that is too long for the frame to be completed.
     pub fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);

@@ -85,7 +85,7 @@ impl Pty {
             .map_err(|source| PtyError::Io { what: "symbolic link", source })
     }
 
-    /// Reads the available bytes. Returns 0 if there are no bytes, or if no host has the port open.
+    /// Reads the available bytes. Returns 0 without bytes, or if no host has the port open.
     pub fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         match rustix::io::read(&self.master, buffer) {
             Ok(n) => Ok(n),

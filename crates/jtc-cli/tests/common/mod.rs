@@ -93,13 +93,13 @@ impl Sim {
         Self::start_in(dir, &[options, &["--faults", file.to_str().unwrap()]].concat())
     }
 
-    /// Sends the controller its parameters.
+    /// Makes the controller use its default parameters.
     pub fn with_parameters(self) -> Self {
         self.jtc(&["params", "use-defaults"]).ends(0);
         self
     }
 
-    /// Sends the controller its parameters and waits until it holds the arm.
+    /// Recovers the controller with its default parameters, and waits until it holds the arm.
     pub fn held(self) -> Self {
         self.jtc(&["recover", "--defaults"]).ends(0);
         self

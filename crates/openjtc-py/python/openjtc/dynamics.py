@@ -81,8 +81,8 @@ class Dynamics:
         return self._native.gravity(q)
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
-        """Computes joint-space mass matrices: (6, 6) or (N, 6, 6), kg·m². They are symmetric and do not include the
-        rotors."""
+        """Computes joint-space mass matrices: (6, 6) or (N, 6, 6), kg·m². The matrices are symmetric and do not include
+        the rotors."""
         return self._native.mass_matrix(q)
 
     def friction(self, qd: ArrayLike, temperature: ArrayLike = 25.0) -> Floats:

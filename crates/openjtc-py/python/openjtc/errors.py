@@ -13,7 +13,7 @@ class Error(Exception):
 
     Attributes:
         message: The failed request, its place, value and limit.
-        code: Short name for programs. It is the same as in ``jtc``, if ``jtc`` has the same error.
+        code: Short name for programs. If ``jtc`` has the same error, the name is the same in ``jtc``.
         joint: Joint, counted from 1; None if the error is not about one joint.
         point: Point of the trajectory, counted from 0; during a motion the time on its path, ms.
         value: Value that was found, in the unit of the message.

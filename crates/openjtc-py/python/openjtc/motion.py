@@ -200,7 +200,7 @@ def followed(robot: Robot, begin: Callable[[], Motion], progress: bool | None) -
         _show(motion, progress)
     except BaseException as error:
         # If Ctrl-C in Python code, or a bar that cannot be drawn, interrupts the wait, the arm is stopped, because no caller waits for
-        # it any more. After an `Exception` before the start, there is no motion to stop.
+        # it any more. After an `Exception` before the start, no motion must be stopped.
         if motion is not None or not isinstance(error, Exception):
             robot._link.rest()
         raise

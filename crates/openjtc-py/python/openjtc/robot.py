@@ -48,7 +48,7 @@ class Robot(Connected):
         degrees: bool = False,
         margin: float | None = None,
     ) -> Plan:
-        """Plans a motion of the controller's arm with its payload. Nothing moves.
+        """Plans a motion of the controller's arm with its payload, without moving the arm.
 
         For the arguments see `Planner` and `Planner.through`. `speed` is 100 % of the limits by default, even on a real arm. The
         `speed` of `run` sets how fast the plan is executed.
@@ -66,7 +66,7 @@ class Robot(Connected):
         degrees: bool = False,
         accept_device_limits: bool = False,
     ) -> Check:
-        """Checks a trajectory like `run`. Nothing is sent.
+        """Checks a trajectory like `run`, without sending the trajectory.
 
         Args:
             trajectory: A trajectory, a plan, or a file of any form that ``jtc traj run`` reads.

@@ -379,9 +379,9 @@ class PlantState:
 class Plant:
     """Arm and drives without a controller: each millisecond takes a torque and returns a measurement.
 
-    This is the plant of :class:`Simulator`, with the same bodies, friction and end stops. It has the same drives with their encoders,
-    over-speed trip, working area and torque limit, and the same delay over the joint bus. The drives are enabled. If drives trip,
-    brakes hold the arm.
+    This is the plant of :class:`Simulator`, with the same bodies, friction and end stops. The plant also has the same drives with
+    their encoders, over-speed trip, working area and torque limit, and the same delay over the joint bus. The drives are enabled. If
+    drives trip, brakes hold the arm.
 
     Args:
         arm: The arm; None: the built-in one.

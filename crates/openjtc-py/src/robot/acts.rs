@@ -35,7 +35,7 @@ impl Machine {
         self.session.port_mut().take_over();
         // The Stop is sent before any query, because it may reach the controller even on a line that returns no bytes.
         let stopped = match self.session.stop() {
-            // The controller refuses the Stop if there is no motion to stop.
+            // The controller refuses the Stop if no motion is in progress.
             Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
             done => done,
         };

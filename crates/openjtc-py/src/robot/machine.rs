@@ -1,4 +1,4 @@
-//! State of the worker: the port, the session over it, and the arm that motions are checked against.
+//! State of the worker: the port, its session, and the arm for the checks of motions.
 
 use std::cell::Cell;
 use std::path::PathBuf;

@@ -16,7 +16,7 @@ use super::worker::lock;
 
 /// Longest wait of a read before it checks for a requested Stop.
 const LOOK: Duration = Duration::from_millis(10);
-/// Longest pause between two pieces of a frame. After a longer pause, the remainder of the frame is no longer expected.
+/// Longest pause between two pieces of a frame. After a longer pause, the rest of the frame is not expected any more.
 const PIECE: Duration = Duration::from_millis(50);
 /// Time within which the record of a Stop arrives. The record is only delayed by the status that is just being sent.
 const RECORD: Duration = Duration::from_millis(200);
@@ -25,7 +25,7 @@ const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
 /// Underlying line.
 pub enum Line {
-    /// A simulator. It has its own type, so that disturbances of its arm can be applied during any job.
+    /// A simulator. This variant is separate, so that disturbances of its arm can be applied during any job.
     Simulated(Box<SimPort>),
     /// A serial port or an agent.
     Other(Box<dyn Port>),

@@ -56,7 +56,7 @@ impl Recording {
         Ok(self.live.as_ref().map(LiveRecorder::sink))
     }
 
-    /// Completes the file if the run moved the arm along its trajectory; otherwise removes the file. A file error becomes a note of the
+    /// Completes the file if the run moved the arm along its trajectory. Otherwise removes the file. A file error becomes a note of the
     /// finished run.
     pub fn end(self, ran: Result<Ran, Failure>) -> Result<Ran, Failure> {
         let Self { path, aside, file, live } = self;

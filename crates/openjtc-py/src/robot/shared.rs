@@ -110,7 +110,7 @@ impl Shared {
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Passes a request to the current run. If there is no run, the result channel is dropped.
+    /// Passes a request to the current run. Without a run, the result channel is dropped.
     pub fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {
@@ -119,7 +119,7 @@ impl Shared {
     }
 }
 
-/// Guard of a requested run. It exists until the run is over or abandoned.
+/// Guard of a requested run, which exists until the run is over or abandoned.
 pub struct Pending(Arc<Shared>);
 
 impl Pending {

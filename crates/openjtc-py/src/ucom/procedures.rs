@@ -1,4 +1,4 @@
-//! Procedures of a chain. They call `ucom-host` in the same order as the command `ucom`.
+//! Procedures of a chain. The functions call `ucom-host` in the same order as the command `ucom`.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -138,7 +138,7 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash number that each board must have. It comes from the caller, or else from the inventory.
+/// Returns the flash number that each board must have. The number comes from the caller, or else from the inventory.
 fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {

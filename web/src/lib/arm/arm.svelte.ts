@@ -120,7 +120,7 @@ export class ArmPage {
     this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';
   }
 
-  /** Calls `handler` with each status, and with undefined if there is no current status. */
+  /** Calls `handler` with each status, and with undefined without a current status. */
   onFrame(handler: (controller: Controller | undefined) => void): () => void {
     this.#frames.push(handler);
     return () => this.#frames.splice(this.#frames.indexOf(handler), 1);

@@ -11,7 +11,7 @@ const ASLEEP_MS = 450;
 export interface JogLine {
   /** Sends rates. Resolves when the agent has accepted them. Zeros end a jog and are accepted from every client. */
   send(rates: number[]): Promise<unknown>;
-  /** Called if the request was refused. It is not repeated. `after`: the key had been released by then. */
+  /** Called if the request was refused and is not repeated. `after`: the key had been released by then. */
   refused(error: unknown, after: boolean): void;
   /** Called if the page was suspended while a key was held. The key is treated as released. */
   slept(): void;

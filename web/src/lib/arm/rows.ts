@@ -1,4 +1,5 @@
-// Rows of waypoint files. They have the columns, units and separator of the file's header, so that the agent can read them.
+// Rows of waypoint files. Each row has the columns, units and separator of the file's header, so that the agent can read
+// them.
 import { type ArmModel, flange, place, quaternion, rpy } from './kinematics.ts';
 
 /** A pose to add as a row. */

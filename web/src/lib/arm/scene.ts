@@ -1,4 +1,4 @@
-// 3D scene of the arm. It is drawn only after a change, and loaded only when it is shown.
+// 3D scene of the arm, which is drawn only after a change, and loaded only when it is shown.
 import {
   AmbientLight, ArrowHelper, BufferGeometry, CircleGeometry, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line,
   LineBasicMaterial, LineDashedMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D, PCFShadowMap, PerspectiveCamera, RingGeometry, Scene,
@@ -63,7 +63,7 @@ export class ArmScene {
   readonly #payload = new Mesh(new SphereGeometry(1, 32, 20), new MeshStandardMaterial({ transparent: true, opacity: 0.75, roughness: 0.5 }));
   #trailPoints: Vector[] = [];
   #q: number[] = [];
-  /** Joint positions of the ghost, and its visibility. They are kept for a new body. */
+  /** Joint positions of the ghost, and its visibility. Both are kept for a new body. */
   #ghostQ: number[] = [];
   #ghostShown = false;
   #palette: Palette;
@@ -223,7 +223,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Sets the ghost, which shows the target pose. It is drawn if it differs from the current pose. */
+  /** Sets the ghost, which shows the target pose. The ghost is drawn if it differs from the current pose. */
   setGhost(q: readonly number[] | undefined, always = false): void {
     const apart = q?.some((value, i) => Math.abs(value - (this.#q[i] ?? value)) > APART_RAD) ?? false;
     const visible = q !== undefined && (apart || always);

@@ -1,5 +1,6 @@
 // The part of TOML that arm files use: tables, arrays of tables, inline tables, arrays over several lines, comments.
-// It is used for display and comparison only. The agent itself reads the arm files that are sent to the controller.
+// The result is used for display and comparison only. The agent itself reads the arm files that are sent to the
+// controller.
 
 export type Value = string | number | boolean | Value[] | Table;
 export interface Table {

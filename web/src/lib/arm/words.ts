@@ -96,8 +96,8 @@ export function noJog(controller: Controller | undefined, job?: { what: string; 
   return `Jogging needs the arm to hold position. ${word}: ${next || detail}`;
 }
 
-/** Returns the question that is asked before a controller without parameters uses its defaults. It explains the origin of
- * the defaults, and the risk if the arm is a different one. */
+/** Returns the question that is asked before a controller without parameters uses its defaults. The text explains the
+ * origin of the defaults, and the risk if the arm is a different one. */
 export function defaultsWords(info: Pick<InfoObject, 'arm' | 'defaults_stored'> | undefined, simulated: boolean): { question: string; used: string; risk: string; button: string } {
   const name = info?.arm || 'the built-in arm';
   const [stored, known] = [info?.defaults_stored ?? false, name === info?.arm];

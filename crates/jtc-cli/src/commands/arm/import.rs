@@ -40,7 +40,7 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Lists the changes by kind. The same change of several joints is listed in one line.
+/// Lists the changes by kind. A change that several joints have in common is listed in one line.
 fn changes(warnings: &[Warning]) -> String {
     let mut kinds: BTreeMap<Change, Vec<(&str, Vec<&str>)>> = BTreeMap::new();
     for w in warnings {

@@ -10,7 +10,7 @@ use super::Course;
 use crate::failure::output_lost;
 use crate::tape::Tape;
 
-/// Files of a run. They are opened before the run.
+/// Files of a run, which are opened before the run.
 pub struct Outputs {
     record: Option<OutputFile>,
     report: Option<OutputFile>,

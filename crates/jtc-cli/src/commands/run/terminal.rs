@@ -105,7 +105,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
     /// Returns the recording and the figures of the run.
     pub fn taken(self) -> Taken {
         let Self { job, outputs, reel, done, last: samples, .. } = self;
-        // Each motion begins the recording before it moves.
+        // Each motion begins the recording before the arm moves.
         let reel = reel.unwrap_or_else(|| Reel::new(RecordingInfo::of(&job.arm), None, Duration::ZERO));
         Taken { done, samples, reel, outputs }
     }

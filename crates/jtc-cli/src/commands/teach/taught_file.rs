@@ -26,14 +26,14 @@ struct Row {
     end: usize,
 }
 
-/// File with the rows of the motion. Of the rest before and after the motion, it contains one pose each.
+/// File with the rows of the motion, and one pose each of the rest before and after the motion.
 pub struct TaughtFile {
     name: String,
     output: Option<OutputFile>,
     file: Option<File>,
     text: String,
     rows: Vec<Row>,
-    /// First pose of the present rest, and the number of its last row.
+    /// First pose of the present rest, and the last slot of the grid in which the arm was at rest.
     rest: Option<([f64; 6], i64)>,
     start_slot: i64,
     last_slot: i64,

@@ -98,7 +98,7 @@ class Event:
         kind: Heartbeats: ``late``, ``lost``, ``back``, ``rebooted``. Control loops: ``left-loop``, ``stopped-by-policy``,
             ``in-loop``. Board: ``error``, ``text``. Bus: ``competing-master``, ``foreign``, ``number-shared``. Others:
             ``updated``, with the result of an update for a board, and ``note``.
-        board: Number of the board; None if the event is about no board.
+        board: Number of the board; None if the event is not about a board.
         text: Event in words.
     """
 

@@ -55,7 +55,8 @@ class OutputTable:
 
 
 class Monitor(Iterator[Sample]):
-    """Iterator over samples as they arrive. It ends after a time or a number of samples. `Chain.monitor` makes it.
+    """Iterator over samples as they arrive, which ends after a time or a number of samples. `Chain.monitor` makes this
+    iterator.
 
     Raises:
         FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); raised only

@@ -30,8 +30,10 @@ export function jtc(args, options = {}) {
   });
 }
 
-/** Starts an agent in a new directory, with a simulated arm. With `faults`, the agent uses the port of a simulated controller that has
- * these faults. */
+/**
+ * Starts an agent in a new directory, with a simulated arm. With `faults`, the agent uses the port of a simulated
+ * controller that has these faults.
+ */
 export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = undefined } = {}) {
   const dir = mkdtempSync(join(tmpdir(), 'openjtc-web-'));
   const tokenFile = join(dir, 'tokens.toml');

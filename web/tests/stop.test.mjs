@@ -12,8 +12,10 @@ after(() => browser.close());
 
 const on = staged(() => browser);
 
-/** Starts a motion of half a minute as another client, and calls `act` during the motion. This is long enough even on a
- * busy computer. */
+/**
+ * Starts a motion of half a minute as another client, and calls `act` during the motion. This is long enough even on a
+ * busy computer.
+ */
 async function moving(agent, act) {
   await jtc(['example', 'motion', '-o', agent.dir]);
   const text = readFileSync(join(agent.dir, 'motion.csv'), 'utf8');

@@ -18,8 +18,9 @@ const status = async (agent) => (await agent.ask('GET', '/api/status')).body;
 const joints = async (agent) => (await status(agent)).controller.joints.map((joint) => joint.position_rad);
 const moves = async (agent) => (await status(agent)).controller.joints.some((joint) => Math.abs(joint.velocity_rad_s) > 0.01);
 
-/** Presses a jog key again, like a user, because the page releases it after the browser was suspended for half a
- * second. */
+/**
+ * Presses a jog key again, like a user, because the page releases it after the browser was suspended for half a second.
+ */
 async function pressAgain(page, key) {
   if (!(await key.getAttribute('class')).includes('held')) {
     await page.mouse.up();

@@ -60,8 +60,10 @@ export interface Ask {
   yields?: boolean;
 }
 
-/** Largest number of open requests, in addition to those sent ahead. A browser opens six connections to one agent, and silently queues
- * further requests. */
+/**
+ * Largest number of open requests, in addition to those sent ahead. A browser opens six connections to one agent, and
+ * silently queues further requests.
+ */
 export const OPEN_MAX = 3;
 /** Longest wait of a command for its turn, ms. After that the command is dropped, because the page may have changed by then. */
 export const WAIT_MAX_MS = 2000;

@@ -37,8 +37,10 @@ export interface Surroundings {
 
 export type Phase = 'connecting' | 'open' | 'waiting' | 'closed';
 
-/** Time without a message after which the connection is considered lost, ms. The agent sends at least one message every
- * half second. */
+/**
+ * Time without a message after which the connection is considered lost, ms. The agent sends at least one message every
+ * half second.
+ */
 export const SILENT_MS = 1400;
 /** Longest time to open a socket, ms. */
 const OPENING_MS = 4000;
@@ -100,8 +102,10 @@ export class Connection<S extends BaseStatus> {
     this.#enter('closed');
   }
 
-  /** Tries at once instead of waiting for the next attempt. Called when the network is back, or the page is visible
-   * again. */
+  /**
+   * Tries at once instead of waiting for the next attempt. Called when the network is back, or the page is visible
+   * again.
+   */
   hurry(): void {
     if (this.#phase !== 'waiting') return;
     this.#around.never(this.#timer);
@@ -166,8 +170,10 @@ export class Connection<S extends BaseStatus> {
     }
   }
 
-  /** Detects another agent, whose event numbers begin again. Its events are requested from the beginning, and this message
-   * is dropped. */
+  /**
+   * Detects another agent, whose event numbers begin again. Its events are requested from the beginning, and this
+   * message is dropped.
+   */
   #know(agent: string): boolean {
     const other = this.#agent !== undefined && this.#agent !== agent;
     this.#agent = agent;

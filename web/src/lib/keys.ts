@@ -9,8 +9,10 @@ export interface Focused {
 
 const TYPED = new Set(['text', 'search', 'url', 'tel', 'email', 'password', 'date', 'time', '']);
 
-/** Returns `true` if keys enter text in this element. Buttons, sliders and switches do not take text. There the space bar stops, and
- * Enter presses the button. */
+/**
+ * Returns `true` if keys enter text in this element. Buttons, sliders and switches do not take text. There the space
+ * bar stops, and Enter presses the button.
+ */
 export function takesText(element: Focused | null | undefined): boolean {
   if (!element) return false;
   if (element.isContentEditable) return true;

@@ -27,8 +27,10 @@ export class Lateness {
     this.#floors = [...this.#floors.filter(({ at }) => at > sent - PROBED_MS), { at: sent, floor }];
   }
 
-  /** Returns the largest possible delay, ms, of a message that was created at `made` and received at `now`. Without probes the delay
-   * is relative to the fastest message. */
+  /**
+   * Returns the largest possible delay, ms, of a message that was created at `made` and received at `now`. Without
+   * probes the delay is relative to the fastest message.
+   */
   take(made: number, now: number): number {
     const span = Math.floor(now / SPAN_MS);
     const difference = now - made;

@@ -66,8 +66,10 @@ export interface Driven {
   works: string;
   /** Actions allowed with a viewer's token. */
   viewerMay: string;
-  /** Policies for a running motion after a disconnect of this browser, the usual one first. Each has the words that end the sentence
-   * `left`. */
+  /**
+   * Policies for a running motion after a disconnect of this browser, the usual one first. Each has the words that end
+   * the sentence `left`.
+   */
   policies: readonly [[Policy, string], ...[Policy, string][]];
   left: string;
 }
@@ -139,8 +141,10 @@ export class Session<S extends SessionStatus> {
 
   /** `true` while a job of this page runs. */
   isBusy: () => boolean = () => false;
-  /** `true` if no motion would continue without a lease. Then the lease is released when the page closes. Otherwise the
-   * lease expires, and its policy applies. */
+  /**
+   * `true` if no motion would continue without a lease. Then the lease is released when the page closes. Otherwise the
+   * lease expires, and its policy applies.
+   */
   isAtRest: () => boolean = () => false;
   /** Result of the last Stop, in the words of the page. Empty: no message. */
   saysOfStop: () => { text: string; failed: boolean } = () => ({ text: this.stopState.text, failed: this.stopState.phase === 'failed' });

@@ -311,8 +311,10 @@ export class ArmPage {
     });
   }
 
-  /** Returns a free number for a new trajectory. If the request contains `new`, the agent refuses the number if another
-   * client has used it meanwhile. */
+  /**
+   * Returns a free number for a new trajectory. If the request contains `new`, the agent refuses the number if another
+   * client has used it meanwhile.
+   */
   async freeNumber(): Promise<number> {
     await this.readTrajectories();
     return freeNumber(this.trajectories);

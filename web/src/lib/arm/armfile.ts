@@ -72,8 +72,10 @@ function compare(board: Value | undefined, file: Value | undefined, place: strin
 /** Keys that are never sent to the controller. A difference in them is not a difference of the arm. */
 const NOT_GIVEN = new Set(['poses', 'format']);
 
-/** Returns the differences between two arm files in the data that the controller uses. Throws TomlError for invalid
- * TOML. */
+/**
+ * Returns the differences between two arm files in the data that the controller uses. Throws TomlError for invalid
+ * TOML.
+ */
 export function differences(board: string, file: string): Difference[] {
   const [a, b] = [parse(board), parse(file)];
   for (const key of NOT_GIVEN) {

@@ -51,8 +51,10 @@ export class Jogger {
     this.#timer = this.#line.every(() => this.#tick(), PERIOD_MS);
   }
 
-  /** Releases the key. Also called if the pointer, the window or the connection is lost. Without a pressed key no request is
-   * sent. */
+  /**
+   * Releases the key. Also called if the pointer, the window or the connection is lost. Without a pressed key no
+   * request is sent.
+   */
   release(): void {
     if (!this.#rates) return;
     this.#end();

@@ -10,8 +10,10 @@ export function isRecorded(quantity: string): quantity is Recorded {
   return quantity in COLUMNS;
 }
 
-/** Returns the columns of a plot: the time, then a column for each joint (from 1), then the commanded values if
- * requested. All values are multiplied by `scale`. */
+/**
+ * Returns the columns of a plot: the time, then a column for each joint (from 1), then the commanded values if
+ * requested. All values are multiplied by `scale`.
+ */
 export function columnsOf(log: LogValues, quantity: Recorded, joints: readonly number[], scale: number, commanded: boolean): (number | null)[][] {
   const scaled = (column: readonly (number | null)[] | undefined) => (column ?? []).map((value) => (value === null ? null : value * scale));
   const of = (key: keyof LogValues['joints'][number]) => joints.map((joint) => scaled(log.joints[joint - 1]?.[key]));

@@ -63,8 +63,10 @@ function isJson(text: string): boolean {
   return /^[\s\uFEFF]*[[{]/.test(text);
 }
 
-/** Returns the waypoint as a row below the header of `text`. `degrees`: numbers without a unit in the header are degrees. `model`: needed
- * for poses of the flange. */
+/**
+ * Returns the waypoint as a row below the header of `text`. `degrees`: numbers without a unit in the header are
+ * degrees. `model`: needed for poses of the flange.
+ */
 export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model?: ArmModel): Row {
   if (isJson(text)) return { problem: 'These waypoints are JSON. Rows can be added to a table (CSV) only.' };
   const header = first(text);

@@ -131,8 +131,10 @@ export function bodyOf(model: ArmModel, materials: Materials, plain = false): Bo
   return { root, joints, mounts, flange };
 }
 
-/** Returns the offset of a link from the origin of its joint along the axis, m. For a link between parallel axes, this is
- * the offset of its centre of mass. */
+/**
+ * Returns the offset of a link from the origin of its joint along the axis, m. For a link between parallel axes, this
+ * is the offset of its centre of mass.
+ */
 function asideOf(model: ArmModel, i: number, to: Vector3): number {
   const across = Math.hypot(to.x, to.y);
   const com = model.links[i + 1]?.com_xyz_m ?? [0, 0, 0];

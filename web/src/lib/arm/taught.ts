@@ -5,8 +5,10 @@ export interface Sample {
   q: number[];
 }
 
-/** Returns the largest distance of a joint, rad, between a sample and the nearest place on the line between two other
- * samples. */
+/**
+ * Returns the largest distance of a joint, rad, between a sample and the nearest place on the line between two other
+ * samples.
+ */
 function aside(sample: Sample, from: Sample, to: Sample): number {
   // The nearest place on the line in joint space is used, not the place at the same time, because the speed of the hand
   // is irrelevant for the path.

@@ -25,8 +25,10 @@ export function figuresOf(result: JointResult | undefined, before: Figures | und
   return { max: Math.max(max, before?.max ?? 0), rms: Math.max(rms, before?.rms ?? 0) };
 }
 
-/** Returns the errors of several tests in mrad, as columns with a common time. The time counts from the first motion of
- * each test. */
+/**
+ * Returns the errors of several tests in mrad, as columns with a common time. The time counts from the first motion of
+ * each test.
+ */
 export function overlay(trials: readonly Trial[]): (number | null)[][] {
   const rows = new Map<number, (number | null)[]>();
   trials.forEach((trial, k) => {

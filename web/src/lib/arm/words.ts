@@ -26,8 +26,10 @@ function sentence(words: string): string {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
-/** Returns the current errors, the most specific first: the cause of a held stop, then the error bits. `explain` accepts each
- * of them unchanged. */
+/**
+ * Returns the current errors, the most specific first: the cause of a held stop, then the error bits. `explain` accepts
+ * each of them unchanged.
+ */
 export function causesOf(controller: Controller): Cause[] {
   const stop = controller.held_stop;
   const found = stop ? [{ words: sentence(stop.text), code: stop.code }] : [];
@@ -79,8 +81,9 @@ export function isPaused(controller: Controller | null | undefined): boolean {
   return controller != null && controller.trajectory === 'Pause';
 }
 
-/** Returns the reason why no joint can be jogged. Empty: jogging is possible. `job` is the running job and its stage.
- * */
+/**
+ * Returns the reason why no joint can be jogged. Empty: jogging is possible. `job` is the running job and its stage.
+ */
 export function noJog(controller: Controller | undefined, job?: { what: string; stage: 'begun' | 'uploading' | 'executing' }): string {
   if (!controller) return 'The state of the arm is not known.';
   if ((controller.state === 'HoldPos' || controller.state === 'Operate') && controller.errors.length === 0) {
@@ -96,8 +99,10 @@ export function noJog(controller: Controller | undefined, job?: { what: string; 
   return `Jogging needs the arm to hold position. ${word}: ${next || detail}`;
 }
 
-/** Returns the question that is asked before a controller without parameters uses its defaults. The text explains the
- * origin of the defaults, and the risk if the arm is a different one. */
+/**
+ * Returns the question that is asked before a controller without parameters uses its defaults. The text explains the
+ * origin of the defaults, and the risk if the arm is a different one.
+ */
 export function defaultsWords(info: Pick<InfoObject, 'arm' | 'defaults_stored'> | undefined, simulated: boolean): { question: string; used: string; risk: string; button: string } {
   const name = info?.arm || 'the built-in arm';
   const [stored, known] = [info?.defaults_stored ?? false, name === info?.arm];
@@ -120,8 +125,10 @@ export function fastest(controller: Controller): number {
 
 const MOVES_RAD_S = 0.01;
 
-/** Returns the texts of a state. `job` is the current job as text. `missing` are the parameters that the controller
- * lacks. */
+/**
+ * Returns the texts of a state. `job` is the current job as text. `missing` are the parameters that the controller
+ * lacks.
+ */
 export function stateWords(controller: Controller, job: string | undefined, missing: readonly string[]): StateWords {
   const causes = causesOf(controller);
   const base = { causes, next: '' };

@@ -143,8 +143,10 @@ export class ChainPage {
     return this.#traces.get(number)?.history;
   }
 
-  /** Sends a command. A refusal is shown as a message. `ends`: the command moves no board and is executed even after a
-   * Stop. */
+  /**
+   * Sends a command. A refusal is shown as a message. `ends`: the command moves no board and is executed even after a
+   * Stop.
+   */
   async command<T = unknown>(what: string, method: string, path: string, body?: unknown, ends = false): Promise<{ value: T } | undefined> {
     // The timeout is long, because boards answer in sequence and a running job first ends its own operation. After a
     // Stop that this page had not yet shown, a command has no effect, even if it arrives late.

@@ -44,8 +44,10 @@ export function stepOf(min: number, max: number, whole: boolean): number {
 
 const WORD = { min: -32768, max: 65535 };
 
-/** Returns the range of a slider. Without a signal table it is a small part of the range of a word, so that a touch does not send
- * the largest value. */
+/**
+ * Returns the range of a slider. Without a signal table it is a small part of the range of a word, so that a touch does
+ * not send the largest value.
+ */
 export function rangeOf(value: Value, chosen: { min: number; max: number } | undefined): Range {
   const whole = !value.unit;
   const of = (min: number, max: number, by: Range['by']): Range => ({ min, max, step: stepOf(min, max, whole), by });
@@ -65,8 +67,10 @@ export function text(value: number, step: number, unit: string | null | undefine
   return `${number(value, digitsOf(step))}${unit ? ` ${unit}` : ''}`;
 }
 
-/** Returns a number in the form that the agent expects. If there is a unit it is included, because a number without a unit
- * could mean another value. */
+/**
+ * Returns a number in the form that the agent expects. If there is a unit it is included, because a number without a
+ * unit could mean another value.
+ */
 export function given(value: number, step: number, unit: string | null | undefined): number | string {
   const plain = value.toFixed(digitsOf(step));
   return unit ? `${plain} ${unit}` : Number(plain);

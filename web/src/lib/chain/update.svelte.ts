@@ -17,8 +17,10 @@ export async function pick(file: File): Promise<Picked> {
   return { name: file.name, size: bytes.length, base64: btoa(text) };
 }
 
-/** Returns the format of a file. Raw bytes are accepted only with the ending `.bin`, so that a text is never flashed as
- * raw bytes by mistake. */
+/**
+ * Returns the format of a file. Raw bytes are accepted only with the ending `.bin`, so that a text is never flashed as
+ * raw bytes by mistake.
+ */
 export function formatOf(name: string): UpdateRequest['format'] {
   return /\.bin$/i.test(name) ? 'bin' : undefined;
 }

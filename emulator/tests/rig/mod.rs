@@ -17,9 +17,9 @@ use openjtc_emulator::{Board, BoardConfig, FIRST_LINE, Port};
 
 use jtc_core::{ControllerState, Telemetry};
 use jtc_sim::Moment;
-use sim_checks::Invariants;
 use jtc_sim::{FaultKind, host as frames};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, Response, Status, StoreState};
+use sim_checks::Invariants;
 
 #[allow(unused_imports, reason = "each test uses its part")]
 pub use elf::{BOARDS, Version, elf, fast_elf, program, version};

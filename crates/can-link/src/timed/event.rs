@@ -73,7 +73,7 @@ pub enum BusError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum QueueError {
     /// The frame is a CAN FD frame, but the bus is classic.
-    #[error("CAN FD frames are none of a bus in virtual time, which is classic")]
+    #[error("a bus in virtual time carries classic CAN frames only, no CAN FD frames")]
     NotClassic,
     /// The member's controller is bus-off until it recovers.
     #[error("the member is bus-off; its controller must recover first")]

@@ -116,7 +116,7 @@ pub enum FirmwareError {
         board: String,
     },
     /// The drive belongs to another board.
-    #[error("{}: the drive of a board {named}, and the image is for {board}", drive.display())]
+    #[error("{}: this drive belongs to a board {named}, but the image is for {board}", drive.display())]
     OtherBoard {
         /// The drive.
         drive: PathBuf,

@@ -50,13 +50,13 @@ pub enum ImageError {
         place: String,
     },
     /// Raw bytes were requested, but the file is a text.
-    #[error("a text is no program, raw bytes were asked for: \"{starts}…\"")]
+    #[error("raw bytes were requested, but this is a text, not a program: \"{starts}…\"")]
     RawText {
         /// Beginning of the text.
         starts: String,
     },
     /// Raw bytes were requested, but the name is the name of an Intel HEX or S-record file.
-    #[error("{name}: raw bytes were asked for, but the name is that of a file of records")]
+    #[error("{name}: raw bytes were requested, but by its name this is an Intel HEX or S-record file")]
     RawName {
         /// The file.
         name: String,

@@ -62,7 +62,7 @@ pub enum RecordProblem {
     #[error("not a length of 0 to 8")]
     Length,
     /// The text is not data.
-    #[error("the data are not pairs of hexadecimal digits, or too many")]
+    #[error("the data are not pairs of hexadecimal digits, or are more than 8 bytes")]
     Data,
     /// The file ends in the middle of the record. The readable part may be only the beginning of the record.
     #[error("the file is broken off here: the line has no end")]

@@ -32,7 +32,7 @@ pub enum ExchangeError {
         last: Option<LastReceived>,
     },
     /// No answer was complete.
-    #[error("board {board}: the answer to {} never came whole ({tries} tries): {problem}", asked.name())]
+    #[error("board {board}: the answer to {} was not received completely ({tries} tries): {problem}", asked.name())]
     Incomplete {
         /// Board number.
         board: u8,

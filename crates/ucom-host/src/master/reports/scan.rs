@@ -117,7 +117,7 @@ pub enum ScanFinding {
         problem: &'static str,
     },
     /// No description of the board was received completely.
-    #[error("the description of board {board} never came whole")]
+    #[error("the description of board {board} was not received completely")]
     NoDescription {
         /// Board number.
         board: u8,

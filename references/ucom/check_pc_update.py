@@ -149,7 +149,7 @@ def until(played: Boards, frames: int) -> int:
 def cancelled(bench: Bench) -> None:
     image = bench.image()
     for cycle in (1, 2):
-        # The boards are slow, so the signal comes during a block.
+        # The PC sends slowly, so the signal comes during a block.
         with alone(bench, profile="prog.frame_gap_us = 20000\n") as (chain, played):
             command = begin(chain, image)
             until(played, 8 * ((cycle - 1) * blocks(image) + 2) + bench.random.randint(1, 6))

@@ -1,4 +1,4 @@
-//! Attacks by clients without permission, as listed in docs/security.md. They are also possible on an arm's agent.
+//! Attacks by clients without permission, as listed in docs/security.md. The tests of an arm's agent try the same ones.
 use crate::common;
 
 use std::io::{Read as _, Write as _};

@@ -60,7 +60,7 @@ fn a_run_whose_client_dies_meanwhile_is_stopped() {
     }
 }
 
-/// A run was cancelled and one of its boards could not be stopped: the agent stops that board later.
+/// A run was cancelled and one of its boards could not be stopped: the agent still stops that board when the agent ends.
 #[test]
 fn a_run_that_cannot_be_taken_back_counts_as_started() {
     let (served, key) = Served::numbered(3);

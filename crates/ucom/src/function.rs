@@ -49,7 +49,7 @@ pub enum Sender {
     Pc,
     /// The boards only.
     Board,
-    /// The PC and the boards, with the same identifier. D-05 defines how receivers distinguish them.
+    /// The PC and the boards, with the same identifier. D-05 defines how they avoid sending it at the same time.
     Both,
 }
 

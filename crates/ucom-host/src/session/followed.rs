@@ -106,7 +106,7 @@ struct One {
     out: bool,
     /// `true` if any board was lost or has rebooted since this board started to run. With `on_lost` this may be the reason for its stop.
     lost: bool,
-    /// `true` if the board has ever left its loop while no board was lost.
+    /// `true` if the board has ever left its loop before any board was lost or had rebooted.
     left: bool,
     /// `true` if the status byte shows that the board has left its loop. The board's own report was then lost.
     status_out: bool,

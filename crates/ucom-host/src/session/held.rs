@@ -127,8 +127,8 @@ impl Session {
         self.held.borrow_mut().followed.ask_no_more(&mut self.driver.master);
     }
 
-    /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands`). Otherwise the boards of
-    /// another PC would not become safe if that PC is lost (D-50).
+    /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands` is `false`). Otherwise the
+    /// boards of another PC would not become safe if that PC is lost (D-50).
     pub fn rest(&mut self, commands: bool) {
         if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
             self.driver.master.end_session();

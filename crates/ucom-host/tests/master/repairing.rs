@@ -40,8 +40,8 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // The board did not receive the number, or the pin of its neighbour is still on. The error does not say
-        // which.
+        // The board did not receive the number, or the pin of its neighbour is still on. Such an error makes no
+        // statement about the numbers.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }

@@ -60,7 +60,7 @@ pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) 
 }
 
 /// Returns `true` if the board reports the program, either because this update wrote it, or because the board had it
-/// before and the flash record does not prove the whole image.
+/// before and no flash record proves the image.
 fn shows_it(result: &UpdateResult) -> bool {
     matches!(result.outcome, UpdateOutcome::Verified | UpdateOutcome::ProgramUpToDate)
 }

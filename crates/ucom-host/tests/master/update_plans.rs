@@ -49,7 +49,8 @@ fn d40_what_the_first_cycle_may_have_erased() {
             assert_eq!(report.exit(), if erased { 5 } else { before }, "{plan}: {report:?}");
             assert_eq!(report.boards[0].outcome, left, "{plan}: {report:?}");
         }
-        // When the error comes with the last block, every plan except `verify-write` has erased flash.
+        // Error 3 comes after block 16 of the attempt, counted from 0: under `verify-write` the last block of cycle 1, under
+        // the other plans after an erase.
         let board = Loader { special: |_, block| (block == 16).then_some("081#03"), ..Loader::new(blocks) };
         let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
         let expected = if plan == Plan::VerifyWrite { 1 } else { 5 };

@@ -1,7 +1,7 @@
 //! The messages of both directions, and their conversion to and from frames.
 //!
-//! Both sides send functions 22, 24 and 26 with the same identifier (D-05). The caller tells the sender by choosing [`ToBoard`] or
-//! [`FromBoard`].
+//! Both sides send functions 22, 24 and 26 with the same identifier (D-05). The caller must know the sender, and
+//! chooses [`ToBoard`] or [`FromBoard`] accordingly.
 
 mod from_board;
 mod to_board;

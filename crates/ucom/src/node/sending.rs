@@ -26,7 +26,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 
     /// Queues MCA_ADMIN_DATA without a request. The frame waits a random time, because the PC may be about to send the same identifier
-    /// (D-05). If an answer is already waiting, no second frame is queued.
+    /// (D-05). If the flags already wait to be sent, no second frame is queued.
     pub(super) fn send_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);

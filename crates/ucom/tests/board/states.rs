@@ -342,7 +342,7 @@ fn d43_cancel_and_again() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, 0x4B3F);
 }
 
-/// D-24: an acknowledge is in the CAN controller when the board's number is removed. If the controller gives it up,
+/// D-24: an acknowledgement is in the CAN controller when the board's number is removed. If the controller gives it up,
 /// it is not offered again, and the board can sleep.
 #[test]
 fn d24_no_acknowledge_without_a_number() {
@@ -358,8 +358,8 @@ fn d24_no_acknowledge_without_a_number() {
     assert!(board.next_deadline() > now, "nothing to do");
 }
 
-/// D-24: the board's number is removed while its acknowledge is in the CAN controller, and the PC gives another
-/// number. When the old acknowledge is sent, the board does not get the new number yet.
+/// D-24: the board's number is removed while its acknowledgement is in the CAN controller, and the PC gives
+/// another number. When the old acknowledgement is sent, the board does not get the new number yet.
 #[test]
 fn d24_acknowledge_of_a_forgotten_number() {
     let mut bus = in_state(Idle);

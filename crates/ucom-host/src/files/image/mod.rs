@@ -213,7 +213,8 @@ impl Image {
     /// Reads a file.
     pub fn read(path: &std::path::Path, options: &ImageOptions) -> Result<Self, ImageError> {
         let io = |source: std::io::Error| ImageError::Io { path: path.into(), source };
-        // A record needs at most 14 characters per byte: one data byte in an S-record with a 32-bit address and a line end.
+        // 16 characters per byte are enough for records of two data bytes or more: an S-record with a 32-bit address, two data bytes and a
+        // line end has at most 20 characters.
         let most = (options.max_bytes as u64).saturating_mul(16).saturating_add(4096);
         let length = std::fs::metadata(path).map_err(io)?.len();
         if length > most {

@@ -279,7 +279,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                     }
                     .into());
                 }
-                // Errors caused by a bad bus are only stored. Such errors are returned if all attempts fail.
+                // Errors caused by a bad bus are only to be logged. The last one is returned if all attempts fail.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }

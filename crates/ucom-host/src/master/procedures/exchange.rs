@@ -122,7 +122,7 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
 /// Sends PC_INFO and reads the answer with the description. Tries up to three times.
 ///
 /// If the description is never complete, the values of the first frame are returned without it. If an answer contains another number, the
-/// board is asked again; the same wrong number in two answers in a row is an error (D-24).
+/// board is asked again. If the same wrong number comes again, the procedure ends at once with an error (D-24).
 pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     info_for(link, board, true).await
 }
@@ -227,8 +227,8 @@ pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
-/// Sends a request that is answered with flags. An error from the board does not end the exchange: errors caused by a bad bus are only
-/// stored, and often mean that the request was lost. The error is returned if all attempts fail.
+/// Sends a request that is answered with flags. An error from the board does not end the exchange: errors caused by a bad bus are only to
+/// be logged, and come just when the request itself was lost. The error is returned if all attempts fail.
 async fn ask_admin(
     link: &Link,
     board: u8,

@@ -13,7 +13,8 @@ use ucom::{Sequence, Status, ToBoard};
 
 /// Updates all boards that are not done yet at once by broadcast. A board that drops out of the group gets further attempts on its own.
 ///
-/// If the broadcast could reach a wrong board, nothing is sent and the boards are updated one by one.
+/// If a board outside the group keeps PROG = 1, the update is refused. If a selected board fails before the transfer and may still accept
+/// program data, there is no broadcast, and the others are updated one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
@@ -87,7 +88,7 @@ async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, 
 
 /// Ends the programming mode of every number that is not selected, and reads the status back.
 ///
-/// Even numbers that do not answer are sent the command three times. Boards without a number ignore PC_PROG.
+/// The command is sent three times to each number, whether it answers or not. Boards without a number ignore PC_PROG.
 async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     let others: Vec<Sequence> =
         link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();

@@ -89,8 +89,8 @@ pub fn trajectory_yaml(data: &[u8]) {
     sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
 }
 
-/// Checks an arm that was read: its model is physical and its parameters fit into their frames, or an error gives the
-/// reason.
+/// Checks an arm that was read: its model is physical, and its parameters fit into their frames unless their own check
+/// rejects them.
 fn sound_arm(read: Result<Arm, FileError>) {
     let Ok(arm) = read else { return };
     assert!(arm.model.check().is_ok());

@@ -187,7 +187,7 @@ impl Sample {
     }
 
     /// Returns the values of a status while `trajectory` is executed. The commanded values are computed for the reported
-    /// point, like the controller does. For the error the measurements are taken to be `delay_ticks` old (J-62).
+    /// point, as the controller does. For the error the measurements are taken to be `delay_ticks` old (J-62).
     pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory, delay_ticks: u8) -> Self {
         let mut sample = Self::from_status(time_s, status);
         if status.state == ControllerState::Operate

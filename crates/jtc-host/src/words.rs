@@ -172,8 +172,8 @@ pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
     all.extend(errors(s.errors & error::EMERGENCY_INPUT).into_iter().map(String::from));
     for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
-        // An active safety line switches the torque of a drive off. An unconfigured drive also sets this bit, so it is
-        // ignored until then.
+        // An active safety line switches the torque of a drive off. An unconfigured drive also sets this bit, so the bit is
+        // ignored until the drive is configured.
         let line_active = joint.warnings & warning::SAFETY_LINE != 0 && !is_awaited(s, number.index());
         let words = joint_errors(joint.internal)
             .into_iter()

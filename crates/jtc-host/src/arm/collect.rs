@@ -49,8 +49,8 @@ impl ParameterFile {
         Self::load_all(std::slice::from_ref(&path.to_owned()))
     }
 
-    /// Reads files and directories together. If two contain the same parameter, the later one is used. A parameter in one
-    /// file for each joint is used only if `paths` lists all six files or their directory. So no joint gets the numbers of
+    /// Reads files and directories together. If two contain the same parameter, the later one is used. A parameter with
+    /// one file for each joint is used only if `paths` lists all six files or their directory. So no joint gets the numbers of
     /// another joint, and no file is read that the user did not mean.
     ///
     /// # Errors

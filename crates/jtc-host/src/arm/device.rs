@@ -41,7 +41,7 @@ impl std::fmt::Display for Difference {
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
-/// Description of the settings that cannot be sent in a frame.
+/// Description of the settings that are not sent with friction, gains and arm model.
 pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
@@ -86,8 +86,8 @@ impl Arm {
         all
     }
 
-    /// Returns the settings that cannot be sent in a frame and that the file does not give. The controller uses its own
-    /// values, so these settings are not compared.
+    /// Returns the settings that are not sent with friction, gains and arm model, and that the file does not give. The
+    /// controller uses its own values, so these settings are not compared.
     pub fn settings_not_given(&self) -> Vec<&'static str> {
         let rotors = self.rotors_given.contains(&false);
         let parts = [(self.gravity.is_none(), "gravity"), (rotors, "rotor inertia")];

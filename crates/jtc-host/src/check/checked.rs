@@ -21,9 +21,9 @@ static PASSED: AtomicU64 = AtomicU64::new(1);
 pub struct CheckOptions {
     /// Division into segments for the upload; the check includes the number of segments.
     pub upload: UploadOptions,
-    /// `true` if the settings that cannot be sent in a frame (limits, gravity, rotor inertia) may differ between arm file
-    /// and controller. The caller thereby confirms that the controller's values are safe for this arm. If `false`, the
-    /// check refuses such an arm (J-55).
+    /// `true` if the settings that are not sent with friction, gains and arm model (limits, gravity, rotor inertia) may
+    /// differ between arm file and controller. The caller thereby confirms that the controller's values are safe for this
+    /// arm. If `false`, the check refuses such an arm (J-55).
     pub accept_device_limits: bool,
     /// Settings of the controller. The default is the built-in settings. For a controller with extensions use the result of
     /// [`Session::device_config`](crate::Session::device_config).

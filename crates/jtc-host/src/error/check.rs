@@ -14,7 +14,8 @@ pub enum CheckError {
     /// The check found problems.
     #[error("{0}")]
     Refused(Box<Verdict>),
-    /// The arm file and the controller have different values for settings that cannot be sent in a frame (J-55).
+    /// The arm file and the controller have different values for settings that are not sent with friction, gains and arm
+    /// model (J-55).
     #[error("{arm}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent ({})", values(differences.len()), listed(differences))]
     DeviceLimits {
         /// Name of the arm.

@@ -253,7 +253,7 @@ pub fn may_flash(
             board: board.clone(),
         });
     }
-    // If the program of this board runs, the supply of the board is right for it. The solder bridges cannot be read.
+    // A program that runs shows that the board has the supply that it needs. The solder bridges cannot be read.
     let mut runs = before.own_info().map(|info| info.board.as_str());
     let runs_this = runs.next().is_some_and(|runs| runs == board) && runs.all(|runs| runs == board);
     let supply_known = !has_two_supplies(board) || runs_this;

@@ -68,7 +68,7 @@ pub fn put(drive: &Drive, image: &Image, progress: &mut dyn FnMut(usize)) -> Res
     Ok(Written { began, ended: Instant::now(), failure_before, doubt })
 }
 
-/// Creates the file on the drive. It is never created on another file system.
+/// Creates the file on the drive. A file that was created on another file system instead is removed.
 fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let gone = || FirmwareError::Changed { what: format!("{}: the drive has gone", drive.path.display()) };
     let is_drive = |found: &fs::Metadata| drive.volume.is_none() || volume(found) == drive.volume;

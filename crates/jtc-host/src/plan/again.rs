@@ -34,7 +34,7 @@ impl Planner<'_> {
         if share < 1.0 {
             planned.trajectory = at_speed(&planned.trajectory, (100.0 * share).max(1.0))?;
             planned.waypoint_times.iter_mut().for_each(|t| *t /= share);
-            // The motion was slowed down to its original duration, so no limit is reached.
+            // The motion was slowed down to the duration of the original, so no limit binds it.
             planned.binding.clear();
         }
         Ok(planned)

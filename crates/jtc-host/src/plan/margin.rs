@@ -1,9 +1,9 @@
 //! Torque margin of a plan: the part of each torque limit that is left free for effects that the model does not contain.
 //!
 //! A plan keeps the model torque, including friction, below (100 % − margin) of each limit. This holds at the lowest
-//! bearing temperature of the plan and at the usual one. If gravity and breakaway friction alone need more than that,
-//! the motion may use a quarter of the torque that they leave, and at least 2 % of the limit
-//! ([`ArmDynamics::usable_torque`]). So a pose that the arm can hold can also be reached and left.
+//! bearing temperature of the plan and at the usual one. If gravity and breakaway friction alone leave little or
+//! nothing below that, the motion may instead use a quarter of the torque that they leave of the whole limit, and at least
+//! 2 % of the limit ([`ArmDynamics::usable_torque`]). So a pose that the arm can hold can also be reached and left.
 //! [`Verdict::margin`](crate::check::Verdict::margin) reports the margin of a motion.
 
 use jtc_core::JOINTS;

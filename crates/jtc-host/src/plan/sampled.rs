@@ -14,7 +14,7 @@ const STEP_MIN_MS: f64 = 2.0;
 const STEP_MAX_MS: f64 = 1000.0;
 /// Maximum deviation of a trajectory from the motion, between the points, rad.
 const ASIDE: f64 = 1e-3;
-/// Minimum number of points between two sharp corners. With fewer points the trajectory deviates more from the motion. A
+/// Minimum number of points for each sharp corner. With fewer points the trajectory deviates more from the motion. A
 /// corner is sharp if it turns by more than the given share of the path, and its legs are longer than the given length
 /// (rad).
 const CORNER_POINTS: usize = 3;

@@ -48,7 +48,7 @@ pub enum RecordingError {
         /// Problem that the reader found.
         problem: String,
     },
-    /// The messages of an MCAP file are not even nearly in the order of their times.
+    /// The messages of an MCAP file are far out of the order of their times.
     Disorder {
         /// The file.
         path: PathBuf,

@@ -139,7 +139,7 @@ impl MessageWriter {
     }
 
     /// Returns the message of a sample at a time (ns since 1970). Returns `None` if the sample has no data for the topic,
-    /// or if the last transforms are less than 20 ms old.
+    /// or if transforms were already written in the same 20 ms of time.
     pub fn write(&mut self, topic: Topic, stamp_ns: u64, sample: &Sample) -> Option<&[u8]> {
         let (cdr, j) = (&mut self.cdr, &sample.joints);
         match topic {

@@ -278,8 +278,8 @@ const ROOM: usize = 4096;
 ///
 /// # Errors
 ///
-/// Returns an error if the file cannot be read, is not a recording of this project, or has messages that are not even
-/// nearly in the order of their times. The samples before the error were passed to `see`.
+/// Returns an error if the file cannot be read, is not a recording of this project, or has messages that are far out
+/// of the order of their times. The samples before the error were passed to `see`.
 pub fn scan(path: &Path, see: impl FnMut(&Sample)) -> Result<Scanned, RecordingError> {
     scan_with(path, ROOM, see)
 }

@@ -14,8 +14,8 @@ use crate::words;
 /// Number of samples shown before and after the first bad sample.
 pub(super) const BEFORE: usize = 3;
 const AFTER: usize = 2;
-/// A step of the measured position is a jump if it exceeds the velocity limit by this factor. Noise and time jitter cause
-/// smaller steps.
+/// A step of the measured position is a jump if it is more than this multiple of the step that the velocity limit permits.
+/// Noise and time jitter cause smaller steps.
 const STEP_SHARE: f64 = 1.2;
 
 /// Values of a joint at one moment near the failure. Unknown values are NaN.

@@ -141,7 +141,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Switches teaching on and waits until it begins, at most until `ended` returns `true`. If it has not begun then, it is
+    /// Switches teaching on and waits until it begins. If it does not begin in time, or `ended` returns `true`, teaching is
     /// switched off again. Otherwise the arm would become compliant as soon as it is at rest, when the operator no longer
     /// expects that.
     ///
@@ -188,7 +188,8 @@ impl<P: Port> Session<P> {
         self.command(&fixed::gripper_control(pump))
     }
 
-    /// Commands the controller to use its built-in default for one parameter.
+    /// Commands the controller to use its default for one parameter: that of the stored arm, or, without one, the built-in
+    /// default (J-54).
     ///
     /// # Errors
     ///
@@ -197,7 +198,8 @@ impl<P: Port> Session<P> {
         self.command(&fixed::empty(parameter.use_default()))
     }
 
-    /// Commands the controller to use its built-in defaults: friction polynomial, gains and arm model.
+    /// Commands the controller to use its defaults, as [`use_default`](Self::use_default): friction polynomial, gains and arm
+    /// model.
     ///
     /// # Errors
     ///
@@ -280,7 +282,7 @@ impl<P: Port> Session<P> {
     /// [`MotionError::LinkLost`] reports this.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
-        // A Stop or a Pause is the first frame that is sent.
+        // No other frame is sent before a Stop or a Pause.
         if !stopping {
             self.introduce()?;
             self.read_host_timeout()?;

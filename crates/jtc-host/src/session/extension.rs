@@ -320,8 +320,8 @@ impl<P: Port> Session<P> {
         self.extension(&fixed::DISABLE)
     }
 
-    /// Jogs at these joint velocities (rad/s, base to wrist). **The arm moves** for 200 ms, or until this function is
-    /// called again (J-58).
+    /// Jogs at these joint velocities (rad/s, base to wrist). **The arm moves** until 200 ms after the last call, or until a
+    /// call in which all velocities are 0 (J-58).
     ///
     /// # Errors
     ///

@@ -93,8 +93,8 @@ impl<P: Port> Session<P> {
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
-        // The device is now in the same state as after a start. A later request of the host activates the complete stored
-        // arm.
+        // This brings the device into the same state as after a start. A later request of the host activates the complete
+        // stored arm.
         self.withdraw_arm()?;
         Ok((pushed, number))
     }

@@ -286,7 +286,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 }
 
-/// Returns the nodes that report a fault of themselves.
+/// Returns the nodes that report a fault of their own.
 fn faulty(s: &Status) -> u8 {
     let joints = s
         .joints

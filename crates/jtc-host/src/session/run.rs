@@ -44,7 +44,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Like [`Session::run`], for a run of any length. `observe` receives each sample when it arrives. `done` receives each
-    /// [`Flow`] with its result, like in [`Session::follow_with`].
+    /// [`Flow`] with its result, as in [`Session::follow_with`].
     ///
     /// # Errors
     ///

@@ -113,7 +113,7 @@ impl Upload {
             .map(|(i, chunk)| frame::segment(options.number, i as u16, count as u16, step_ms, chunk))
             .collect::<Result<Vec<Vec<u8>>, _>>()?;
         let longest = frames.first().map_or(0, Vec::len);
-        // The frames in flight take 60 ms, which covers the latency of USB adapters.
+        // The window is large enough for 60 ms on the line, which covers the latency of USB adapters.
         let time = line_time(longest, baud).as_secs_f64();
         let window = if time > 0.0 { (0.060 / time).ceil() as usize + 2 } else { WINDOW_MAX };
         Ok(Self {

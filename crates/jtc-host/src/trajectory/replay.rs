@@ -15,7 +15,7 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Minimum spacing of points, ms. If two points are this far apart or more, all are kept.
+/// Minimum spacing of points, ms. If any two consecutive points are this far apart or more, all points are kept.
 const GRID_MS: u32 = 10;
 
 /// Spacing of measured positions, s. With a smaller spacing the encoder noise would appear as speed.

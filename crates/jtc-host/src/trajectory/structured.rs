@@ -117,8 +117,8 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     samples.acceleration = all_or_none(&form.points, "acceleration_rad_s2", |p| p.acceleration_rad_s2)?;
     let exact = form.step_ms;
     let mut loaded = finish(samples, Form::Json)?;
-    // A single point keeps the step of the file, even if the step is above 1 s, so that the times would be considered
-    // irregular.
+    // A single point keeps the step of the file, even a step above 1 s, with which the times of several points would be
+    // considered irregular.
     if let (Some(step_ms), 1) = (exact, loaded.trajectory.points.len()) {
         loaded.trajectory.step_ms = step_ms;
     }

@@ -42,7 +42,7 @@ fn description(scale: f64) -> String {
 }
 
 /// Sends the parameters of `arm` to a controller whose real arm is `plant`, moves it, and then holds it for 5 s. Returns
-/// the largest position error of each joint, mrad.
+/// the largest position error of each joint during the motion, mrad.
 fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     let config = SimConfig {
         baud: None,

@@ -42,8 +42,8 @@ impl Arm {
         }
     }
 
-    /// Finds unstable gains for each joint. If all are stable, returns the tolerated factors of the rotor inertias. Returns
-    /// `None` if the file does not give gains or rotor inertias.
+    /// Finds unstable gains, of each joint and of all joints together. If all are stable, returns the tolerated factors of the
+    /// rotor inertias. Returns `None` if gains are unstable, or if the file does not give gains or all rotor inertias.
     pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) -> Option<RotorMargins> {
         let pid = self.pid.as_ref().filter(|_| self.rotors_given == [true; JOINTS])?;
         let delay = self.config().delay_ticks;
@@ -163,7 +163,7 @@ fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
 
 /// Formats a range such as `0.08..12`, with two digits, rounded to the safe side.
 fn range(down: f64, up: f64) -> String {
-    // Prevents that a value with exactly two digits is rounded further.
+    // Keeps a value that already has two digits from being rounded further.
     const ROUNDING: f64 = 1e-9;
     format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
 }

@@ -91,7 +91,7 @@ fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError>
     Ok(way)
 }
 
-/// Returns the joints that are neither fixed nor mimic another joint, beginning at the root.
+/// Returns the joints that are not fixed and do not mimic another joint, beginning at the root.
 fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
     let driven = |j: &&Joint| j.joint_type != JointType::Fixed && j.mimic.is_none();
     let mut joints: Vec<&Joint> = joints.into_iter().filter(driven).collect();

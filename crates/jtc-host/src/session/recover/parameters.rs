@@ -22,7 +22,7 @@ pub enum RecoverParameters {
     Arm {
         /// Arm with friction, gains and model.
         arm: Arc<Arm>,
-        /// `true` if the controller may have other values for settings that cannot be sent in a frame.
+        /// `true` if the controller may have other values for settings that are not sent with friction, gains and model.
         accept_device_limits: bool,
     },
 }

@@ -160,8 +160,8 @@ fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() 
     port.write_all(&fixed::EXECUTE).unwrap();
 }
 
-/// J-33: if a controller gets a Pause while it decelerates after a Stop, it pauses. So a Pause of any client is not written
-/// after a Stop.
+/// J-33: a controller refuses a Pause while it decelerates after a Stop, but an older one pauses. So a Pause of any client is
+/// not written after a Stop.
 #[test]
 fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     let (mut far, path) = pair();

@@ -87,7 +87,7 @@ impl Asked {
     }
 }
 
-/// Facts about a board before it is flashed: the report on each requested line. Without lines, no controller was asked.
+/// Facts about a board before it is flashed: the report on each line that was asked. Without lines, no controller was asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Before {
     /// Lines that were asked.

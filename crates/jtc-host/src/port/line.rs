@@ -434,7 +434,7 @@ impl Line {
             || is(FrameType::TeachingModeEnable)
             // An upload is the preparation of a motion.
             || is(FrameType::Trajectory);
-        // A Pause while the arm decelerates after a Stop would leave a motion that can be resumed.
+        // With an older controller, a Pause while the arm decelerates after a Stop would leave a motion that can be resumed.
         let weakens = bytes == fixed::PAUSE && output.is_stopped();
         if (moves && output.halted.is_some()) || weakens {
             return Err(output.refusal());

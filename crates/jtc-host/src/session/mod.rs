@@ -322,8 +322,8 @@ impl<P: Port> Session<P> {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
-                // No status has arrived either, so the device is late and has not lost the frame. A Stop is sent again
-                // anyway.
+                // No status has arrived either, so the device is late and has not lost the frame. A Stop or a Pause is sent
+                // again anyway.
                 None if !halts && self.last_received < begun => {
                     due = false;
                     self.next_status()?;

@@ -76,7 +76,7 @@ impl<P: Port> Session<P> {
         if let Some(model) = &set.model {
             frames.push((Parameter::ArmModel, frame::arm_model(model)?, 1));
         }
-        // The last parameter switches the torque on. So a Stop of another program ends the transfer.
+        // A controller that has all parameters switches the torque on. So a Stop of another program ends the transfer.
         let stops = self.port.halts().stops;
         let mut all = Vec::new();
         for (parameter, frame, times) in frames {

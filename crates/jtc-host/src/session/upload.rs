@@ -184,8 +184,8 @@ impl Upload {
 
 impl<P: Port> Session<P> {
     /// Uploads a trajectory that passed the check. Returns when the controller reports that the trajectory is complete
-    /// (trajectory state Stop). The arm does not move. Calls `progress` after each confirmed segment, which can cancel the
-    /// upload with [`Flow::Cancel`].
+    /// (trajectory state Stop). The arm does not move. Calls `progress` after each confirmed segment; `progress` can
+    /// cancel the upload with [`Flow::Cancel`].
     ///
     /// The first segment deletes the trajectory that the controller had.
     ///

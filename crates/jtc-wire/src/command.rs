@@ -55,7 +55,7 @@ pub const ALL_NODES: u8 = 0x7F;
 /// Meaning of a command, borrowed from the frame. The lengths are valid; the numbers in `Floats` are not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command<'a> {
-    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old frame of 6 bytes clears all errors.
+    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old frame of 6 bytes means the controller and all nodes.
     ClearCurrentErrors {
         /// Clear the controller's own errors.
         jtc: bool,
@@ -155,9 +155,9 @@ pub mod field {
 }
 
 impl<'a> Command<'a> {
-    /// Parses a frame on the device. Returns `IncorrectValue` for an unknown command, for an invalid pump byte, and for a body that is too
-    /// short for its type; [`crate::Receiver`] never returns such a body. Returns `NotAllowed` for a frame that only a device sends, such
-    /// as JtcStatus.
+    /// Parses a frame on the device. Returns `IncorrectValue` for an unknown [`ExecCommand`], for an invalid pump byte, and for a body that
+    /// is too short for its type; [`crate::Receiver`] never returns such a body. Returns `NotAllowed` for a frame that only a device sends,
+    /// such as JtcStatus.
     pub fn parse(frame: FrameRef<'a>) -> Result<Self, DataStatus> {
         let body = frame.body();
         let byte = |i: usize| body.get(i).copied().ok_or(DataStatus::IncorrectValue);

@@ -247,7 +247,7 @@ impl Display for crate::GripperStatus {
 pub enum Piece<'a> {
     /// A valid frame of either direction.
     Frame(FrameRef<'a>),
-    /// Bytes between valid frames: damaged frames, noise, or a frame that is cut off at the end of the capture.
+    /// Bytes between valid frames: invalid frames, noise, or a frame that is cut off at the end of the capture.
     Other(&'a [u8]),
 }
 

@@ -54,7 +54,7 @@ impl Response {
     /// Marks that there is no record.
     pub const NONE: Self = Self::bad(0, FrameStatus::Idle, 0);
 
-    /// Creates the record of a damaged frame.
+    /// Creates the record of a frame or run of bytes that is not a valid frame.
     pub const fn bad(frame_type: u8, status: FrameStatus, length: u16) -> Self {
         Self { frame_type, status, data: DataStatus::Idle, length }
     }

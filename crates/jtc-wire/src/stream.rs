@@ -25,7 +25,7 @@ use registers::Registers;
 pub enum LinkEvent<'a> {
     /// A good frame.
     Frame(FrameRef<'a>),
-    /// A damaged frame, and the bytes that follow it without a gap.
+    /// An invalid frame, and the bytes that follow it without a gap.
     Bad(Response),
     /// A run of bytes whose first byte does not look like a frame.
     Noise(Response),
@@ -75,7 +75,7 @@ pub struct Receiver<B> {
     end: usize,
     /// Time of the last byte, µs.
     last_us: u64,
-    /// The caller holds bytes that the buffer had no space for. During this time, silence is not a gap on the line.
+    /// The caller holds bytes that `push` has not taken. During this time, silence is not a gap on the line.
     refused: bool,
     /// There is a gap before those bytes.
     gap_before_refused: bool,

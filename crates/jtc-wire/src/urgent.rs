@@ -105,7 +105,8 @@ struct Tail {
     commands: UrgentCommands,
     /// Position in the stream at which the last of these commands ended.
     hit: u64,
-    /// Number of bytes received when the last urgent command of any line came. A frame that began earlier was sent before that command.
+    /// Number of bytes received when the last urgent command of any line came. A frame that began earlier is considered older than that
+    /// command.
     overtaken: u64,
 }
 
@@ -132,8 +133,8 @@ pub struct UrgentWatch<const LINES: usize> {
 
 impl<const LINES: usize> UrgentWatch<LINES> {
     /// Creates a watch. `inter_byte_timeout_us`: silence after which bytes no longer belong to the same frame, µs. Times are only as
-    /// precise as the calls of `scan`. If this timeout is one tick longer than the timeout of the receiver, every Stop that the receiver
-    /// finds is also found here.
+    /// precise as the calls of `scan`. If this timeout is at least one tick longer than the timeout of the receiver, every Stop that the
+    /// receiver finds is also found here.
     pub const fn new(inter_byte_timeout_us: u32) -> Self {
         let tail =
             Tail { window: 0, received: 0, last_us: 0, commands: UrgentCommands::NONE, hit: 0, overtaken: 0 };
@@ -169,7 +170,8 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         let lines_with = commands.iter().filter(|commands| !commands.is_empty()).count();
         for tail in &mut self.lines {
             let own = !core::mem::take(&mut tail.commands).is_empty();
-            // The order of two lines within a tick is not known. Therefore all bytes received so far on both lines are considered older.
+            // The order of the lines within a tick is not known. Therefore all bytes received so far are considered older, except those
+            // after the command on the only line that has one.
             match lines_with {
                 0 => {}
                 1 if own => tail.overtaken = tail.hit,

@@ -120,7 +120,7 @@ pub struct Info {
     pub nodes_missing: u8,
     /// Cause of the last start.
     pub boot_cause: BootCause,
-    /// Number of starts, if the device counts them.
+    /// Number of starts, as far as the device knows.
     pub boots: u32,
     /// Time since the last start, ms.
     pub uptime_ms: u64,

@@ -171,7 +171,7 @@ fn j56_a_page_of_the_log_is_these_bytes() {
     ];
     assert_eq!(out[..n - 2], bytes);
     assert_eq!(Answer::parse(FrameRef::new_checked(&out[..n]).unwrap()), Some(Answer::Log(page)));
-    // J-56 limits the length of a page.
+    // Even the longest page is within the limit of J-56.
     let full = LogPage { bytes: &[7; LOG_PAGE], ..page };
     assert!(Answer::Log(full).emit(&mut out).unwrap() <= 256);
 }

@@ -75,8 +75,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// At every position the register equals that of the whole stream. It is computed from fewer than `GRID` bytes, because older ones
-        /// are overwritten.
+        /// At every position the register equals that of the whole stream. Fewer than `GRID` bytes must suffice to compute it, so the test
+        /// overwrites the older ones.
         #[test]
         fn any_register_from_a_few_bytes(steps in steps()) {
             let (mut registers, mut gone, mut held) = (Registers::new(), Vec::new(), Vec::new());

@@ -119,7 +119,7 @@ fn j05_frame_type() {
     }
 }
 
-/// The same as D16 of the old device: a frame whose length its type cannot have is never executed, even if the CRC is right.
+/// This also covers D16 of the old device: a frame whose length its type cannot have is never executed, even if the CRC is right.
 #[test]
 fn j05_length_of_another_type() {
     let mut line = Line::new();

@@ -106,7 +106,7 @@ impl Answer {
         }
     }
 
-    /// Parses an answer on the controller. Inlined, because a report that is stored by bytes and copied by words would stall a PC.
+    /// Parses an answer on the controller. Inlined: otherwise a report is stored by bytes and copied by words, for which a PC must wait.
     #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);

@@ -8,7 +8,7 @@ fn kept_inputs() {
     test_kit::run_kept_inputs(&[("bus_frame", bus_frame)]);
 }
 
-/// Tests the identifier of every frame of the bus with very different payload bytes.
+/// Tests the identifier of every frame of the bus, with extreme payload bytes.
 #[test]
 fn every_frame_with_extreme_payloads() {
     for id in 0..0x800_u16 {

@@ -24,8 +24,8 @@ pub use trig::{SIN_COS_MAX, sin_cos, sqrt};
 
 /// An arm prepared for kinematics and dynamics: values that do not depend on the joint positions are precomputed.
 ///
-/// No function fails or panics. For a NaN, an infinite argument or a position above [`SIN_COS_MAX`] the results are not valid, and usually
-/// NaN.
+/// No function fails or panics. For a NaN, an infinite argument or a position whose magnitude is above [`SIN_COS_MAX`] the results are not
+/// valid, and usually NaN.
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     chain: chain::Chain,

@@ -15,7 +15,7 @@ pub type JointVec = [f64; JOINTS];
 pub struct Origin {
     /// Translation in the parent frame, m.
     pub xyz: [f64; 3],
-    /// Roll, pitch, yaw, rad. A joint angle within 2 µrad of a multiple of π/2 is replaced by that multiple.
+    /// Roll, pitch, yaw, rad. In a joint origin, an angle within 2 µrad of a multiple of π/2 is replaced by that multiple.
     pub rpy: [f64; 3],
 }
 

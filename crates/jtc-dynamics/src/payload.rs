@@ -106,7 +106,6 @@ impl Payload {
 /// The part of an arm's dynamics that depends on masses: base inertial parameters of its links (Gautier and Khalil 1990), with the payload.
 /// The parameters are linear in the masses and in the first and second moments of the bodies. Therefore an interpolation between two
 /// physical arms with the same joints is also physical.
-/// same joints is as physical as both.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkInertias(pub(crate) [BaseInertialParameters; JOINTS]);
 

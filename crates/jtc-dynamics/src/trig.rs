@@ -75,7 +75,7 @@ const fn direction_sin(k: usize) -> f64 {
     if k % DIRECTIONS < half { sin } else { -sin }
 }
 
-/// Largest argument of [`sin_cos`], rad. Above it the result is NaN.
+/// Largest magnitude of an argument of [`sin_cos`], rad. Above it the result is NaN.
 pub const SIN_COS_MAX: f64 = 1.0e9;
 
 /// Returns sine and cosine of `x` (rad).

@@ -72,7 +72,7 @@ proptest! {
                 prop_assert!((telemetry.joints[j].torque_model - gravity[j]).abs() < 1e-3, "joint {}", j + 1);
             }
         }
-        // The nodes of absent joints never got a frame of their own.
+        // The nodes of absent joints were never given a torque or asked for a state.
         for request in &rig.sent {
             match request {
                 Request::Move { torque, .. } => {

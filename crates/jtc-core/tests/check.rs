@@ -128,7 +128,7 @@ fn table(low: f32, high: f32, cold: f32, warm: f32) -> Vec<u8> {
     )
 }
 
-/// Joint 4 accelerates to `v` rad/s and returns to rest, and reverses halfway.
+/// Joint 4 moves out and back with a peak speed of `v` rad/s. It is at rest at both ends.
 fn swing(v: f64) -> Vec<RawPoint> {
     [0.0, 0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5, 0.0].map(|share| point(4, 0.0, share * v, 0.0)).to_vec()
 }

@@ -108,7 +108,7 @@ fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     assert_eq!(rig.state(), ControllerState::Teaching);
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     arm.run(&mut rig, 1_000);
-    // The drive has been configured again, so its position is used.
+    // The drive is configured again, after which its position is used.
     rig.send(FrameType::Disable, &[]);
     arm.run(&mut rig, 100);
     assert_eq!(rig.state(), ControllerState::Init);

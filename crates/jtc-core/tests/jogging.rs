@@ -93,8 +93,7 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
     }
 }
 
-/// A Stop, a Pause, a released key and silence end a jog like a Stop ends a motion on the path: within 520 ms, even from the velocity
-/// limit.
+/// A Stop, a Pause, a released key and silence end a jog as a Stop ends a motion on the path: within 520 ms, even from the velocity limit.
 #[test]
 fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     for share in [0.1, 0.7, 1.0] {

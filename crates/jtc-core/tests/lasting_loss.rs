@@ -194,7 +194,7 @@ fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
                 }
             }
             if dead {
-                // One tick with an acknowledgement, followed by five Moves.
+                // In the first tick the answer to the last Move before still arrives. Then five Moves are not answered.
                 assert_eq!(seen, Some(5), "{start}");
                 assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
                 assert_eq!(rig.torque, [0.0; 6]);

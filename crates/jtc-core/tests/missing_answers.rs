@@ -158,7 +158,7 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
         }
         rig.run(3);
         rig.nodes[JOINT].glitch = 0.3;
-        // One tick without a fault, followed by five answers.
+        // An answer arrives one tick later. Four implausible answers are tolerated, and the fifth is an error.
         rig.run(5);
         assert_eq!((rig.state(), rig.errors()), (state, 0));
         assert!(rig.controller.telemetry().joints[JOINT].position.abs() < 1e-9);

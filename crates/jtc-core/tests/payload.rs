@@ -222,7 +222,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
     let mut rig = holding_at(&POSES[1]);
     let q = rig.controller.telemetry().joints.map(|joint| joint.position);
     let model = Parameters::avena().model;
-    // Torque that remains within the limits, per kg, computed from the Jacobian of the flange alone.
+    // Highest mass that the torque limits allow, kg, computed from the Jacobian of the flange alone.
     let dynamics = Dynamics::new(&model, Config::avena().gravity);
     let (arm, unit) = (dynamics.gravity_torque(&q), dynamics.flange_torque(&q));
     let most = (0..6)

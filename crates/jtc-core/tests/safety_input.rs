@@ -60,7 +60,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     }
 }
 
-/// A controller on the path, with a ramp.
+/// Returns an arm that moves on a path, with this ramp. Its safety input has just become 0.
 fn moving(ramp_ms: u16) -> Bench {
     let mut bench = Bench::holding(config(ramp_ms), 1.0, 0.0);
     bench.execute(1.0, 4.0);

@@ -18,7 +18,7 @@ use openjtc_emulator::{BoardConfig, Elf, FIRST_LINE};
 use rig::Rig;
 use session::{Session, Steps};
 
-/// Interrupt handlers of the program, with their exception number and priority.
+/// Interrupt handlers of the program, with their names and exception numbers.
 const HANDLERS: [(&str, usize); 8] = [
     ("TIM7, the tick", FIRST_LINE + 55),
     ("TIM5, time of the links", FIRST_LINE + 50),

@@ -40,7 +40,7 @@ pub mod sr {
     pub const QW: u32 = 1 << 2;
     /// An operation has ended without an error (only set if its interrupt is enabled).
     pub const EOP: u32 = 1 << 16;
-    /// A write-protected sector was accessed.
+    /// A write to a protected sector was attempted.
     pub const WRPERR: u32 = 1 << 17;
     /// A word was written while programming was not enabled.
     pub const PGSERR: u32 = 1 << 18;

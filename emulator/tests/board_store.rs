@@ -113,7 +113,7 @@ fn clean(rig: &mut Rig) {
     assert_eq!(wrong, None, "the first sectors are not the store's");
 }
 
-/// J-54: a stored image survives a loss of power, and the image before it stays in flash until the next store but one.
+/// J-54: a stored image survives a loss of power, and the image before it stays in flash until the next store.
 #[test]
 fn j54_a_stored_image_outlasts_the_power() {
     let mut rig = board(Bank2::default());

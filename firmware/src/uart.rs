@@ -281,7 +281,7 @@ pub struct Transmitter {
 unsafe impl Send for Transmitter {}
 
 impl Transmitter {
-    /// Returns `true` if the last frame has been transferred completely.
+    /// Returns `true` if DMA has read all bytes of the last frame.
     pub fn is_free(&self) -> bool {
         !self.stream.running()
     }

@@ -12,7 +12,7 @@ use super::flight::Event;
 pub struct Host {
     /// All bytes that the host sent.
     pub sent: Vec<u8>,
-    /// Number of sent bytes up to the end of the last frame for which the device has sent a record.
+    /// Number of sent bytes up to the end of the last frame that the device has executed.
     found: usize,
     /// Bytes that must be received next: the statuses of the shadow controller.
     pub expected: VecDeque<u8>,

@@ -231,7 +231,7 @@ impl Board {
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // The parser accepts bytes while a frame is executed, as in the board's interrupt. If the bytes waited, the
+        // The parser accepts bytes while a frame is executed, as on the real board. If the bytes waited, the
         // parser would detect a gap.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {

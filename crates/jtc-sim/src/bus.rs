@@ -96,7 +96,7 @@ struct Pending {
     frame: Frame,
 }
 
-/// The bus, including the controller's transceiver.
+/// The bus, including the controller's CAN interface.
 #[derive(Clone, Debug)]
 pub struct Bus {
     scales: [Scale; JOINTS],

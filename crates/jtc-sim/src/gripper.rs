@@ -8,7 +8,7 @@ use crate::request::NodeRequest;
 const PUMP_LAG: u32 = 100;
 /// Number of pumping ticks until the first and the second vacuum level are reached.
 const LEVELS: (u32, u32) = (300, 700);
-/// Transition to Init; its code differs from the code of the drives.
+/// Code of the gripper for the transition from Ready or Enabled to Init.
 const TO_INIT: NodeState = NodeState::new(14);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
 /// Number of ticks after power-up in which the gripper does not answer.

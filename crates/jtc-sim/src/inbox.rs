@@ -17,7 +17,7 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// Creates a buffer. With `one_per_interrupt`, the second of two consecutive requests stays in the buffer until
+    /// Creates a buffer. With `one_per_interrupt`, the second of two requests back to back stays in the buffer until
     /// another request arrives.
     pub fn new(one_per_interrupt: bool) -> Self {
         Self { one_per_interrupt, waiting: VecDeque::new(), last_us: None }

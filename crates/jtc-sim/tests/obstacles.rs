@@ -174,7 +174,7 @@ fn an_arm_with_gears_that_yield_is_held_and_moved() {
     assert!(twist.abs() > 2e-4 && twist.abs() < 0.02, "joint 2 is loaded: {twist} rad");
 }
 
-/// A fault of the shortest duration is active for one tick, if a tick can show it.
+/// A fault with a duration of 0 ms is active for one tick.
 #[test]
 fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     let mut operator = held(config());

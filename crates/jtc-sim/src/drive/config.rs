@@ -35,7 +35,7 @@ pub struct DriveConfig {
     /// Torque at the joint divided by the requested torque. The drive reports the requested torque as delivered. Real
     /// drives: about 1/1.3.
     pub delivers: f64,
-    /// `true` if the drive processes only one message per interrupt. After two consecutive requests it then stays one
+    /// `true` if the drive processes only one message per interrupt. After two requests back to back it then stays one
     /// message late.
     pub one_message_per_interrupt: bool,
     /// `true` if the drive executes ChangeFsm in the interrupt and answers with the code of the transition. Otherwise

@@ -6,7 +6,7 @@ use jtc_wire::ExecCommand;
 use super::broken::Broken;
 use jtc_sim::{Moment, Worked};
 
-/// Time from a pause or stop until the arm stands, ms, in addition to the time of J-33, for the commanded motion to come to rest.
+/// Time in addition to the time of J-33, ms, in which the arm comes to rest after the commanded motion.
 const REST_MS: u32 = 20;
 /// Speed below which a joint counts as standing, rad/s.
 const STANDS: f64 = 0.02;

@@ -9,7 +9,7 @@ use jtc_sim::Support;
 const STANDS: f64 = 2e-3;
 /// Time below this speed after which a joint counts as standing, ms.
 const STANDS_MS: u64 = 50;
-/// Remaining duration of the motion in the test, ms. A fault that stops nothing leaves it running for longer than `WATCH_MS`.
+/// Time after the fault, ms. If the motion still runs then, the fault has stopped nothing. The motion itself takes longer.
 const WATCH_MS: u64 = 700;
 /// Longest observed time, ms.
 const LONGEST_MS: u64 = 10_000;

@@ -186,13 +186,13 @@ impl fmt::Debug for CanFrame {
 /// Reasons why a frame is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidFrame {
-    /// An 11-bit identifier with a larger value.
+    /// The value is too large for an 11-bit identifier.
     #[error("identifier 0x{value:X} has more than 11 bits (0x7FF); is it an extended one?")]
     StandardId {
         /// The number.
         value: u32,
     },
-    /// A 29-bit identifier with a larger value.
+    /// The value is too large for a 29-bit identifier.
     #[error("identifier 0x{value:X} has more than 29 bits (0x1FFFFFFF)")]
     ExtendedId {
         /// The number.

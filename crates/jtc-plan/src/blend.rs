@@ -97,9 +97,9 @@ impl BlendedPath {
         }
     }
 
-    /// Removes the corners that lie within `share` of the blend from the straight line between the remaining corners.
-    /// Waypoints are removed only if they are so dense that the whole line stays within their blend. Waypoints for
-    /// which `keep` returns `true` stay. Returns `None` if no corner can be removed.
+    /// Returns the path without the corners that lie within `share` of the blend from the straight line between the
+    /// remaining corners, in order along it. Waypoints are removed only if they are so dense that the whole line stays
+    /// within their blend. Waypoints for which `keep` returns `true` stay. Returns `None` if no corner can be removed.
     pub(crate) fn thinned(&self, blend: f64, share: f64, keep: &dyn Fn(usize) -> bool) -> Option<Self> {
         let mut stays: Vec<bool> = self.corners.iter().map(|c| c.stop && !c.leads_back).collect();
         for (i, given) in self.given.iter().enumerate() {

@@ -1,14 +1,14 @@
 //! Chooses which corners are rounded, and which waypoints are corners.
 //!
 //! A stop at a corner is always within the blend, and so is a line close to dense waypoints. The planner uses the
-//! fastest of these options.
+//! fastest option.
 use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
 /// Maximum deviations of dropped waypoints from the line, as shares of the blend.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// A path is not planned if a thinned version has fewer corners by this factor.
+/// With a jerk limit, a path is not planned if it has at least this many times the corners of a thinned version.
 const DENSE: usize = 8;
 /// Number of rounds in which corners become stops.
 const ROUNDS: usize = 5;

@@ -116,7 +116,7 @@ impl TimedBus {
         }
     }
 
-    /// Sets if controllers begin to recover as soon as they are bus-off, like `restart-ms` in Linux and the automatic
+    /// Sets whether controllers begin to recover as soon as they are bus-off, like `restart-ms` in Linux and the automatic
     /// recovery of many controllers. Frames queued meanwhile wait. Without this setting, [`recover`](Self::recover)
     /// begins the recovery.
     pub fn set_recovers_by_itself(&mut self, recovers: bool) {
@@ -171,12 +171,12 @@ impl TimedBus {
         }
     }
 
-    /// Sets if a member drops a frame after one failure instead of repeating it.
+    /// Sets whether a member drops a frame after one failure instead of repeating it.
     pub fn set_one_shot(&mut self, member: MemberId, one_shot: bool) {
         self.members[member.0].one_shot = one_shot;
     }
 
-    /// Sets if a member acknowledges received frames.
+    /// Sets whether a member acknowledges received frames.
     pub fn set_acknowledges(&mut self, member: MemberId, acknowledges: bool) {
         self.members[member.0].acknowledges = acknowledges;
     }

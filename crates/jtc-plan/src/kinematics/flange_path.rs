@@ -203,7 +203,7 @@ impl<'a> Follower<'a> {
         Ok(samples)
     }
 
-    /// Advances to `s`. Returns `None` if a joint would turn too far on the way, and an error if the path ends there.
+    /// Advances to `s`. Returns `None` if the step must be shorter, and an error if the path ends there.
     fn try_step(&mut self, s: f64) -> Result<Option<()>, PoseError> {
         let chain = &self.kinematics.chain;
         let place = self.trace.at(s);

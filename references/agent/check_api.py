@@ -71,7 +71,7 @@ def programs(jtc, directory):
 
         # A second client stops the arm without a lease. Then the command stops it.
         for stop in [lambda: bob.ask("stop")[0] == 200, lambda: run_jtc("traj", "stop").returncode == 0]:
-            # After another client's Stop motion requests are refused for three seconds.
+            # After another client's Stop, motion requests are refused for three seconds.
             time.sleep(3.2)
             shown = anna.ask("get_status")[1]
             after = shown.last_event

@@ -67,7 +67,7 @@ def programs(ucom, directory):
         # Updates a board. The protocol page gives the checksum of the image.
         image = base64.b64encode(bytes((37 * i + 11) % 256 for i in range(1000))).decode()
         request = anna.model("UpdateRequest", boards=[{"board": 2}], image=image, format="bin")
-        # After another client's Stop motion requests are refused for three seconds.
+        # After another client's Stop, requests that begin something are refused for three seconds.
         time.sleep(3.2)
         job = anna.job("update", body=request)
         assert job.stage == "finished", job

@@ -300,7 +300,7 @@ fn an_arm_in_motion_is_recovered_and_the_policy_of_one_run_is_that_of_one_run() 
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 1 }));
     event(&served, last, "executing");
     assert_eq!(over(&served, job, || {})["stage"], "stopped", "by its lease's own policy");
-    // Pauses the run of another client, which then ends with a Stop.
+    // A client without the lease pauses bob's run, and bob's Stop then ends it.
     std::thread::sleep(Duration::from_secs(3));
     let bob = Program::new(&served, "bob", 30.0, "continue");
     let job = bob.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));

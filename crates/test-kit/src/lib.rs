@@ -33,8 +33,9 @@ pub type Target = (&'static str, Body);
 /// Runs each body over every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. The name of the file that
 /// runs is printed, so a failing test shows it.
 ///
-/// Panics if a body panics, if the target does not exist, or if no input is stored for it. Otherwise a misspelt name
-/// would test nothing.
+/// # Panics
+/// If a body panics, if the target does not exist, or if no input is stored for it. Otherwise a misspelt name would
+/// test nothing.
 pub fn run_kept_inputs(targets: &[Target]) {
     for (target, body) in targets {
         let files = kept_inputs(target);

@@ -60,7 +60,7 @@ impl ModelError {
 pub enum Support {
     /// No support: a joint without torque falls.
     None,
-    /// The arm is on a stand until all joints have been enabled once; afterwards it has no support.
+    /// The arm is on a stand until all joints are enabled for the first time; afterwards it has no support.
     Stand,
     /// Holding brakes, which are open only while their drive is enabled. Real drives have no brakes. With brakes the
     /// simulated arm keeps a usable pose after an error.

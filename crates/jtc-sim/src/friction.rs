@@ -222,8 +222,8 @@ impl FrictionTorques {
     /// Returns the bristle deflections `dt` seconds after they were `z`, at velocities `v`.
     ///
     /// dz/dt = v − rate·z is far too stiff for Runge-Kutta at 1 ms, because the rate reaches 10⁴/s at speed. For a
-    /// constant velocity the exact solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). Replacing e by 1/(1
-    /// + x + x²/2) gives second order without an exponential, and converges to the exact end value g/σ0 for any x.
+    /// constant velocity the exact solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). Replacing e by
+    /// 1/(1 + x + x²/2) gives second order without an exponential, and converges to the exact end value g/σ0 for any x.
     #[inline]
     pub fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {
         let FrictionModel::LuGre(lugre) = self.model else { return *z };

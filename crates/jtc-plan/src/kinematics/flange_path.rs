@@ -39,8 +39,8 @@ pub struct FlangePath {
 
 impl FlangePath {
     /// Creates the path from the joint positions `start` (rad) along `legs`. Corners are blended within `blend` m, at
-    /// most half of each leg; with 0 the path stops there. The first waypoint is the start, so leg 1 leads to waypoint
-    /// 2. Legs without motion are skipped.
+    /// most half of each leg; with 0 the path stops there. The first waypoint is the start, so leg 1 leads to
+    /// waypoint 2. Legs without motion are skipped.
     ///
     /// # Errors
     ///

@@ -256,7 +256,7 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Condition that starts the fault.
     pub trigger: Trigger,
-    /// Duration, ms; at least 1, because faults begin and end only with a millisecond. `None`: the fault never ends.
+    /// Duration, ms; 0 is treated as 1, because faults begin and end only with a millisecond. `None`: the fault never ends.
     pub duration_ms: Option<u64>,
 }
 

@@ -221,7 +221,7 @@ fn d_07_frames_alike_bit_for_bit_look_like_one() {
     assert_eq!((bus.pending(a), bus.pending(b)), (0, 0));
 }
 
-/// D-03 and bus load: the load is the number of transmitted bits divided by the bit rate.
+/// D-03 and bus load: the load is the number of bits sent per second divided by the bit rate.
 #[test]
 fn the_load_is_the_share_of_bits() {
     for bitrate in [1_000_000, 500_000, 250_000, 125_000] {

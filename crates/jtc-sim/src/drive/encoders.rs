@@ -19,8 +19,8 @@ pub(super) struct Encoders {
 }
 
 impl Encoders {
-    /// Returns the speed of a joint after another millisecond, in which it moved to `q` (rad), rad/s. It is computed from the
-    /// motor's encoder, which is much finer than the joint's.
+    /// Returns the speed of a joint after another millisecond, in which it moved to `q` (rad), rad/s. It is computed
+    /// from the motor's encoder, which is much finer than the joint's.
     pub fn speed(&mut self, q: f64) -> f64 {
         let motor = floor(q * MOTOR_COUNTS_PER_RAD);
         let oldest = core::mem::replace(&mut self.history[self.oldest], motor);

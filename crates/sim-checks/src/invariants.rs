@@ -9,8 +9,7 @@ mod motion;
 pub use broken::{Broken, Violation};
 use motion::{MotionWatch, powered};
 
-use jtc_sim::Worked;
-use jtc_sim::{Moment, World};
+use jtc_sim::{Moment, Worked, World};
 
 /// Ticks between two frames that replace Move.
 const MOVES_BETWEEN: u32 = 3;

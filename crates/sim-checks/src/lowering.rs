@@ -4,9 +4,7 @@ use jtc_core::{Config, ControllerState, JOINTS, Parameters, TrajectoryState};
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::ExecCommand;
 
-use jtc_sim::host;
-use jtc_sim::{ModelError, SimConfig, Support};
-use jtc_sim::{Operator, OperatorError};
+use jtc_sim::{ModelError, Operator, OperatorError, SimConfig, Support, host};
 
 /// Joint that lowers the arm: the shoulder, which carries the largest load.
 pub const LOADED: usize = 1;

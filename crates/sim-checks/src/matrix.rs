@@ -11,9 +11,7 @@ use jtc_core::{ControllerState, JOINTS, error, joint_error};
 use jtc_wire::{ExecCommand, FrameType};
 
 use crate::invariants::{Invariants, Violation};
-use jtc_sim::host;
-use jtc_sim::{Operator, OperatorError};
-use jtc_sim::{SimConfig, Support};
+use jtc_sim::{Operator, OperatorError, SimConfig, Support, host};
 
 use rows::{LASTING_MS, ROWS, Row};
 

@@ -5,12 +5,10 @@ use jtc_dynamics::JointVec;
 use jtc_wire::{ExecCommand, FrameType, RawPoint};
 
 use crate::invariants::{Invariants, Violation};
-use jtc_sim::DriveConfig;
-use jtc_sim::PUSH_MAX;
-use jtc_sim::host::{self, Listener};
-use jtc_sim::{Fault, FaultKind, Trigger};
-use jtc_sim::{SimConfig, Support};
-use jtc_sim::{Statistics, World};
+use jtc_sim::{
+    DriveConfig, Fault, FaultKind, PUSH_MAX, SimConfig, Statistics, Support, Trigger, World,
+    host::{self, Listener},
+};
 
 /// Step time of the paths, ms.
 pub const PATH_STEP_MS: u16 = 10;

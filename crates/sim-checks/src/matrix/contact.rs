@@ -5,11 +5,7 @@ use jtc_dynamics::Dynamics;
 
 use super::standstill::state_then;
 use super::{MatrixError, bring_to, config_for};
-use jtc_sim::Operator;
-use jtc_sim::Side;
-use jtc_sim::host;
-use jtc_sim::{Fault, FaultKind, Trigger};
-use jtc_sim::{ModelError, Support};
+use jtc_sim::{Fault, FaultKind, ModelError, Operator, Side, Support, Trigger, host};
 
 /// Observed time, ms: longer than the remainder of the motion.
 const WATCH_MS: u64 = 5_000;

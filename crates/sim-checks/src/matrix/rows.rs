@@ -3,9 +3,7 @@ use jtc_bus::{GRIPPER, Joint};
 use jtc_core::ControllerState;
 use jtc_wire::{FrameType, fixed};
 
-use jtc_sim::Operator;
-use jtc_sim::host;
-use jtc_sim::{Fault, FaultKind, Trigger};
+use jtc_sim::{Fault, FaultKind, Operator, Trigger, host};
 
 /// Ticks after which a lasting fault is removed.
 pub(super) const LASTING_MS: u64 = 300;

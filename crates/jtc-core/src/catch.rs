@@ -10,7 +10,7 @@ use crate::deceleration::moves;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. It is longer than the
+/// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. This time is longer than the
 /// reversal of a swing.
 const CALM_MS: u16 = 100;
 
@@ -26,7 +26,7 @@ pub(crate) struct Catch {
     busy_ms: u16,
     /// Since it was enabled, the joint has been calm for `CALM_MS` at least once.
     settled: bool,
-    /// Sag of the set position, rad. It grows in one direction only.
+    /// Sag of the set position, rad. The sag grows in one direction only.
     sag: f64,
     /// Highest speed of the present half swing, with its sign, and of the half swing before it, rad/s.
     peak: f64,

@@ -3,7 +3,7 @@
 //! A measurement is delayed: the drive read its encoder before it received the Move that it answered, and the command that follows from the
 //! measurement acts even later. The *due* position is the position that was commanded this *delay* ([`Config::delay_ticks`](crate::Config))
 //! ago; a joint that follows exactly would measure it now. The difference between the measured and the due position is therefore an error
-//! of the joint. It does not contain the distance that the joint has moved meanwhile.
+//! of the joint. This difference does not contain the distance that the joint has moved meanwhile.
 use crate::config::Config;
 use crate::interpolation::SetPoint;
 use crate::remembered::remembered;

@@ -37,7 +37,7 @@ pub struct Config {
     /// Age of a measurement when the command that follows from it takes effect, in ticks (J-62); 7 at most. The drives have a loop of 1 ms,
     /// in which they read their encoder and apply the torque. A drive answers a Move that it receives between two loops with the reading of
     /// the first loop, and applies the torque in the second. The controller uses the answer in its next tick, and the Move of that tick
-    /// takes effect in the third loop. So the delay is two loops after the reading, whatever the phase between the drive's loops and the
+    /// takes effect in the third loop. So the delay is two loops after the reading, for any phase between the drive's loops and the
     /// controller's ticks. An arm with a slower bus, or with drives that filter their positions, has a longer delay. 0: measurements are
     /// compared with the present command.
     pub delay_ticks: u8,
@@ -52,7 +52,7 @@ pub struct Config {
     pub missed_moves_max: u8,
     /// Time for which a node may be silent after its reset without an error, ms.
     pub node_boot_ms: u32,
-    /// Longest time from READY to ENABLE, ms (J-16). It is measured while enabling is requested.
+    /// Longest time from READY to ENABLE, ms (J-16). This time is measured while enabling is requested.
     pub enable_timeout_ms: u32,
     /// Highest speed at which joints are enabled, rad/s (J-16). Every joint must have been slower for `enable_still_ms`, so that a falling
     /// arm is not stopped with a jolt.
@@ -64,7 +64,8 @@ pub struct Config {
     pub enable_rest_ms: u16,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
-    /// Length of the ramp of path time for pause, stop and resume, ms (J-33). It is longer if the acceleration or torque limits require it.
+    /// Length of the ramp of path time for pause, stop and resume, ms (J-33). The ramp is longer if the acceleration or torque limits
+    /// require it.
     pub ramp_ms: u16,
     /// Measured speed that raises an error while torque is on, as a multiple of the joint's velocity limit (J-35).
     pub overspeed_factor: f64,

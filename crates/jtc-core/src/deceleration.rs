@@ -12,7 +12,7 @@ const STANDING: f64 = 0.02;
 const CATCH_DECELERATION: f64 = 3.0;
 /// Peak deceleration of a falling joint, as a multiple of the mean deceleration. The peak is in the middle of the motion.
 const STEEPEST: f64 = 1.5;
-/// Peak deceleration of a joint that was led, as a multiple of the mean deceleration. The peak is at the beginning, where the damping of
+/// Peak deceleration of a joint that was led, as a multiple of the mean deceleration. The peak is at the beginning, when the damping of
 /// Teaching already decelerates the joint.
 pub(crate) const STEEPEST_LED: f64 = 2.0;
 

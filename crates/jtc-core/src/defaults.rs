@@ -1,4 +1,4 @@
-//! Defaults at the start of the device (rules, section 7). They are generated from `arms/avena.toml` at build time.
+//! Defaults at the start of the device (rules, section 7). These defaults are generated from `arms/avena.toml` at build time.
 use jtc_dynamics::{ArmModel, Link, Origin, Payload};
 
 use crate::bounds::ParameterBounds;

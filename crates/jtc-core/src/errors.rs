@@ -75,7 +75,7 @@ impl Errors {
         self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
     }
 
-    /// Adds the errors that a refused trajectory would have caused in motion (J-36) to the occurred errors. They are not latched.
+    /// Adds the errors that a refused trajectory would have caused in motion (J-36) to the occurred errors. These errors are not latched.
     pub fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
         self.hold_joints(bits, false);
     }
@@ -172,8 +172,8 @@ mod tests {
 
     const INTERNAL: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
 
-    /// An error is in both words from the tick in which it is raised. It stays in the word of occurred errors until the host clears that
-    /// word as well.
+    /// An error is in both words from the tick in which it is raised. The error stays in the word of occurred errors until the host clears
+    /// that word as well.
     #[test]
     fn j21_what_is_raised_has_occurred_until_that_is_cleared() {
         for (raise, word) in [
@@ -195,7 +195,8 @@ mod tests {
         }
     }
 
-    /// The cause of a held stop is shown as occurred, and as current if the stop latches. It is not an error, so the safety output stays 1.
+    /// The cause of a held stop is shown as occurred, and as current if the stop latches. This cause is not an error, so the safety output
+    /// stays 1.
     #[test]
     fn j66_j69_the_cause_of_a_held_stop_is_shown_and_is_no_error() {
         for latches in [false, true] {

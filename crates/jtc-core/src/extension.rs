@@ -59,7 +59,7 @@ pub(crate) struct Extensions {
     pub hash: Option<u64>,
     /// Ticks since a frame of a host was received.
     pub hosts_silent_ms: u32,
-    /// Time left in which a Jog with a velocity is refused. It begins again with each such Jog.
+    /// Time left in which a Jog with a velocity is refused. This time begins again with each such Jog.
     pub jogs_refused_ms: u16,
     /// Progress of the hash of the arm.
     hashed: (usize, Hash),
@@ -196,7 +196,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 return Err(DataStatus::NotAllowed);
             }
         } else if !set.jogging() {
-            // There is no jog that must end.
+            // No jog is active, so no jog must end.
             return Ok(());
         }
         let jogging = set.jogging();

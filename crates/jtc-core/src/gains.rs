@@ -16,8 +16,8 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Age of the derivative's torque beyond [`Config::delay_ticks`], ticks. It is half of the ticks over which the derivative is taken, plus
-/// half of the tick for which a torque is held.
+/// Age of the derivative's torque beyond [`Config::delay_ticks`], ticks. This age is half of the ticks over which the derivative is taken,
+/// plus half of the tick for which a torque is held.
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Age of the position error's torque beyond [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
@@ -171,8 +171,8 @@ impl Trial {
         self.held_ms = 0;
     }
 
-    /// Ends the trial, because the arm is no longer held. If gains are on trial, returns the gains before them, because the new ones have
-    /// not held the arm.
+    /// Ends the trial, because the arm is not held any more. If gains are on trial, returns the gains before them, because the new ones
+    /// have not held the arm.
     pub fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
@@ -220,7 +220,7 @@ impl Trial {
         Some(blended)
     }
 
-    /// Begins a blend to other gains. It starts from the gains that act now, while `given` are in use.
+    /// Begins a blend to other gains. The blend starts from the gains that act now, while `given` are in use.
     fn blend_from(&mut self, given: &[PidGains; JOINTS]) {
         let acting = self.blended(given).unwrap_or(*given);
         self.from = acting.map(|gains| [gains.kp as f32, gains.kd as f32]);
@@ -233,7 +233,7 @@ impl Trial {
     }
 
     /// Handles joints (a bit each) that fail with their `gains`; the loops of the `unstable` joints are unstable. If the gains must change,
-    /// returns the cause and the new gains: those before the trial or, if there are none, softer gains for the unstable joints.
+    /// returns the cause and the new gains: those before the trial or, if none are stored, softer gains for the unstable joints.
     pub fn fails(
         &mut self,
         failed: u8,

@@ -2,8 +2,8 @@
 //!
 //! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
 //! path needs less torque: the torque for inertia falls with the square of the rate. Therefore path time slows down as far as the joints at
-//! their limits require (time scaling under torque limits, Dahl and Nielsen 1990). It returns to its rate when no joint is at its limit any
-//! more.
+//! their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its rate when no joint is at its
+//! limit any more.
 use crate::JOINTS;
 use crate::path::PathClock;
 use crate::remembered::remembered;

@@ -339,7 +339,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let outcome = parameters.take_model(&arm.model, self.slice_progress, at, config);
                 self.model_taken(outcome)
             }
-            // The stored arm has one kind of friction. It is used for both requests of a host.
+            // The stored arm has one kind of friction. This kind is used for both requests of a host.
             _ => match arm.friction {
                 FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
                 FrictionImage::Table(floats) => parameters.take_table(&floats, self.slice_progress, config),

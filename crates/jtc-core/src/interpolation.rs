@@ -40,7 +40,7 @@ impl From<&RawPoint> for SetPoint {
     }
 }
 
-/// Amount by which rounding may increase a value between two points, in rad and rad/s. It is too small to matter for any limit.
+/// Largest increase of a value between two points due to rounding, in rad and rad/s. This amount is too small to matter for any limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// Rises from 0 to 1 with zero slope at both ends.
@@ -59,7 +59,7 @@ struct Weights {
     acceleration: [f64; 2],
 }
 
-/// Units of the samples, and the changes that they cause in a step. They are constant for a trajectory.
+/// Units of the samples, and the changes that they cause in a step. Units and changes are constant for a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Units {
     /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one unit.

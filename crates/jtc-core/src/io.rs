@@ -18,8 +18,8 @@ pub struct BusState {
 pub struct HostEvent<'a> {
     /// The line, which gets the response record.
     pub line: usize,
-    /// The event was received before an urgent command that was an input of this tick or an earlier one. An overtaken Execute is no longer
-    /// executed, and an overtaken Stop or Pause has already taken effect (J-04).
+    /// The event was received before an urgent command that was an input of this tick or an earlier one. An overtaken Execute is not
+    /// executed any more, and an overtaken Stop or Pause has already taken effect (J-04).
     pub overtaken: bool,
     /// The frame came on a plain line: no extension request was received in the 2 s before its first byte (J-51). Its record contains no
     /// data status above 6, and segment 0 acts as a Stop in Operate (J-30).
@@ -40,8 +40,8 @@ pub struct Inputs<'a> {
     pub safety_input: bool,
     /// Number of ticks since the last one that were missed, or were at least half a tick late (J-12).
     pub missed_ticks: u16,
-    /// Stop and Pause commands that have arrived on each line since the last tick. They take effect in this tick, before all waiting events
-    /// (J-04). Their frames also appear as events when it is their turn.
+    /// Stop and Pause commands that have arrived on each line since the last tick. These commands take effect in this tick, before all
+    /// waiting events (J-04). Their frames also appear as events when it is their turn.
     pub urgent: [UrgentCommands; HOST_LINES],
     /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. Offer the events that are not done again
     /// in the next tick.
@@ -75,8 +75,8 @@ pub struct Outputs {
     pub status: bool,
     /// Line that gets the response record in that status; the other line gets the status without it. `None` if the status has no record.
     pub record_line: Option<usize>,
-    /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). It is never set together
-    /// with `status`.
+    /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). This output is never set
+    /// together with `status`.
     pub answer_line: Option<usize>,
     /// [`Controller::stored_arm`](crate::Controller::stored_arm) must be written to non-volatile memory (J-54).
     pub store: bool,

@@ -193,8 +193,8 @@ impl JointJog {
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
-            // A joint that still accelerates when its jog ends becomes faster until its acceleration is zero. It then reaches the velocity
-            // that was commanded before. Rounding to whole ticks can add a few µrad/s, which the limit does not allow.
+            // A joint that still accelerates when its jog ends becomes faster until its acceleration is zero. The joint then reaches the
+            // velocity that was commanded before. Rounding to whole ticks can add a few µrad/s, which the limit does not allow.
             let reached = self.velocity + next * tick;
             let velocity = reached.max(-fastest).min(fastest);
             let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / tick };
@@ -211,8 +211,8 @@ impl JointJog {
         } else {
             (self.velocity, self.acceleration)
         };
-        // The distance is measured from the point of zero acceleration, which is ahead of a joint that accelerates, and behind a joint that
-        // brakes.
+        // The distance is measured from the point of zero acceleration, which is ahead of a joint that accelerates, and which a joint that
+        // brakes has passed.
         let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
         let rise = self.most / jerk;
         let rest = if peak >= self.most * rise {
@@ -254,7 +254,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is commanded at any time, the joints stay within the range and the limits of velocity, acceleration and jerk. They are
+        /// For any commands at any time, the joints stay within the range and the limits of velocity, acceleration and jerk. The joints are
         /// at rest soon after the last command.
         #[test]
         fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(

@@ -23,7 +23,7 @@ pub struct JointConfig {
     /// Torque that is requested from the drive, as a multiple of the commanded torque at the joint (J-61). Drives that deliver less torque
     /// than requested need a value above 1.
     pub torque_gain: f64,
-    /// Damping in Teaching, N·m·s/rad (J-25). It is reduced if the joint is too light for it.
+    /// Damping in Teaching, N·m·s/rad (J-25). The damping is reduced if the joint is too light for it.
     pub teach_damping: f64,
 }
 

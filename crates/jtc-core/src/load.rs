@@ -1,9 +1,9 @@
-//! The load that a joint carries and that the model lacks. It is learned from the integral of the position controller.
+//! The load that a joint carries and that the model lacks. The load is learned from the integral of the position controller.
 use crate::DT;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Ticks between two observations of the same joint. One joint is observed in each tick.
+/// Ticks between two observations of the same joint. Each tick observes a single joint.
 const PERIOD: f64 = crate::JOINTS as f64;
 /// Time constant of the low-pass filter, s.
 const TIME_S: f64 = 1.0;
@@ -141,7 +141,7 @@ mod tests {
         assert_eq!(load.torque(0.0), 0.0);
     }
 
-    /// A load that was lowered may be above the bound. It does not jump back to the bound.
+    /// A load that was lowered may be above the bound. Such a load does not jump back to the bound.
     #[test]
     fn j70_a_load_that_was_lowered_is_kept() {
         let mut load = Load::default();

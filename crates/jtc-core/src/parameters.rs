@@ -33,7 +33,7 @@ pub struct TableOf<T> {
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum Friction {
-    /// Coefficients c0..c5 of each joint, ascending. c4 = 0 means that there is no temperature factor.
+    /// Coefficients c0..c5 of each joint, ascending. With c4 = 0 the torque does not depend on the temperature.
     Polynomial([[f64; 6]; JOINTS]),
     /// A table for each joint.
     Table([TableOf<f32>; JOINTS]),

@@ -2,7 +2,7 @@
 //! (Bobrow, Dubowsky and Gibson 1985; Pham and Pham 2018). This module changes only the rate.
 //!
 //! The *rate* is path time in seconds per second; the change of the rate is the *slope* (1/s). A resume takes as long as the limits
-//! require. A pause or a stop ends within a configured time. It begins along an S-shaped ramp with a margin to the limits. If that would
+//! require. A pause or a stop ends within a configured time. Each begins along an S-shaped ramp with a margin to the limits. If that would
 //! take too long, it uses all available torque. Then the slope is what the arm can achieve at its torque limits, which are computed
 //! including the feedback torque, so that the set values never run ahead of an arm that cannot follow (time scaling under torque limits,
 //! Dahl and Nielsen 1990).
@@ -45,7 +45,7 @@ pub struct SlopeBounds {
 /// A slope in the wrong direction (a pause during a resume) is removed this many times faster than a ramp is rounded. A hurried stop
 /// changes its slope equally fast.
 const REVERSAL: f64 = 8.0;
-/// Fraction of the difference to the target slope by which a path that is held back changes its slope in a tick.
+/// Change per tick of the slope of a path that is held back, as a fraction of the difference to the target slope.
 const SETTLES: f64 = 0.1;
 /// Share of the configured time within which a stop must end. The rest of the time is for the part of the path that is still ahead.
 const PUNCTUAL: f64 = 0.6;
@@ -77,7 +77,7 @@ impl Ramp {
 }
 
 impl PathClock {
-    /// Creates a clock at point 0, where the arm is at rest. Its rate is `pace` from the start.
+    /// Creates a clock at point 0, for an arm at rest. Its rate is `pace` from the start.
     pub fn start(pace: f64) -> Self {
         Self { rate: pace, target: pace, ..Self::default() }
     }
@@ -182,8 +182,8 @@ impl PathClock {
         self.slope = if self.rate > 0.0 { slope } else { 0.0 };
     }
 
-    /// Slows down to standstill, in at most `stop_ms` if the torque limits allow it. It follows an S-shaped ramp of `ramp_ms` while that is
-    /// possible within `bounds.easy`. If that would take too long, it uses `bounds.full`. Then the rate may also rise again, if all
+    /// Slows down to standstill, in at most `stop_ms` if the torque limits allow it. The clock follows an S-shaped ramp of `ramp_ms` while
+    /// that is possible within `bounds.easy`. If that would take too long, it uses `bounds.full`. Then the rate may also rise again, if all
     /// available torque cannot prevent the arm from gaining speed.
     pub fn slow_down(&mut self, ramp_ms: f64, stop_ms: f64, bounds: &SlopeBounds) {
         // In this function slopes are decelerations: positive towards standstill.

@@ -18,7 +18,7 @@ pub(crate) struct PayloadBlend {
     left_ms: u16,
 }
 
-/// State of the blend. It ends at the arm with its configured payload.
+/// State of the blend. The blend ends at the arm with its configured payload.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlendState {
     left_ms: u16,

@@ -74,8 +74,8 @@ impl Pid {
     /// `encoder_step` (rad): resolution of the encoder if the joint is commanded at rest; `None` in motion.
     ///
     /// At rest, the integral stops changing when the error is within one step, until the error exceeds [`RELEASE_STEPS`]. An integral that
-    /// continued below the resolution of the encoder would make a joint with stiction break away again and again (hunting). The same is
-    /// true for an integral that restarted at each change of the last bit.
+    /// continued below the resolution of the encoder would make a joint with stiction break away again and again (hunting). An integral
+    /// that restarted at each change of the last bit would have the same effect.
     pub fn step(
         &mut self,
         gains: &PidGains,

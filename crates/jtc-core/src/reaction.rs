@@ -132,7 +132,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// Ends a trial when the arm is no longer held. Gains on trial have not held the arm, so it is not enabled again with them.
+    /// Ends a trial when the arm is not held any more. Gains on trial have not held the arm, so it is not enabled again with them.
     pub(crate) fn end_trial(&mut self) {
         let Some(gains) = self.parameters.trial.end() else { return };
         self.parameters.pid = gains;

@@ -86,7 +86,7 @@ impl ReceivedParameters {
         [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
     }
 
-    /// Uses the built-in gains, model or polynomial where the value is `true`.
+    /// Uses the built-in gains, model or polynomial if the value is `true`.
     pub fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
         if pid {
             self.pid = defaults::PID;
@@ -184,8 +184,8 @@ impl ReceivedParameters {
     }
 
     /// Returns `true` if every joint can hold the payload in these settings at `at` (rad), or needs less torque than now (J-60). Also
-    /// returns `true` while it cannot be decided: before all positions are known and the model is received. It is checked again when Init
-    /// ends.
+    /// returns `true` while it cannot be decided: before all positions are known and the model is received. The payload is checked again
+    /// when Init ends.
     pub fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
@@ -350,7 +350,7 @@ impl ReceivedParameters {
         config: &Config,
     ) -> Result<(), DataStatus> {
         let dynamics = dynamics(model, config);
-        // Before all positions are known this cannot be decided. It is checked again when Init ends.
+        // Before all positions are known this cannot be decided. The model is checked again when Init ends.
         if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
             return Err(DataStatus::IncorrectValue);
         }

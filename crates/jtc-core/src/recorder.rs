@@ -60,7 +60,7 @@ pub(crate) enum LogRequest {
 
 /// The recorder. `P` is a piece of its memory: blocks that keep their contents during a reset and are not cached.
 ///
-/// The board creates one at its start, whatever the memory contains, and calls [`record`](Self::record) after every tick.
+/// The board creates one at its start, for any content of the memory, and calls [`record`](Self::record) after every tick.
 pub struct Recorder<P, const N: usize> {
     writer: Writer<P, N>,
     reference: Reference,

@@ -146,7 +146,7 @@ impl Setting {
         if self.of_joint() { JOINTS } else { 1 }
     }
 
-    /// Returns the value in `config`. `joint`: from 1; 0 for a setting of the arm. Returns `None` if there is no such value.
+    /// Returns the value in `config`. `joint`: from 1; 0 for a setting of the arm. Returns `None` if the setting has no such value.
     pub fn get(&self, config: &Config, joint: u8) -> Option<f64> {
         table::get(config, self.number, self.index(joint)?)
     }

@@ -1,8 +1,8 @@
 //! Two flash slots that keep one image through any loss of power (J-54).
 //!
-//! An image, here a stored arm, is a sequence of bytes that this module does not interpret. It is written to the slot that does not hold
-//! the newest image, so that the previous image stays complete until the new one is complete. A slot is a header of one flash word followed
-//! by the image, filled up to whole words:
+//! An image, here a stored arm, is a sequence of bytes that this module does not interpret. An image is written to the slot that does not
+//! hold the newest image, so that the previous image stays complete until the new one is complete. A slot is a header of one flash word
+//! followed by the image, filled up to whole words:
 //!
 //! | bytes | content |
 //! |---|---|
@@ -36,7 +36,7 @@ pub type Word = [u8; WORD];
 
 const MAGIC: [u8; 4] = *b"JTCA";
 const VERSION: u16 = 1;
-/// Content of erased flash. It also fills the last word of an image.
+/// Content of erased flash. This byte also fills the last word of an image.
 const ERASED: u8 = 0xFF;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -145,7 +145,7 @@ impl Slots {
         }
     }
 
-    /// Returns the slot for the next image, and its sequence number. It is never the slot of the newest image.
+    /// Returns the slot for the next image, and its sequence number. This is never the slot of the newest image.
     pub fn next(&self) -> (usize, u32) {
         self.current().map_or((0, 1), |(slot, sequence)| (1 - slot, sequence.wrapping_add(1)))
     }

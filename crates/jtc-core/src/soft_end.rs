@@ -3,8 +3,8 @@
 /// Distance from a position limit at which the spring begins to act, rad.
 pub(crate) const SOFT_END: f64 = 0.1;
 
-/// Returns the depth (rad) of a joint at `position` inside the soft end of its `range` (lowest and highest position, rad). It is positive
-/// at the upper end and negative at the lower end.
+/// Returns the depth (rad) of a joint at `position` inside the soft end of its `range` (lowest and highest position, rad). The depth is
+/// positive at the upper end and negative at the lower end.
 pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
     let (low, high) = range;
     let above = (position - (high - SOFT_END)).max(0.0);

@@ -12,7 +12,7 @@ pub(crate) struct Conditions {
     pub initialised: bool,
     /// The host has enabled teaching.
     pub teaching: bool,
-    /// The arm is held at rest, and its loads are known or not needed (J-25). It is evaluated only if `teaching` is set.
+    /// The arm is held at rest, and its loads are known or not needed (J-25). This condition is evaluated only if `teaching` is set.
     pub teachable: bool,
     /// A trajectory is being executed.
     pub execute: bool,

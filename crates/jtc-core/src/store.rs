@@ -182,7 +182,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step.ms))
     }
 
-    /// Checks that the segment may follow the received ones. It changes nothing.
+    /// Checks that the segment may follow the received ones. The check changes nothing.
     pub fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
         let first = segment.segment == 0;
         let before = if first { 0 } else { self.received };
@@ -223,7 +223,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Copies points `from..to` of the segment after the received ones. They become valid with `commit`.
+    /// Copies points `from..to` of the segment after the received ones. The copied points become valid with `commit`.
     pub fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
         let slots = self.points.as_mut().get_mut(self.received + from..self.received + to).unwrap_or(&mut []);
         for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
@@ -350,7 +350,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         // point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
-        // This is also done exactly at a point and at the last one, where it has no effect, so that every tick does the same work.
+        // This is also done exactly at a point and at the last one, without any effect, so that every tick does the same work.
         let (end, u) = match points.get(index + 1) {
             Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),

@@ -10,7 +10,7 @@ use crate::motion::{ControlMode, Found, LawInputs};
 use crate::{ControllerState, JOINTS, joint_error};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Runs one control tick (1 ms). The amount of work is bounded, whatever the inputs are.
+    /// Runs one control tick (1 ms). The amount of work is bounded for any inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let before = self.state;
         // 1. Inputs. The error flags are formed before the commands of the host are executed, so that a clear cannot hide a fault that
@@ -73,7 +73,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises errors from outside the control law. They latch (J-21).
+    /// Raises errors from outside the control law. These errors latch (J-21).
     fn form_error_flags(&mut self, inputs: &Inputs<'_>) {
         if self.safety_input_releases(inputs.safety_input) {
             self.errors.raise_emergency_input();
@@ -149,8 +149,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.control(ControlMode::Teach)
     }
 
-    /// Runs the control step in Operate. It is a separate function so that its instructions can be counted. On the path their number is the
-    /// same in every tick.
+    /// Runs the control step in Operate. This step is a separate function so that its instructions can be counted. On the path their number
+    /// is the same in every tick.
     #[inline(never)]
     fn operate(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         self.motion.latch(&self.nodes, &self.config);
@@ -164,7 +164,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Runs the control law and its limits. Returns the torques to command, and the joint errors to which the controller has no other
     /// reaction (J-66).
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A joint above its over-speed limit is out of control. The only possible reaction is to take the torque away.
+        // A joint above its over-speed limit is out of control. Removing the torque is the only possible reaction.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let braking = self.brake();
         let blended = if self.parameters.trial.runs() && mode != ControlMode::Teach {

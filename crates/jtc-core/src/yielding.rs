@@ -25,7 +25,7 @@ pub(crate) const SPRING_RATE: f64 = 30.0;
 /// other at frequencies at which an old speed measurement makes the loop unstable, so a joint feels only a third of its inertia with the
 /// others fixed.
 const LOWERING_RATE: f64 = 40.0;
-/// Fraction of the remaining change by which the damper and the spring change in a tick.
+/// Change per tick of the damper and the spring, as a fraction of the remaining change.
 const SETTLES: f64 = 0.2;
 /// Like [`SETTLES`], for the brake.
 const BRAKE_SETTLES: f64 = 0.5;
@@ -49,7 +49,7 @@ const DRIVEN_CALM_MS: u16 = 50;
 const LOADED: f64 = 0.05;
 /// Distance (rad) and time (ms) of sinking after which the joint is considered overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
-/// Time constant with which the load takes over the torque of the damper, s.
+/// Time constant for the load to take over the torque of the damper, s.
 const LEARNS_S: f64 = 0.5;
 /// Range of the torque of spring and damper against a joint that its own load drives, as shares of that load; the rest is friction. If a
 /// load has driven the joint for [`DRIVEN_MS`], it does not exist: a person had leaned on the arm. The load fades with the time constant
@@ -217,8 +217,8 @@ impl Yield {
         }
     }
 
-    /// Returns the torque that Teaching carries, N·m. Of a doubted load this is only the part that the `spring` (N·m) has not opposed,
-    /// because the rest may not exist.
+    /// Returns the torque that Teaching carries, N·m. If the load is doubted, this is only the part that the `spring` (N·m) has not
+    /// opposed, because the rest may not exist.
     pub fn taught_load(&self, spring: f64) -> f64 {
         if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
     }

@@ -101,7 +101,7 @@ fn j53_absent_is_set_in_init_and_error_only() {
         rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 100);
         assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Operate");
         assert!(!is_absent(&rig, j));
-        // The same in Error, after a drive has stopped answering.
+        // In Error, after a drive has stopped answering, the same values are accepted.
         rig.nodes[j].silent = true;
         rig.until(50, |r| r.state() == ControllerState::Error);
         assert_eq!(set(&mut rig, &all), DataStatus::NoError);
@@ -164,7 +164,7 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
             rig.run(500);
             assert_eq!(rig.state(), ControllerState::Error, "it answers still");
             assert!(rig.torque == [0.0; 6]);
-            // The joint is no longer marked as absent.
+            // The joint is not marked as absent any more.
             assert_eq!(set(&mut rig, &[(settings::ABSENT, j, 0.0)]), DataStatus::NoError);
             rig.run(50);
             rig.clear(true, 0x7F);
@@ -176,7 +176,7 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
     }
 }
 
-/// An enabled drive of an absent joint is disabled, whatever has enabled it.
+/// An enabled drive of an absent joint is disabled, regardless of the cause of its enabling.
 #[test]
 fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     let mut rig = bench(&[(2, 0.0)]);
@@ -238,7 +238,7 @@ fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     assert_eq!((q[1], q[4]), (0.9, -0.3));
 }
 
-/// A payload or a model is not refused because of a load that only an absent joint would have to hold.
+/// A payload or a model is not refused because of a load that only an absent joint would hold.
 #[test]
 fn j53_absent_joints_hold_nothing() {
     let payload = |mass: f64| {

@@ -40,7 +40,7 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     }
 }
 
-/// A Stop or a Pause requires that the arm is held. It therefore also cancels a teach request that waits for standstill.
+/// A Stop or a Pause requires that the arm is held. Both commands therefore also cancel a teach request that waits for standstill.
 #[test]
 fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
     for command in [ExecCommand::Stop, ExecCommand::Pause] {
@@ -205,8 +205,8 @@ fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of 500 refused; at most {:.0} % of a torque limit, {longest} ms", 100.0 * most);
 }
 
-/// A joint holds a position with 98 % of its limit, and its friction needs more than the margin. It does not start: Execute is refused (8),
-/// as for an arm at another position.
+/// A joint holds a position with 98 % of its limit, and its friction needs more than the margin. The joint does not start: Execute is
+/// refused (8), as for an arm at another position.
 #[test]
 fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     let holds = Parameters::avena().model;
@@ -264,8 +264,8 @@ fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     }
 }
 
-/// An arm that is exactly at its paused point continues, whatever the torque margin is. A friction table with torque at standstill once
-/// prevented that.
+/// An arm that is exactly at its paused point continues with any torque margin. A friction table with torque at standstill once prevented
+/// that.
 #[test]
 fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     let model = Parameters::avena().model;

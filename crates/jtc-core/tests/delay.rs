@@ -1,4 +1,4 @@
-//! A measurement is older than the command of the same tick. It is compared with the set value of its own time (J-62).
+//! A measurement is older than the command of the same tick. The measurement is compared with the set value of its own time (J-62).
 use crate::{plant, rig};
 
 use std::collections::VecDeque;

@@ -137,7 +137,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
 }
 
 /// The motor control of a drive pauses after a stop. If enabling were requested earlier, the joint would be enabled at the end of that
-/// pause, whatever the motion of the arm is then.
+/// pause, regardless of the motion of the arm at that time.
 #[test]
 fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     let mut rig = Rig::holding();

@@ -59,7 +59,7 @@ fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     }
 }
 
-/// An arm in motion does not follow the jump either. It comes to rest on its true path.
+/// An arm in motion does not follow the jump either. The arm comes to rest on its true path.
 #[test]
 fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     for (joint, size) in [(0, 0.01), (0, -0.2), (1, 0.006), (2, -0.02), (4, 0.1)] {
@@ -197,7 +197,7 @@ fn j35_without_a_window_nothing_is_compared() {
     assert_eq!((rig.errors(), cause(&mut rig)), (0, None));
 }
 
-/// A jump is rarely a single step. It may pass through a value in between, come in two parts, coincide with lost answers or a jump of
+/// A jump is rarely a single step. The jump may pass through a value in between, come in two parts, coincide with lost answers or a jump of
 /// another joint, and go back.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
@@ -235,8 +235,8 @@ fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     }
 }
 
-/// An answer with a wrong position and a wrong speed is not a jump. It is not used, like a wrong position without a speed to compare it
-/// with.
+/// An answer with a wrong position and a wrong speed is not a jump. Such an answer is not used, like a wrong position without a speed to
+/// compare it with.
 #[test]
 fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     for (position, velocity) in [(0.3, 1.9), (-0.3, 1.2), (0.02, -1.5)] {

@@ -156,7 +156,7 @@ fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     }
 }
 
-/// A table may have friction at standstill. It is blended in during the approach, not in one tick.
+/// A table may have friction at standstill. This friction is blended in during the approach, not in one tick.
 #[test]
 fn j44_the_friction_of_a_table_at_standstill_makes_no_step() {
     let tables = Config::avena().joints.map(|joint| {

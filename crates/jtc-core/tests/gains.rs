@@ -234,7 +234,7 @@ fn j71_a_swing_that_grows_ends_the_trial() {
     }
 }
 
-/// The torque does not step when gains change, whatever share of it comes from the integral.
+/// The torque does not step when gains change, for any share of the integral in the torque.
 #[test]
 fn j71_gains_come_in_without_a_step_of_the_torque() {
     let worst_step = |gains: Option<Gains>| {
@@ -263,7 +263,7 @@ fn j71_gains_come_in_without_a_step_of_the_torque() {
     }
 }
 
-/// A loop is unstable when the joints are enabled. There are no earlier gains, and softer gains hold the arm.
+/// A loop is unstable when the joints are enabled. No earlier gains exist, and softer gains hold the arm.
 #[test]
 fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     let model = Parameters::avena().model;
@@ -424,8 +424,8 @@ fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     }
 }
 
-/// Two joints swing under new gains. The earlier gains are restored. They are not made softer because of the swing of the second joint
-/// before that.
+/// Two joints swing under new gains. The earlier gains are restored. The restored gains are not made softer because of the swing of the
+/// second joint before that.
 #[test]
 fn j66_j71_gains_that_came_back_are_not_softened_for_what_was_before_them() {
     let mut config = Config::avena();

@@ -1,5 +1,5 @@
-//! The gripper is brought up in parallel with the arm. It never takes the torque of the arm away, and never starts its pump by itself
-//! (J-14, J-23).
+//! The gripper is brought up in parallel with the arm. The gripper never takes the torque of the arm away, and never starts its pump by
+//! itself (J-14, J-23).
 use crate::rig;
 
 use jtc_bus::{NodeState, Request};
@@ -209,7 +209,7 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
-        // The same after Init.
+        // The gripper still holds the part after Init.
         rig.nodes[2].configured = false;
         rig.nodes[2].report.state = NodeState::INIT;
         rig.run(400);

@@ -300,7 +300,8 @@ fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     }
 }
 
-/// Returns the highest rate (1/s) at which the damping of these joints (N·m·s/rad) reduces a speed. It is computed by power iteration.
+/// Returns the highest rate (1/s) at which the damping of these joints (N·m·s/rad) reduces a speed. The rate is computed by power
+/// iteration.
 fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6]) -> f64 {
     let dynamics = jtc_dynamics::Dynamics::new(&arm.model, [0.0; 3]);
     let (mut v, mut rate) = ([1.0, -0.9, 0.8, -0.7, 0.6, 0.5], 0.0);

@@ -95,7 +95,7 @@ fn j68_a_load_that_was_a_hand_does_not_drive_a_joint_for_long() {
 }
 
 /// Answers of a joint that a hand leads are lost. The torque of its springs fades, followed by damping and friction compensation, because
-/// the last speed is no longer valid. The torque makes no step.
+/// the last speed is not valid any more. The torque makes no step.
 #[test]
 fn j25_the_torque_of_a_joint_that_does_not_answer_fades() {
     let base = ArmFile::avena();
@@ -160,7 +160,7 @@ fn j25_a_payload_that_is_lifted_slowly_is_still_carried() {
 }
 
 /// A clamp holds a joint away from its commanded position, with up to a quarter of its torque limit. When Teaching begins, only the part of
-/// this torque that was found is carried. It fades when the joint is led away.
+/// this torque that was found is carried. The carried torque fades when the joint is led away.
 #[test]
 fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     for (arm, joint, share) in

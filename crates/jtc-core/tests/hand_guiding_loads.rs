@@ -53,8 +53,8 @@ fn j25_j60_a_payload_that_is_given_and_taken_away_leaves_no_load() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// A payload is found in a pose in which its full load acts on a joint, and configured in the upright pose, in which it causes no load. It
-/// is carried only once.
+/// A payload is found in a pose in which its full load acts on a joint, and configured in the upright pose, in which it causes no load. The
+/// payload is carried only once.
 #[test]
 fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.3), 4_000);
@@ -95,7 +95,7 @@ fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     }
 }
 
-/// A load was lowered (J-70), whatever its cause was, and the torque of the damper was learned. Then the load is removed.
+/// A load of any cause was lowered (J-70), and the torque of the damper was learned. Then the load is removed.
 #[test]
 fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_range() {
     let arm = ArmFile::avena();
@@ -171,8 +171,8 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
             let about = format!("{} rotors {rotors} joint {}", arm.name, joint + 1);
             assert!(back < 0.4 && most < 1.8, "{about}: {back} rad/s against the hand, {most} rad/s");
             if rig.state() == ControllerState::HoldPos {
-                // The joint was too fast for the damping. It is now held by gains for five times the rotor inertia, which is not tested
-                // here.
+                // The joint was too fast for the damping. The joint is now held by gains for five times the rotor inertia, which is not
+                // tested here.
                 assert!(rotors < 0.5, "{about} is held");
                 ended += 1;
                 continue;

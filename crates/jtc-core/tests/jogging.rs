@@ -54,8 +54,8 @@ fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Resu
     Ok(())
 }
 
-/// Joint 1 of the shipped arm at 1.5 rad/s: a jog that ended between 599 and 695 ms once released the arm. The same happened with other
-/// joints and arms.
+/// Joint 1 of the shipped arm at 1.5 rad/s: a jog that ended between 599 and 695 ms once released the arm. Other joints and arms had the
+/// same fault.
 #[test]
 fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_arm() {
     let fast = |velocity_max: f64, acceleration_max: f64| {
@@ -306,7 +306,7 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     }
 }
 
-/// A key is held down and moves joint 2 of an arm with 3.5 or 4 kg outwards, until the joint stops by itself. There is no error, and enough
+/// A key is held down and moves joint 2 of an arm with 3.5 or 4 kg outwards, until the joint stops by itself. No error occurs, and enough
 /// torque remains for the way back.
 #[test]
 fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
@@ -357,7 +357,7 @@ fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     }
 }
 
-/// A joint that is marked as absent holds nothing, whatever the model is.
+/// With any model, a joint that is marked as absent holds nothing.
 #[test]
 fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     let pose = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];

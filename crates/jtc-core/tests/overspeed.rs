@@ -112,7 +112,7 @@ fn j43_position_limits_outside_the_working_area_are_refused() {
         let error = ConfigError::Position { joint: 6, value, limit: 2.9905 };
         assert_eq!(config.check(), Err(error));
         assert!(error.to_string().contains("joint 6"), "{error}");
-        // If the drives do not keep to a working area, there is no such limit.
+        // If the drives do not keep to a working area, no such limit applies.
         config.joint_config_bits &= !0x01;
         assert_eq!(config.check(), Ok(()));
     }

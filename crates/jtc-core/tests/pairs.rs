@@ -10,7 +10,7 @@ use crate::rig::{Rig, floats};
 
 /// Time after which the end state is checked, ms.
 const WATCH_MS: usize = 6_000;
-/// Silence that host supervision tolerates, ms. It is longer than the activities take to begin.
+/// Silence that host supervision tolerates, ms. This silence is longer than the activities take to begin.
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
 /// A simulated arm without brakes, and its controller.

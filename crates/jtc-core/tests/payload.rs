@@ -254,7 +254,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
     assert_eq!(set(&mut rig, &Payload::NONE), DataStatus::NoError);
 }
 
-/// The payload remains set after errors and new models, changes at once if there is no torque, and is not part of the arm.
+/// The payload remains set after errors and new models, changes at once if the arm has no torque, and is not part of the arm.
 #[test]
 fn j60_the_payload_stays_through_errors_and_new_models() {
     let payload = point_mass(1.5);
@@ -376,7 +376,7 @@ fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     }
 }
 
-/// A centre of mass without a mass is not a payload. It does not reduce the load that Teaching carries.
+/// A centre of mass without a mass is not a payload. Such a centre of mass does not reduce the load that Teaching carries.
 #[test]
 fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
     let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);

@@ -286,7 +286,8 @@ fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     assert_eq!(rig.ask(SEGMENT, &of_three(1)), DataStatus::NotAllowed, "not 6, as for wrong points");
 }
 
-/// After its Execute, a trajectory may be executed by another client. It is not known whether that client can handle values above 6.
+/// After its Execute, a trajectory may be executed by another client. The controller does not know whether that client can handle values
+/// above 6.
 #[test]
 fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     for plain in [true, false] {
@@ -330,7 +331,7 @@ fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStat
         .collect()
 }
 
-/// Existing hosts wait for ever if a segment is refused, whatever the reason is.
+/// Existing hosts wait for ever if a segment is refused for any reason.
 #[test]
 fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     for (name, points, error) in broken() {

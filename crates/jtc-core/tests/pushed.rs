@@ -206,7 +206,7 @@ fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a
 }
 
 /// The rotor inertias are only proposals. If the rotors are half as heavy, or a third, the loop of a yielding joint is too stiff for them.
-/// It becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
+/// The joint becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
 #[test]
 fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     for (arm, rotors) in [ArmFile::ur5(), ArmFile::z1()].iter().flat_map(|arm| [(arm, 0.33), (arm, 0.5)]) {

@@ -94,8 +94,8 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.controller.telemetry().joints[4].set_position, rad(path()[400].position[4]));
 }
 
-/// The torque falls within 10 ms to the torque of a weak spring. It never rises by a step on the way, and follows the joint wherever it is
-/// led.
+/// The torque falls within 10 ms to the torque of a weak spring. The torque never rises by a step on the way, and follows the joint
+/// wherever it is led.
 #[test]
 fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     let mut rig = bench(false);

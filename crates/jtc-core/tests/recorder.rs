@@ -197,7 +197,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
     assert!(cuts > 200, "{cuts}");
 }
 
-/// Whatever changes in the memory, only data that were written are read, and all complete data are read.
+/// After any changes in the memory, only data that were written are read, and all complete data are read.
 #[test]
 fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     let mut rig = holding();

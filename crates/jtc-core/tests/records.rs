@@ -198,7 +198,7 @@ fn j04_a_line_that_floods_loses_no_record_of_the_other() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..Default::default() })]
 
-    /// Whatever frames are sent, each frame gets exactly one record while at most 64 wait. The records of each line are in order.
+    /// For any sequence of frames, each frame gets exactly one record while at most 64 wait. The records of each line are in order.
     #[test]
     fn j04_exactly_one_record_a_frame(sent in prop::collection::vec((0usize..2, 0u8..8), 1..60)) {
         let mut rig = Rig::holding();

@@ -181,7 +181,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
-    // The same for the occurred errors: the first clear empties their word, the second one has no effect.
+    // The occurred errors behave alike: the first clear empties their word, the second one has no effect.
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NotAllowed);
     // A controller without errors refuses no clear.
@@ -387,7 +387,7 @@ fn j04_each_record_is_carried_once_and_in_order() {
     assert_eq!(records[0].frame_type, 0x08);
     assert_eq!(records[1], bad);
     assert!(records[2..].iter().all(|r| (r.frame_type, r.data, r.length) == (0x0F, DataStatus::NoError, 6)));
-    // If there are no records, one status is sent every 40 ms, with an empty record.
+    // Without records, one status is sent every 40 ms, with an empty record.
     rig.run(40);
     rig.statuses.clear();
     rig.run(400);

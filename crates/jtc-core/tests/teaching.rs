@@ -7,7 +7,7 @@ use jtc_wire::FrameType;
 use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
 
-/// Returns the distance by which a hand leads each joint from a pose, rad. No joint reaches a soft end.
+/// Returns how far a hand leads each joint from a pose, rad. No joint reaches a soft end.
 fn led(pose: &[f64; 6]) -> [f64; 6] {
     let second = if pose[1] > 1.0 { -0.3 } else { 0.3 };
     [0.1, second, -0.3, 0.2, 0.3, 0.3]

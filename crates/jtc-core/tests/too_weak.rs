@@ -51,7 +51,7 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
     }
 }
 
-/// Whether an arm can be held is checked when it must be held, not while a hand moves it before.
+/// The check that an arm can be held is done when the arm must be held, not while a hand moves it before.
 #[test]
 fn j06_the_model_is_judged_where_init_ends() {
     let mut rig = Rig::new(weak());

@@ -17,7 +17,7 @@ pub struct PathRange {
     limits: (f64, f64),
     /// The limits with their tolerance, inside the working area.
     tolerated: (f64, f64),
-    /// Amount by which rounding to the wire format may increase a position between two points.
+    /// Largest increase of a position between two points due to rounding to the wire format.
     tolerance: f64,
     /// Half of the working area; infinite while the drives do not keep to it.
     area: f64,

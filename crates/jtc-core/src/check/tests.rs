@@ -60,8 +60,8 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
     (position, velocity, speed)
 }
 
-/// Returns the margins to the limits of joint 0 around two points, for any signs of their velocities and accelerations. They are: the
-/// margin of the hull of the positions (rad, below and above); the margin of the hull of the velocities (rad/s), with the bump for the
+/// Returns the margins to the limits of joint 0 around two points, for any signs of their velocities and accelerations. The margins are:
+/// the margin of the hull of the positions (rad, below and above); the margin of the hull of the velocities (rad/s), with the bump for the
 /// unexplained distance less one step; and the margin of the acceleration of `b` (rad/s²).
 fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let (limit, h, more) = (&config.joints[0], f64::from(step_ms) / 1000.0, tolerance(step_ms));

@@ -21,8 +21,8 @@ impl Extensions {
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Loads the stored arm (J-54). Its settings and its name are in use from now on, and the UseDefault frames select it. The parameters
-    /// still have to be requested. The board calls this before the first tick. Returns `false` if this controller does not accept the
-    /// image. The settings then do not change, and the UseDefault frames are refused until an arm is stored.
+    /// must still be requested. The board calls this before the first tick. Returns `false` if this controller does not accept the image.
+    /// The settings then do not change, and the UseDefault frames are refused until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());

@@ -215,7 +215,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
     let image = bench.image();
     assert_eq!(Hash::of_image(&image), first);
     assert!(ArmImage::parse(&image).is_some());
-    // The hash does not include the name or the speed override. It includes each setting of the arm.
+    // The hash does not include the name or the speed override. The hash includes each setting of the arm.
     bench.send(0, &fixed::set_name(&Name::cut("another")));
     assert_eq!(bench.set(128, 0, 0.5), DataStatus::NoError);
     assert_eq!(bench.info(0).hash, first);

@@ -103,8 +103,7 @@ fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
 }
 
 proptest! {
-    /// New gains are blended in without a step, whatever the gains before: in a millisecond a gain changes by at most 1/200 of the
-    /// difference.
+    /// New gains are blended in without a step, for any earlier gains: in a millisecond a gain changes by at most 1/200 of the difference.
     #[test]
     fn j71_gains_come_in_over_half_a_second(factors in prop::array::uniform3(0.05..1.5f64), again_ms in 0..900u16) {
         let [before, second, third] = factors.map(scaled);

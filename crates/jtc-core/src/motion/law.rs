@@ -86,7 +86,7 @@ pub(crate) struct ControlLaw {
     pid: [Pid; JOINTS],
     /// Torque of the last tick.
     pub torque: [JointTorque; JOINTS],
-    /// State of Teaching. It exists only in Teaching, and the flight recorder does not store it.
+    /// State of Teaching. This state exists only in Teaching, and the flight recorder does not store it.
     pub(super) taught: Option<Taught>,
     transfer: Transfer,
     /// Joints that yield (J-68, J-70).
@@ -247,7 +247,7 @@ impl ControlLaw {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
 
-    /// Returns the feedback torque, which corrects the torques of the model and of the load, N·m. It opposes a push.
+    /// Returns the feedback torque, which corrects the torques of the model and of the load, N·m. The feedback torque opposes a push.
     pub fn feedback(&self, joint: usize) -> f64 {
         let pid = &self.torque[joint].pid;
         pid.p + pid.d + (pid.i - self.load(joint))

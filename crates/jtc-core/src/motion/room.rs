@@ -1,6 +1,6 @@
-//! Torque margin for a motion from the held position. It determines how soon the arm can reach the first point of a path (J-34), and the
-//! acceleration and speed of a jog (J-58). Gravity and the load found are taken into account at both ends of the motion, friction at its
-//! top speed.
+//! Torque margin for a motion from the held position. This margin determines how soon the arm can reach the first point of a path (J-34),
+//! and the acceleration and speed of a jog (J-58). Gravity and the load found are taken into account at both ends of the motion, friction
+//! at its top speed.
 use jtc_dynamics::sqrt;
 
 use super::Motion;
@@ -46,9 +46,9 @@ pub(crate) struct JogRoom {
 }
 
 impl Motion {
-    /// Returns the time for the approach from the held position to `to` (rad), ms. It is the time of a ramp, or longer if the velocity,
-    /// acceleration or torque limits require it. Returns `None` if the torque limits require over 2 s more than the other limits. Uses the
-    /// inertia of a ramp that begins here.
+    /// Returns the time for the approach from the held position to `to` (rad), ms. The approach takes the time of a ramp, or longer if the
+    /// velocity, acceleration or torque limits require it. Returns `None` if the torque limits require over 2 s more than the other limits.
+    /// Uses the inertia of a ramp that begins here.
     pub fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
         let config = inputs.config;
         let from = &self.set.point.position;

@@ -127,7 +127,7 @@ impl SetValues {
     }
 
     /// Begins to hold the arm at its measured position. An arm that moves because a hand has led it first comes to rest within `length_ms`.
-    /// It is then caught like a falling load.
+    /// Such an arm is then caught like a falling load.
     pub fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);

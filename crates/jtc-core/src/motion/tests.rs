@@ -152,7 +152,7 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
 #[test]
 fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
-        // One moving joint is sufficient: all joints decelerate.
+        // A single moving joint is sufficient: all joints decelerate.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
         let mut motion = holding([true, true, true, false, true, true]);
         motion.set.hold_measured(&nodes, 200.0, &Config::avena());

@@ -89,7 +89,7 @@ impl Nodes {
         target
     }
 
-    /// Returns the requested state of the gripper. It is also brought up in states with torque, in addition to the joints (J-23).
+    /// Returns the requested state of the gripper. The gripper is also brought up in states with torque, in addition to the joints (J-23).
     fn gripper_target(&self, goal: Goal, config: &Config) -> Target {
         let Some(node) = self.gripper_node().filter(|_| self.gripper_answers(config)) else {
             return Target::NoChange;

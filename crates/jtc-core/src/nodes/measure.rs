@@ -128,7 +128,7 @@ pub(crate) struct Measurement {
     used: Reading,
     /// There has been a usable answer.
     known: bool,
-    /// Time, ms. It wraps around after 49 days, which does not affect differences.
+    /// Time, ms. The clock wraps around after 49 days, which does not affect differences.
     clock_ms: u32,
     /// The last usable answer. Its position is extrapolated to the present tick.
     answer: Reading,
@@ -409,7 +409,7 @@ impl Measurement {
     }
 
     /// Bridges the difference between the answer of this tick and `predicted`, so that it does not become a step. An answer in its place
-    /// makes no step. It reduces the remainder of earlier differences as far as it can, because they would add up otherwise.
+    /// makes no step. Such an answer reduces the remainder of earlier differences as far as it can, because they would add up otherwise.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;
@@ -443,9 +443,9 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// Computes the rate from the youngest answer that is old enough to this answer. The rate is computed from answers only. A rate
-    /// computed from predictions would confirm itself, whatever the joint does, while every other answer is lost. `as_predicted`: the
-    /// answer was close to its prediction. Inlined for the ticks without a late answer.
+    /// Computes the rate from the youngest answer that is old enough to this answer. The rate is computed from answers only. While every
+    /// other answer is lost, a rate computed from predictions would confirm itself for any motion of the joint. `as_predicted`: the answer
+    /// was close to its prediction. Inlined for the ticks without a late answer.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;

@@ -168,7 +168,7 @@ impl Nodes {
         self.gripper_lost
     }
 
-    /// Returns the CAN flags of a gripper that does not answer. They are shown, but are not an error (J-14, J-23).
+    /// Returns the CAN flags of a gripper that does not answer. These flags are shown, but are not an error (J-14, J-23).
     pub fn gripper_flags(&self, config: &Config) -> u32 {
         if self.gripper && !self.gripper_answers(config) { GRIPPER_FLAG } else { 0 }
     }

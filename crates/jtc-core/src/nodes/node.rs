@@ -117,7 +117,7 @@ impl Node {
 
     /// Returns `true` if the node reports an error. A gripper has no warnings.
     pub fn faulty(&self) -> bool {
-        // Drives also set this warning before they are configured, whatever the level of the line is.
+        // Drives also set this warning before they are configured, for any level of the line.
         let safety_line = self.valid && self.report.warnings & warning::SAFETY_LINE != 0;
         self.in_fault() || (self.seen && safety_line)
     }

@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Ticks between two checks of the same joint. One joint is checked per tick.
+/// Ticks between two checks of the same joint. Each tick checks a single joint.
 const PERIOD: u8 = 10;
 /// Consecutive checks of a joint that must show a difference in the same direction.
 const LOOKS: u8 = 5;

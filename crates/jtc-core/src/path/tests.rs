@@ -62,7 +62,7 @@ fn j33_margins_give_way_before_a_stop_comes_late() {
             assert!(ticks <= 480, "{ticks} ms with {easy:?} and {most}");
         }
     }
-    // The same is true if the bounds shrink after half of the ramp.
+    // A stop is also in time if the bounds shrink after half of the ramp.
     let ticks = stop(|ms, _| SlopeBounds { easy: if ms < 100 { FREE } else { (0.0, 0.0) }, full: FREE });
     assert!(ticks <= 350, "{ticks}");
     // A stop within its margins is not hurried.
@@ -118,7 +118,7 @@ fn j33_each_tick_of_a_stop() {
         (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
         // Within its margins and just in time, so the stop is not hurried.
         (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
-        // At full speed path time does not become faster, whatever the arm does.
+        // At full speed path time does not become faster, for any motion of the arm.
         (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
         // The last step: path time is at rest and does not slow down any further.
         (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),

@@ -21,7 +21,7 @@ pub(super) mod head {
     pub const SEQUENCE: usize = 1;
     /// Number of bits (low half) and their check.
     pub const COMMIT: usize = 2;
-    /// Start of the first snapshot (low half; [`super::NONE`] if there is none) and its complement.
+    /// Start of the first snapshot (low half; [`super::NONE`] if none exists) and its complement.
     pub const SNAPSHOT: usize = 3;
     /// State of the log (low half) and its complement.
     pub const FLAGS: usize = 4;

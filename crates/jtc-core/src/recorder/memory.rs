@@ -107,7 +107,7 @@ pub(super) struct Writer<P, const N: usize> {
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
-    /// Creates a writer, whatever the memory contains.
+    /// Creates a writer, for any content of the memory.
     pub fn new(pieces: [P; N]) -> Self {
         let ring = Ring { pieces };
         let newest = ring.newest();

@@ -30,8 +30,8 @@ pub enum Record {
     },
 }
 
-/// A log: blocks in the order of their numbers. Reading never fails: whatever the blocks contain, it returns the records of the valid ones,
-/// from the first snapshot on.
+/// A log: blocks in the order of their numbers. Reading never fails: for any content of the blocks, it returns the records of the valid
+/// ones, from the first snapshot on.
 #[derive(Clone, Debug)]
 pub struct Log<'a> {
     blocks: &'a [Block],

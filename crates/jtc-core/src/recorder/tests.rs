@@ -1,4 +1,4 @@
-//! Whatever frames the bus carries, they are read back unchanged.
+//! Any frames that the bus carries are read back unchanged.
 extern crate std;
 use std::vec;
 use std::vec::Vec;

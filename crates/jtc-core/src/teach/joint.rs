@@ -12,7 +12,7 @@ const FAST: (f64, f64) = (0.4, 0.8);
 /// Highest rate at which the damping reduces the speed of a joint whose other joints are free to move, 1/s. Measured speeds are about 8 ms
 /// old. Joints that move each other tolerate less damping.
 pub(super) const DAMPING_RATE: f64 = 90.0;
-/// Speed at which the damping of a joint balances the load that it carries, rad/s, if its inertia tolerates so much damping.
+/// Speed at which the damping of a joint balances the load that it carries, rad/s, if its inertia tolerates that damping.
 const SINKS: f64 = 0.5;
 /// Value to which the damping grows, divided by the torque limit, s/rad.
 const GROWN: f64 = 1.0;
@@ -20,7 +20,7 @@ const GROWN: f64 = 1.0;
 /// joint before that is measured. Without it, over-speed would release the arm.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
-/// Speed above which a joint is no longer taught but brought to rest: in rad/s, and as a share of the over-speed threshold (J-35).
+/// Speed above which a joint is brought to rest instead of being taught: in rad/s, and as a share of the over-speed threshold (J-35).
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
 /// Time constant of the speed that is computed from positions, s. Drives report a mean over 10 ms.
 const SPEED_S: f32 = 0.004;
@@ -32,7 +32,7 @@ const PROPOSED: f64 = 200.0;
 const CERTAIN_FRICTION: f64 = 0.7;
 /// Highest share of the damping that the friction compensation may cancel, because the friction may not exist.
 const USED_UP: f64 = 0.5;
-/// Time constant with which the dry friction fades in and out, s.
+/// Time constant for the dry friction to fade in and out, s.
 const GRIP_S: f64 = 0.1;
 /// Speed below which a joint is always considered at rest, rad/s.
 const STANDING: f64 = 0.01;
@@ -225,13 +225,13 @@ impl TaughtJoint {
         (torque, Bears { balanced, compressed })
     }
 
-    /// Returns the highest torque of the dry friction, N·m. It is less if the joint has friction of its own.
+    /// Returns the highest torque of the dry friction, N·m. This torque is less if the joint has friction of its own.
     fn breakaway(&self, limits: &JointConfig, config: &Config) -> f64 {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }
 
-    /// Returns the dry friction of a slow joint. It fades between the speed at which damping balances its torque and three times that
-    /// speed. So any lower torque is stopped, and the sum of damping and dry friction never falls with the speed.
+    /// Returns the dry friction of a slow joint. The dry friction fades between the speed at which damping balances its torque and three
+    /// times that speed. So any lower torque is stopped, and the sum of damping and dry friction never falls with the speed.
     fn dry_friction(
         &mut self,
         position: f64,

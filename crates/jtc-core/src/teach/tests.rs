@@ -50,7 +50,7 @@ fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
 
 #[test]
 fn j25_friction_never_becomes_a_great_mass() {
-    // If the arm is stretched vertically, a mass at the flange loads no joint. Near that pose the mass would have to be enormous.
+    // If the arm is stretched vertically, a mass at the flange loads no joint. Near that pose the mass would need to be enormous.
     assert!(begun([8.0; JOINTS], &[0.0; JOINTS]).mass.abs() < 0.2);
     for k in 0..200 {
         let q = [0.0, 0.01 * f64::from(k), 0.0, 0.0, 0.0, 0.0];
@@ -155,13 +155,13 @@ fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     }
 }
 
-/// A removed mass is added again if the joint sinks without it and there is no other explanation.
+/// A removed mass is added again if the joint sinks without it and nothing else explains this.
 #[test]
 fn j25_a_mass_that_is_missed_comes_back() {
     let mut driven = Driven::new();
     let gone = driven.moves(1.0, 0.3, 4_000);
     assert!(gone < 0.2, "{gone}");
-    // The missing torque drives the joint as the acting torque did before. It is this multiple of the remaining torque.
+    // The missing torque drives the joint as the acting torque did before. The missing torque is this multiple of the remaining torque.
     let sinking = f64::from((1.0 - gone) / gone);
     for (against, velocity, ms) in
         [(sinking, -0.05, 1_000), (sinking, -0.2, 90), (sinking, 0.2, 1_000), (0.5 * sinking, -0.2, 1_000)]

@@ -14,7 +14,7 @@ const SOFTEST: f32 = 0.2;
 /// Time without a swing after which the joint becomes harder by one step, and time between further steps, ms.
 const HARDENS_MS: (u16, u16) = (300, 100);
 
-/// State of the swing of a joint, and the factor by which the joint is softer.
+/// State of the swing of a joint, and the factor that makes the joint softer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Swing {
     /// Highest speed in the present direction, with its sign, rad/s, and time in this direction, ms.
@@ -22,7 +22,7 @@ pub(super) struct Swing {
     half_ms: u8,
     /// Highest speed of the previous half; 0 if that was not half a swing.
     before: f32,
-    /// Factor by which spring, damper and brake are softer, and time since it changed, ms.
+    /// Factor that makes spring, damper and brake softer, and time since it changed, ms.
     soft: f32,
     soft_ms: u16,
 }

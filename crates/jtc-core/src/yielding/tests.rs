@@ -209,7 +209,8 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
     }
 }
 
-/// A lowered load comes to rest if the limit can hold it. It is then held if a little of the limit remains for the position controller.
+/// A lowered load comes to rest if the limit can hold it. The load is then held if a little of the limit remains for the position
+/// controller.
 #[test]
 fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
     let limits = limits();

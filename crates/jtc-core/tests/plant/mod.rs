@@ -1,4 +1,4 @@
-//! A simulated physical arm that is connected to the [`Rig`]. It has rigid bodies, rotors, rigid or elastic gears, LuGre friction, and
+//! A simulated physical arm that is connected to the [`Rig`]. The arm has rigid bodies, rotors, rigid or elastic gears, LuGre friction, and
 //! drives with a coarse encoder and a delayed speed.
 
 use jtc_core::{Config, Parameters};
@@ -17,7 +17,7 @@ const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
 /// Integration steps per millisecond. The bristles are stiff, so there are many.
 const SUBSTEPS: usize = 20;
 const DT: f64 = 1e-3 / SUBSTEPS as f64;
-/// Inertia of the output side of an elastic gear, kg·m². It turns with the link.
+/// Inertia of the output side of an elastic gear, kg·m². The output side turns with the link.
 const GEAR_OUTPUT: f64 = 0.01;
 /// Damping of an elastic gear per stiffness, s: N·m·s/rad for each N·m/rad.
 const GEAR_DAMPING: f64 = 5e-4;

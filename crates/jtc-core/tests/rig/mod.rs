@@ -204,7 +204,7 @@ impl Rig {
         });
     }
 
-    /// Adds a Stop or Pause that arrives on a line. It takes effect in the next tick, and its frame waits after the others.
+    /// Adds a Stop or Pause that arrives on a line. The command takes effect in the next tick, and its frame waits after the others.
     pub fn urgent(&mut self, line: usize, command: UrgentCommand) {
         self.urgent[line].push(command);
         self.send_on(line, FrameType::TrajSetExecStatus, &[ExecCommand::from(command) as u8]);

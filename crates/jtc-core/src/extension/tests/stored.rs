@@ -28,7 +28,7 @@ fn j54_a_stored_arm_is_what_the_defaults_mean_after_the_next_start() {
     assert_eq!((info.missing, info.arm.as_str(), info.defaults_stored), (7, "other", true));
     assert_eq!(bench.controller.config.gravity[1], 3.0);
     assert_ne!(info.hash, hash, "its parameters are not in use yet");
-    // The friction of the stored arm is a table. It is used for both kinds of default friction that an existing host may request.
+    // The friction of the stored arm is a table. The table is used for both kinds of default friction that an existing host may request.
     bench.use_defaults();
     let info = bench.info(0);
     assert_eq!((info.hash, info.missing), (hash, 0));

@@ -26,7 +26,7 @@ fn arm(host: u8) -> Vec<Vec<u8>> {
 }
 
 proptest! {
-    /// Of each kind of parameter, the frame that was accepted last is in use, whichever host sent it. Two frames are never mixed, though
+    /// For each kind of parameter, the frame that was accepted last is in use, whichever host sent it. Two frames are never mixed, though
     /// each may take many ticks. Each host gets its own records and answers, in the order of its frames.
     #[test]
     fn j04_j53_two_hosts_with_different_arms_do_not_mix_within_a_frame(

@@ -253,7 +253,7 @@ fn j40_j41_j42_the_torque_is_the_sum_of_its_parts() {
     assert_eq!((torque.correction(), torque.sum()), (127.0, 255.0));
 }
 
-/// The result is the requested torque, or the part of it that the limit leaves. It never has the opposite sign.
+/// The result is the requested torque, or the part of it that the limit leaves. The result never has the opposite sign.
 #[test]
 fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     for (wanted, torque, taken) in [

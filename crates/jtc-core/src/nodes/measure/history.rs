@@ -56,7 +56,8 @@ pub(super) struct History {
     answers: [Kept; SLOTS],
     /// Slot of the next answer. The number wraps around.
     next: u8,
-    /// Number of answers before the newest one that came without a gap, one per millisecond. It may exceed the number of stored answers.
+    /// Number of answers before the newest one that came without a gap, one per millisecond. This number may exceed the number of stored
+    /// answers.
     in_turn: u8,
     /// Answers that were close to their predictions, as a mask. The newest answer is bit 0.
     as_predicted: u8,
@@ -72,7 +73,7 @@ impl History {
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// Stores an answer. Returns the rate from the youngest answer that is old enough to this one; `None` if there is no such answer.
+    /// Stores an answer. Returns the rate from the youngest answer that is old enough to this one; `None` if no answer is old enough.
     #[inline(always)]
     pub fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;

@@ -34,7 +34,7 @@ fn step(joint: &mut Measurement, tick: &Tick) -> bool {
     joint.step(tick, past, &Config::avena()) == Outcome::Used
 }
 
-/// A joint that has moved at this velocity for a while. It is at position 0 now.
+/// A joint that has moved at this velocity for a while. The joint is at position 0 now.
 fn moving(velocity: f64) -> Measurement {
     let mut joint = Measurement::default();
     for k in -20..=0 {

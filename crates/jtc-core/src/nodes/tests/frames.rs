@@ -88,7 +88,7 @@ fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     }
 }
 
-/// Puts node `n` into Init, where it waits for its configuration.
+/// Puts node `n` into Init, so that it waits for its configuration.
 fn waits(nodes: &mut Nodes, n: usize) {
     (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.state) =
         (false, false, NodeState::INIT);
@@ -153,7 +153,7 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
         nodes.nodes[GRIPPER].silent = 5;
     };
     assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
-    // A joint that must be enabled does not wait for so many ticks.
+    // A joint that must be enabled does not wait for this number of ticks.
     let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
     assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");

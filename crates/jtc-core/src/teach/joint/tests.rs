@@ -100,7 +100,8 @@ fn j25_the_dry_friction_lets_go_of_a_joint_that_moves_and_takes_hold_again() {
     assert!(held < -0.9 * 0.03 * limits().torque_max, "{held} N·m after 300 ms");
 }
 
-/// Half of the Coulomb friction, smoothed within 0.1 rad/s, and zero from 0.6 rad/s on. It is less if the damping does not allow its slope.
+/// Half of the Coulomb friction, smoothed within 0.1 rad/s, and zero from 0.6 rad/s on. This share is less if the damping does not allow
+/// its slope.
 #[test]
 fn j25_a_share_of_the_coulomb_friction_is_taken_away() {
     for (velocity, share) in

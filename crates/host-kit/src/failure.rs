@@ -44,7 +44,7 @@ impl Failure {
         Self { facts: Box::new(facts), ..self }
     }
 
-    /// Creates a failure whose reason is already in the printed result. It has a kind and no code.
+    /// Creates a failure whose reason is already in the printed result. The failure has a kind and no code.
     pub fn shown(kind: ErrorKind) -> Self {
         Self::new(kind, "", "")
     }

@@ -1,7 +1,7 @@
 //! Requests to the thread that owns a device, and the Stops that overtake them.
 //!
-//! One thread owns a device: it alone calls the device's functions. Other threads put requests into the [`Queue`] of this thread, which
-//! takes them one at a time. A request begins when the owner takes it.
+//! A single thread owns a device: only this thread calls the device's functions. Other threads put requests into the [`Queue`] of this
+//! thread, which takes them one at a time. A request begins when the owner takes it.
 //!
 //! Stops are numbered. A Stop cancels the request that is being done, unless it is an update. A command or an update that was requested
 //! before a Stop and has not begun is refused. So nothing that was requested before a Stop begins after it.
@@ -18,7 +18,8 @@ pub enum Kind {
     /// Update of a device's program. A Stop refuses it while it waits. Once begun it is not cancelled by a Stop, because a device with a
     /// half-written program could not work afterwards.
     Update,
-    /// Question, which changes nothing. A Stop cancels it once begun; while it waits it stays. It is taken after all commands and updates.
+    /// Question, which changes nothing. A Stop cancels it once begun; while it waits it stays. A question is taken after all commands and
+    /// updates.
     Question,
 }
 
@@ -43,16 +44,16 @@ pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 pub struct Request<D, T> {
     /// Kind of the request.
     pub kind: Kind,
-    /// Number of the last Stop before the request: see [`Queue::stops`]. It does not matter for questions.
+    /// Number of the last Stop before the request: see [`Queue::stops`]. This number does not matter for questions.
     pub after: u64,
-    /// What the front end knows about the request.
+    /// Data of the front end about the request.
     pub tag: T,
     /// Function of the request.
     pub act: Act<D>,
 }
 
 impl<D, T> Request<D, T> {
-    /// Returns `true` if one of so many Stops came after the request and refuses it.
+    /// Returns `true` if a Stop with a number up to `stops` came after the request and refuses it.
     fn is_late(&self, stops: u64) -> bool {
         self.kind != Kind::Question && self.after < stops
     }
@@ -191,7 +192,7 @@ impl<D, T: Clone> Queue<D, T> {
         self.lock().tags().any(is_it)
     }
 
-    /// Cancels the request with such a tag: the current one must end, a waiting one is refused. Returns `false` if there is none.
+    /// Cancels the request with such a tag: the current one must end, a waiting one is refused. Returns `false` if no such request exists.
     pub fn cancel(&self, is_it: impl Fn(&T) -> bool) -> bool {
         let request = {
             let mut state = self.lock();

@@ -20,7 +20,7 @@ const EVENTS_MAX: usize = 500;
 /// Number of requests that can wait for an event at the same time. Further requests are answered after [`NO_PLACE_S`],
 /// so that connections remain for other clients.
 const WAITING_MAX: usize = 64;
-/// Longest wait of a further request, in seconds. It limits the load by clients that ask again immediately.
+/// Longest wait of a further request, in seconds. This wait limits the load by clients that ask again immediately.
 const NO_PLACE_S: f64 = 0.25;
 /// Shortest interval between messages of a stream that are not events.
 const PERIOD: Duration = Duration::from_millis(40);

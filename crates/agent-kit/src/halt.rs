@@ -25,7 +25,7 @@ pub struct KnownHalt {
 }
 
 /// Number of the last Stop or Pause before a request: the number that the client sends, or else the number of the
-/// last one when the head of the request arrived. It is read before the body, which may arrive slowly.
+/// last one when the head of the request arrived. The number is read before the body, which may arrive slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 

@@ -38,8 +38,8 @@ pub struct CommandLog {
     repeats: Repeats,
 }
 
-/// Kinds of lines about motions, Stops and leases. They are written even if other lines are dropped, because other
-/// lines leave half of the queue free.
+/// Kinds of lines about motions, Stops and leases. These lines are written even if other lines are dropped, because
+/// other lines leave half of the queue free.
 const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 

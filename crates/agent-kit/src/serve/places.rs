@@ -7,7 +7,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::AbortHandle;
 use tokio::time::Instant;
 
-/// Largest number of connections from this computer. The same number applies to other computers, so that they cannot
+/// Largest number of connections from this computer. This number also applies to other computers, so that they cannot
 /// block local clients.
 pub(super) const CONNECTIONS_MAX: usize = 256;
 /// If fewer places than this are free, a connection serves only one request, which must be sent at once.
@@ -17,8 +17,8 @@ const FEW: usize = CONNECTIONS_MAX / 2;
 /// block a Stop, however many there are. All connections together stay below the 1024 files that a program may open.
 const KEPT_HERE: usize = 192;
 const KEPT_ELSEWHERE: usize = 64;
-/// Shortest time that a local connection has to send its request before it is closed for a new one. The new
-/// connection waits for this time.
+/// Shortest time in which a local connection can send its request before it is closed for a new one. The new connection
+/// waits for this time.
 const ASKS_WITHIN: Duration = Duration::from_millis(20);
 
 /// Places for connections of one side.

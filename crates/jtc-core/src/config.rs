@@ -73,8 +73,8 @@ pub struct Config {
     pub overspeed_ms: u16,
     /// Longest pause or stop if the torque limits allow it, ms (J-33).
     pub stop_ms: u16,
-    /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after that, an error is raised
-    /// (J-33).
+    /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after that, the joints that move are
+    /// overloaded and lower their loads (J-33, J-70).
     pub braking_ms_max: u16,
     /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above this share is
     /// considered a push (J-66).
@@ -87,8 +87,8 @@ pub struct Config {
     pub torque_release: bool,
     /// A held stop ends only when the host has cleared it (J-69).
     pub protective_stop_latches: bool,
-    /// Longest time after a joint was enabled for which its torque may stay at the limit without an error, ms (J-43). The load of the joint
-    /// may be unknown at first, and must be caught.
+    /// Longest time after a joint was enabled for which its torque may stay at the limit without an overload, ms (J-43). The load of the
+    /// joint may be unknown at first, and must be caught.
     pub catch_ms_max: u16,
     /// Time over which a torque step at a change of state is blended out, ms (J-25, J-44).
     pub blend_ms: u16,
@@ -105,7 +105,7 @@ pub struct Config {
     pub safety_input_ramp_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
-    /// Time without a frame from any host after which a motion is paused and teaching ends, ms (J-59); 0: never.
+    /// Time without a valid frame from any host after which a motion is paused and teaching ends, ms (J-59); 0: never.
     pub host_timeout_ms: u16,
     /// Speed override, in seconds of path time per second, 0.05 to 1 (J-57). The speed override is not part of an arm.
     pub speed: f64,

@@ -267,9 +267,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Runs one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues. Meanwhile all available torque
-    /// may brake. After `stop_ms` the remaining motion may be slow enough to be ignored. If path time still runs when the braking time is
-    /// over, torque cannot stop it: the joints that move get an error. If the arm is already held by then, and is moved from outside, the
-    /// ordinary limits apply.
+    /// may brake. After `stop_ms` the remaining motion may be slow enough to be ignored. If path time or a jog still runs when the braking
+    /// time is over, torque cannot stop it: the joints that move are overloaded. If the arm is already held by then, and is moved from
+    /// outside, the ordinary limits apply.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
             // A jog has begun since then, or continues.
@@ -294,7 +294,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             if self.config.torque_release {
                 self.errors.raise_joints(&causes);
             } else {
-                // Path time is at rest, and joints that still move are lowered (J-70).
+                // Path time stops, and joints that still move lower their loads (J-70).
                 self.motion.begin_yields(&[false; JOINTS], &moving, &self.config);
                 self.hold_stop(&causes, StopKind::Overload);
                 if jogged {

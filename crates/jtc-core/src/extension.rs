@@ -139,7 +139,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             Command::StoreArm => self.store_arm(),
             Command::Disable if self.settable() || self.holds_at_rest() => {
                 // J-53: without its parameters the controller goes to Init, without torque, and stays there. In Init and Error a host can
-                // then send another arm. Its parts would not match the parameters of the last arm (J-71).
+                // then send another arm. Its parts need not match the parameters of the last arm (J-71).
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
             }
@@ -396,8 +396,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// Reacts if no host has sent anything for too long (J-59): path time comes to rest, and teaching ends. `done`: number of host events
-    /// that were done in this tick.
+    /// Reacts if no host has sent a valid frame for too long (J-59): path time comes to rest, and teaching ends. `done`: number of host
+    /// events that were done in this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));

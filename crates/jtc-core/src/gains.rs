@@ -21,8 +21,8 @@ pub(crate) const POSES: usize = 17;
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Age of the position error's torque beyond [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
-/// Factors of the required inertia: of Kd and of Kp, each times the age of its torque. The result is 1.1 to 1.7 times the inertia at which
-/// the loop of one joint becomes stable, if Kp is at most half of the Kp that Kd can damp.
+/// Factors of the required inertia: of Kd times the age of its torque, and of Kp times both ages. The result is 1.1 to 1.7 times the
+/// inertia at which the loop of one joint becomes stable, if Kp is at most half of the Kp that Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
 /// Highest sag of a joint, as a share of the position error limit, if new gains reduce the torque of its integral.

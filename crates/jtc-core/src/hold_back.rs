@@ -1,8 +1,8 @@
 //! Slows down path time while a motion overloads a joint (J-75).
 //!
 //! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
-//! path needs less torque: the torque for inertia falls with the square of the rate. Therefore path time slows down as far as the joints at
-//! their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its rate when no joint is at its
+//! path needs less torque: the torque for inertia falls with the square of the rate. Therefore path time slows down as much as the joints
+//! at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its rate when no joint is at its
 //! limit any more.
 use crate::JOINTS;
 use crate::path::PathClock;
@@ -32,7 +32,7 @@ pub(crate) struct HoldBack {
     since_ms: u16,
     /// Consecutive ticks in which a joint has been at its limit.
     pressed_ms: u16,
-    /// Ticks since the last joint was at its limit.
+    /// Ticks since a joint was last at its limit.
     quiet_ms: u16,
     /// Ticks of this run in which the path was held back.
     run_ms: u16,

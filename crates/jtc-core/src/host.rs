@@ -233,8 +233,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Clears errors (J-21). A fault that a joint still reports is raised again in this tick. If `clear` has no effect, it is refused, and
-    /// the controller does not repeat it after the joint has been cleared.
+    /// Clears errors (J-21). A fault that a joint still reports is raised again in this tick. If `clear` has no effect because of that, it
+    /// is refused, and it is not executed later either, when the joint has been cleared.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);

@@ -3,7 +3,7 @@ use crate::remembered::remembered;
 
 /// Number of late ticks that is a failure.
 const COUNT: usize = 10;
-/// Window in which these ticks are a failure, ms.
+/// Length of the window, ms: the first and the last of these ticks must be less than this apart.
 const WINDOW_MS: u64 = 1_000;
 
 /// Times of the last late or missing ticks.
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn j12_ten_late_ticks_in_exactly_a_second_are_borne() {
-        // The first to the ninth tick take 16 ms; the last two of them are 2 ms apart.
+        // The first and the ninth late tick are 16 ms apart. The tenth comes 2 ms after the last of the ticks `between`, which are in time.
         for (between, too_many) in [(981, true), (982, false)] {
             let mut late = LateTicks::default();
             assert!(!(0..9).any(|_| late.count(1)));

@@ -151,7 +151,7 @@ impl Motion {
         self.set.follow(at, clock.rate, clock.slope);
     }
 
-    /// Runs one tick of the control law and of its limits. Returns the torques to command and the violations of the limits.
+    /// Runs one tick of the control law and of its limits. Returns the torques to command and the findings of the limits.
     // A single function does the work of every tick: calls inside it would copy the torques back and forth.
     #[inline(never)]
     pub fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {

@@ -11,10 +11,10 @@
 //! | any other overloaded joint, on the path or the approach | path time is held back (J-75); if that does not help, the arm stops |
 //! | any other overloaded joint, in a jog | the jog ends (J-33) |
 //! | any other overloaded joint, at rest, or still moving at the end of the time for a stop | the joint lowers its load |
-//! | a set value above its limit | the arm stops on its path, or its jog ends |
+//! | a set value outside a limit of the path | the arm stops on its path, or its jog ends |
 //!
-//! The first row that applies to a joint is used. All rows except the first end in a held stop (J-69): the arm is held, the cause is shown,
-//! and nothing moves until the host clears it.
+//! The first row that applies to a joint is used. All reactions except the release and holding back end in a held stop (J-69): the arm is
+//! held, the cause is shown, and nothing moves until the host clears it.
 use jtc_wire::{RawPoint, StopCause, StopKind};
 
 use crate::controller::Controller;

@@ -44,7 +44,7 @@ pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 pub const SNAPSHOT_MS: u16 = 500;
 /// Ticks that are recorded after the first error (J-56).
 pub const AFTER_ERROR_MS: u16 = 300;
-/// Ticks until the next snapshot after an input that a replay cannot repeat.
+/// Ticks from one snapshot to the next, if an input between them cannot be repeated by a replay.
 const EARLY_SNAPSHOT_MS: u16 = 250;
 /// Ticks for which recording pauses after a page was requested, so that the block that is being read is not overwritten.
 const HELD_MS: u16 = 2_000;

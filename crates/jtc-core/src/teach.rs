@@ -26,9 +26,9 @@ const FIRST: u8 = 9;
 /// Ticks between two checks of the load, and that time in s.
 const JUDGED_MS: u8 = 12;
 const PERIOD: f64 = JUDGED_MS as f64 * DT;
-/// Torque of 1 kg at the flange, summed over all joints (N·m/kg). Up to the first value no load is attributed to a mass, from the second
-/// value on the complete fit. HoldPos cannot distinguish a load from static friction, and a little friction must not become a large mass in
-/// another pose.
+/// Torque of 1 kg at the flange on all joints together, as the root of the sum of squares (N·m/kg). Up to the first value no load is
+/// attributed to a mass, from the second value on the complete fit. HoldPos cannot distinguish a load from static friction, and a little
+/// friction must not become a large mass in another pose.
 const LOADS: (f64, f64) = (2.0, 6.0);
 /// Time for which a mass must have driven the arm by itself before it is removed, ms, and time constant of the removal, s.
 const DRIVEN_MS: u16 = 1_000;

@@ -183,7 +183,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (limited.torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
     }
 
-    /// Ignores position errors in motion (J-43) if the check of the trajectory has accepted a path outside the limits (J-36).
+    /// Ignores positions outside their limits in motion (J-43) where the check of the trajectory has accepted the path outside the limits
+    /// (J-36).
     #[cold]
     fn tolerate_positions(&self, found: &mut [Found; JOINTS]) {
         let Some(first) = self.store.first() else { return };

@@ -51,8 +51,8 @@ const LOADED: f64 = 0.05;
 const SINKS: (f64, u16) = (0.5, 3_000);
 /// Time constant for the load to take over the torque of the damper, s.
 const LEARNS_S: f64 = 0.5;
-/// Range of the torque of spring and damper against a joint that its own load drives, as shares of that load; the rest is friction. If a
-/// load has driven the joint for [`DRIVEN_MS`], it does not exist: a person had leaned on the arm. The load fades with the time constant
+/// Range of the torque of spring and damper against a joint that its own load drives, as shares of that load; the rest is friction. A load
+/// that has driven the joint for [`DRIVEN_MS`] is interpreted as a person who leaned on the arm. The load fades with the time constant
 /// [`GOES_S`] (s), and returns with [`COMES_BACK_S`] (s) if the joint sinks without it.
 const DRIVEN: (f64, f64) = (0.5, 1.2);
 /// Speed above which a load is considered to drive its joint, rad/s.
@@ -64,7 +64,7 @@ const COMES_BACK_S: f64 = 0.3;
 const HOLDABLE: f64 = 0.95;
 /// Number of missing answers after which the spring does not act.
 const MISSING: u8 = 2;
-/// Number of yields after which a yield of the joint continues until the host clears it. Yields are counted together if each yield of the
+/// Number of yields of a joint, of which the last one continues until the host clears it. Yields are counted together if each yield of the
 /// arm begins within [`AGAIN_MS`] after the one before.
 const TIMES: u8 = 3;
 /// See [`TIMES`].

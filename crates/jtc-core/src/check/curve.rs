@@ -8,7 +8,7 @@ const DEPTH: usize = 6;
 pub(super) struct Leaves {
     /// Place in the interval, 0..1.
     pub at: f64,
-    /// Value of the curve there. If the halvings did not suffice, the value of a control point that may lie outside the curve.
+    /// Value of the curve there. If the halvings did not suffice, the value of a control point, which the curve may not reach.
     pub value: f64,
     /// The bound.
     pub bound: f64,

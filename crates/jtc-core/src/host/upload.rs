@@ -49,15 +49,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // The host repeats the segment until it is accepted, and sends no Stop meanwhile. Therefore the segment acts as a Stop, and is
-            // refused in this tick.
+            // The host repeats the segment until it is accepted, and forwards no Stop meanwhile. Therefore the segment acts as a Stop, and
+            // is refused in this tick.
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
             // This may also happen in the middle of a segment: the change of state has cleared the trajectory.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // The segment was sent before a Stop that has taken effect.
+        // The segment was received before a Stop that has taken effect.
         let stopped =
             received.overtaken && self.overtaking.get(received.line).is_some_and(|before| before.stopped);
         if first && !received.plain && stopped {

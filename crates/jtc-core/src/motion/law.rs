@@ -271,8 +271,8 @@ impl ControlLaw {
     }
 
     /// Returns `true` if the load of every held joint is known, so that Teaching can carry it. In addition, the position controller must
-    /// make almost no torque. An integral that is still changing, or that gives back torque of the model, has not found the load. A person
-    /// who leans on the arm will let go.
+    /// make almost no torque. An integral that is still changing, or that gives back torque that is now in the model, has not found the
+    /// load. A person who leans on the arm will let go.
     ///
     /// If a `contact` may press on the arm, its pressure is not waited for, but a load that was known before must be known again.
     pub fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
@@ -432,7 +432,7 @@ impl ControlLaw {
         self.observed = (j as u8 + 1) % JOINTS as u8;
         let speed = set.point.velocity[j].abs();
         let creeps = speed > 0.0 && speed < CREEPS;
-        // While the integral gives back torque of the model, it does not show a load.
+        // While the integral gives back torque that is now in the model, it does not show a load.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
             // An integral that has not reached the torque that it must hold has not found the load.

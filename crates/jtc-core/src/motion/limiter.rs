@@ -26,7 +26,7 @@ pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
     pushed: [Recent; JOINTS],
     turns: [Turns; JOINTS],
-    /// Number of ticks since the start.
+    /// Number of ticks of this limiter, which starts anew whenever the torque is turned off.
     tick: u32,
 }
 
@@ -61,7 +61,7 @@ impl Found {
 pub(crate) struct Limited {
     /// Torque to command, N·m.
     pub torque: [f64; JOINTS],
-    /// Violations of the limits; `None` if no reaction is needed.
+    /// Findings of this tick; `None` if no reaction is needed.
     pub found: Option<[Found; JOINTS]>,
     /// Sag of the set positions of joints whose loads are being caught, rad; `None` if no set position has sagged.
     pub sag: Option<[f64; JOINTS]>,

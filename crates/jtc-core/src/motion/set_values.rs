@@ -127,7 +127,7 @@ impl SetValues {
     }
 
     /// Begins to hold the arm at its measured position. An arm that moves because a hand has led it first comes to rest within `length_ms`.
-    /// Such an arm is then caught like a falling load.
+    /// Such an arm is caught like a falling load.
     pub fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);
@@ -182,7 +182,8 @@ impl SetValues {
         self.holding = [true; JOINTS];
     }
 
-    /// Moves the set position of a yielding joint to the position of its spring, rad. This change of the set values is not a motion.
+    /// Moves the set position of a yielding joint to the position to which its spring pulls, rad. This change of the set values is not a
+    /// motion.
     pub fn lead(&mut self, j: usize, position: f64) {
         (self.point.position[j], self.point.velocity[j], self.point.acceleration[j]) = (position, 0.0, 0.0);
         self.commanded.begin(j, position, 0.0, 0);

@@ -313,7 +313,7 @@ impl Measurement {
     #[inline(never)]
     fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let counted = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
-        // The answer cannot be older than the last one. A repeated frame is also taken as evidence, so the count may be wrong.
+        // The answer is younger than the last one. A repeated frame is also taken as evidence, so the count may be wrong.
         let since = self.clock_ms.wrapping_sub(self.answered_ms).saturating_sub(1);
         let ticks = if self.known { counted.min(since.min(u8::MAX.into()) as u8) } else { counted };
         let late = self.late(ticks, &tick, past, config);
@@ -443,9 +443,9 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// Computes the rate from the youngest answer that is old enough to this answer. The rate is computed from answers only. While every
-    /// other answer is lost, a rate computed from predictions would confirm itself for any motion of the joint. `as_predicted`: the answer
-    /// was close to its prediction. Inlined for the ticks without a late answer.
+    /// Computes the rate between the youngest answer that is old enough, and this answer. The rate is computed from answers only. A rate
+    /// computed from predictions would confirm itself, whatever the joint does, while every other answer is lost. `as_predicted`: the
+    /// answer was close to its prediction. Inlined for the ticks without a late answer.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;

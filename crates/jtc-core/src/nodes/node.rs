@@ -51,7 +51,7 @@ pub(crate) struct Node {
     pub(super) fresh: bool,
     /// The joint is marked as absent (J-53).
     pub(super) absent: bool,
-    /// State that the node reported while its answers are ignored.
+    /// State that the node reported while its answers were ignored.
     pub(super) unasked: Option<NodeState>,
     /// Number of answers since the last tick. All except the last one were late.
     pub(super) answers: u8,

@@ -31,7 +31,7 @@ pub struct RecordedEvent {
     len: usize,
 }
 
-/// The body of a Trajectory frame with segment 0 and no points.
+/// A Trajectory frame of segment 0 without points.
 const EMPTY_SEGMENT: &[u8] = &[0; 14];
 
 /// Kinds of [`RecordedEvent`]s.

@@ -9,8 +9,8 @@ use crate::yielding::SPRING_RATE;
 
 /// Speeds of a joint between which its damping grows, rad/s.
 const FAST: (f64, f64) = (0.4, 0.8);
-/// Highest rate at which the damping reduces the speed of a joint whose other joints are free to move, 1/s. Measured speeds are about 8 ms
-/// old. Joints that move each other tolerate less damping.
+/// Highest rate at which the damping reduces the speed of a joint while the other joints are free to move, 1/s. Measured speeds are about
+/// 8 ms old. Joints that move each other tolerate less damping.
 pub(super) const DAMPING_RATE: f64 = 90.0;
 /// Speed at which the damping of a joint balances the load that it carries, rad/s, if its inertia tolerates that damping.
 const SINKS: f64 = 0.5;
@@ -20,7 +20,8 @@ const GROWN: f64 = 1.0;
 /// joint before that is measured. Without it, over-speed would release the arm.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
-/// Speed above which a joint is brought to rest instead of being taught: in rad/s, and as a share of the over-speed threshold (J-35).
+/// Speed above which a joint is no longer taught but brought to rest: in rad/s, and as a share of the over-speed threshold (J-35). The
+/// lower one is used.
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
 /// Time constant of the speed that is computed from positions, s. Drives report a mean over 10 ms.
 const SPEED_S: f32 = 0.004;

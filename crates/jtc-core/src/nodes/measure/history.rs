@@ -73,7 +73,7 @@ impl History {
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// Stores an answer. Returns the rate from the youngest answer that is old enough to this one; `None` if no answer is old enough.
+    /// Stores an answer. Returns the rate between the youngest answer that is old enough, and this one; `None` if there is no such answer.
     #[inline(always)]
     pub fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
@@ -107,8 +107,8 @@ impl History {
         self.as_predicted & younger == younger
     }
 
-    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since then. The last answer may
-    /// be missing.
+    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since then. Only the answer of
+    /// the last millisecond may be missing.
     pub fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         let n = u32::from(ms).checked_sub(since_newest)?;

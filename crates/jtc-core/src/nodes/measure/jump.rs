@@ -39,8 +39,8 @@ pub(super) struct Jumps {
     taken_off: f64,
     /// Difference of the two encoders before the possible jump, rad.
     before: f32,
-    /// Size of the possible jump, rad. After a finding: the size of the jump, or how many times as fast as the reported speed positions
-    /// change.
+    /// Size of the possible jump, rad. After a finding: the size of the jump, or the ratio of the change of the positions to the reported
+    /// speed.
     value: f32,
     /// Number of answers with the possible jump.
     answers: u8,

@@ -7,7 +7,7 @@ use std::vec::Vec;
 use super::*;
 use crate::drawn::is_in_the_protocol;
 
-/// States of a drive that it leaves after some time, the request that leads to each, and its name.
+/// States of a drive, without those that it leaves by itself after some time; the request that leads to each, and its name.
 const STATES: [(NodeState, Target, &str); 5] = [
     (NodeState::START, Target::NoChange, "Start"),
     (NodeState::INIT, Target::Init, "Init"),

@@ -157,7 +157,7 @@ proptest! {
         late in lateness(3),
         lost in prop::collection::vec(30u32..300, 0..20),
     ) {
-        // No answer is late in the second half, but the losses are detected there as well.
+        // No answer is late at the end, but the losses are detected there as well.
         let late: Vec<u32> = late.iter().enumerate().map(|(n, late)| if n < 400 { *late } else { 0 }).collect();
         let off = motion.off(&arrivals(&late, &lost));
         let way = 4.0 * motion.speed() * DT;

@@ -45,7 +45,7 @@ impl Default for Invariants {
 }
 
 impl Invariants {
-    /// Creates a checker for a simulation that has already been running. Commands before that count as permissions for what it does.
+    /// Creates a checker for a simulation that has already been running. Its present state and motion count as permitted.
     pub fn joining(world: &World) -> Self {
         let t = world.telemetry();
         Self {

@@ -19,7 +19,7 @@ pub use contact::contact_table;
 pub use standstill::standstill_table;
 pub use stopping::stopping_table;
 
-/// Time in which a reaction is expected, ms.
+/// Time for which a reaction is awaited, ms.
 const WATCH_MS: u64 = 600;
 /// Pose in which the arm is held, rad.
 const START: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];

@@ -24,7 +24,7 @@ pub(super) struct MotionWatch {
     fast: [u16; JOINTS],
     /// Per joint: ticks for which it has been enabled.
     enabled: [u16; JOINTS],
-    /// For each joint: the last ticks in which the torque was at its limit; bit 0 is the last tick.
+    /// For each joint, as a mask: in which of the last ticks the torque was at its limit. Bit 0 is the last tick.
     saturated: [u128; JOINTS],
 }
 

@@ -28,13 +28,13 @@ enum Meets {
     Plane,
     /// Load that the controller does not know, kg.
     Load(f64),
-    /// Load that the arm drops after a second, kg.
+    /// Load that the controller does not know, and that the arm drops after a second, kg.
     Drops(f64),
     /// Friction of all joints, as a factor of the controller's values.
     Friction(f64),
     /// Masses of all links, as a factor of the controller's values.
     Masses(f64),
-    /// Safety input that is low for 1 ms, after which the host clears the error after this number of ms.
+    /// Safety input that is low for 1 ms. The host clears the error after this number of ms.
     Cleared(u64),
 }
 

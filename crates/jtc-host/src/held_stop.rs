@@ -75,7 +75,8 @@ impl HeldStop {
 /// Reactions of a controller to faults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reacting {
-    /// Last held stop; `None` if there was none since the start or since the occurred errors were cleared.
+    /// Last held stop; `None` if the arm was not in a held stop since the start or since the occurred errors were
+    /// cleared.
     pub last_held_stop: Option<HeldStop>,
     /// Joints, from 1, that yield or lower their loads.
     pub yields: Vec<u8>,

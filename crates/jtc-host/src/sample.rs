@@ -1,5 +1,5 @@
-//! Sample of a run, in the form that recordings and reports store. It is made from the controller's telemetry or from a
-//! status.
+//! Sample of a run, in the form that recordings and reports store. A sample is made from the controller's telemetry or
+//! from a status.
 
 use jtc_core::{JOINTS, JointTelemetry, Telemetry};
 use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};

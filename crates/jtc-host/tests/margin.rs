@@ -188,7 +188,7 @@ fn stretched(share: f64) -> (Arm, Config) {
 
 const OUT: [f64; JOINTS] = [0.0, 1.5, 0.0, 0.0, 0.0, 0.0];
 
-/// A pose that needs more torque than the margin permits can be reached and left. The margin is kept where that is
+/// A pose that needs more torque than the margin permits can be reached and left. The margin is kept if that is
 /// possible. If it falls below 10 %, there is a warning.
 #[test]
 fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {

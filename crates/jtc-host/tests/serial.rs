@@ -199,8 +199,8 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     read(&mut far, &[fixed::EXECUTE; 1]);
 }
 
-/// Simulates a controller. It calls `next` with the received bytes, and sends the status that `next` returns. Returns a
-/// flag that ends the controller, and its thread.
+/// Simulates a controller. The controller calls `next` with the received bytes, and sends the status that `next`
+/// returns. Returns a flag that ends the controller, and its thread.
 fn controller(
     mut far: TTYPort,
     mut next: impl FnMut(&[u8]) -> Status + Send + 'static,
@@ -254,8 +254,8 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
     }
 }
 
-/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. It is considered ended when the
-/// record of its end has arrived.
+/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. Such teaching is considered
+/// ended when the record of its end has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {
     for heard in [1, 3, u32::MAX] {

@@ -94,8 +94,8 @@ impl Arm {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the settings with which a motion for a controller with the settings `device` is checked. Of two limits the
-    /// tighter one is used; gravity, payload and rotor inertia are those of the controller.
+    /// Returns the settings for the check of a motion for a controller with the settings `device`. The tighter one of
+    /// two limits is used; gravity, payload and rotor inertia are those of the controller.
     pub fn config_on_device(&self, device: &Config) -> Config {
         let mut config = self.config();
         config.gravity = device.gravity;

@@ -114,8 +114,8 @@ fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     }
 }
 
-/// A controller accepts the gain sets in use on their arms in 300 poses, with and without a load. It refuses the gains of the
-/// built-in arm times three and five.
+/// A controller accepts the gain sets in use on their arms in 300 poses, with and without a load. The controller refuses the gains
+/// of the built-in arm times three and five.
 #[test]
 fn j71_the_gains_in_use_are_taken_in_all_poses_with_all_loads() {
     let plain = include_str!("../../tests/sessions/plain.urdf");

@@ -145,7 +145,7 @@ impl Arm {
                         let torque = t.torque.into_iter().flatten();
                         t.velocity.into_iter().chain(t.temperature).chain(torque).collect::<Vec<_>>()
                     };
-                    // Of the 440 numbers of a table, only the first difference is listed.
+                    // Only the first difference between the 440 numbers of two tables is listed.
                     let pairs = numbers(own).into_iter().zip(numbers(has));
                     if let Some((own, has)) = pairs.clone().find(|(own, has)| own != has) {
                         let count = pairs.filter(|(own, has)| own != has).count();
@@ -154,7 +154,7 @@ impl Arm {
                     }
                 }
             }
-            // One friction is a polynomial and the other a table.
+            // A polynomial is compared with a table.
             (Some(own), Some(has)) => {
                 let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
                 compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");

@@ -234,7 +234,7 @@ impl Arm {
         config
     }
 
-    /// Returns the friction compensation: the polynomial, or, if there is none, the table.
+    /// Returns the friction compensation: the polynomial, or else the table.
     pub fn friction(&self) -> Option<Friction> {
         let polynomial = self.polynomial.map(Friction::Polynomial);
         polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table(**t)))

@@ -66,11 +66,11 @@ pub const RULES: [Rule; 11] = [
 
 /// Highest rate at which the damping in Teaching reduces a speed, 1/s (J-25).
 const TEACH_DAMPING_RATE: f64 = 100.0;
-/// Tool speed limit of an imported arm, m/s. It is the limit for setting up a robot next to people (ISO 10218).
+/// Tool speed limit of an imported arm, m/s. The value is the limit for setting up a robot next to people (ISO 10218).
 const TOOL_SPEED_MAX: f64 = 0.25;
 /// Damping: Kd · (age of the derivative) / (least inertia) (J-71).
 const DAMPING: f64 = 0.7;
-/// Age of the derivative, s: half of its time window, plus the half tick by which the hold delays a torque.
+/// Age of the derivative, s: half of its time window, plus the delay of a torque by the hold (half a tick).
 const DERIVATIVE_AGE: f64 = 3e-3;
 /// Kp divided by Kd, 1/s.
 const STIFFNESS_RATE: f64 = 20.0;
@@ -78,7 +78,7 @@ const STIFFNESS_RATE: f64 = 20.0;
 const INTEGRAL_RATE: f64 = 2.0;
 /// Proposed Ki as a share of the greatest Ki that is stable without friction.
 const INTEGRAL_PART: f64 = 1.0 / 3.0;
-/// Factor by which the gains must be stable beyond both ends of the range of rotor inertias.
+/// The gains must be stable beyond both ends of the range of rotor inertias by this factor.
 const RESERVE: f64 = 1.5;
 /// Steps of the search for gains with that reserve.
 const REDUCTIONS: usize = 60;

@@ -32,7 +32,7 @@ fn a_file_of_another_kind_is_called_no_arm_file() {
 fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
     let whole = Arm::avena();
     assert!(AVENA_TOML.contains("\nformat = 2\n") && whole.to_toml().starts_with("format = 2\n"));
-    // Older files have no format key. They are read in the same way.
+    // Older files have no format key. Such files are read in the same way.
     assert_eq!(Arm::parse(&AVENA_TOML.replace("\nformat = 2\n", "\n")).unwrap(), whole);
     for other in ["3", "1", "\"two\""] {
         // The format error is reported before errors about unknown keys.
@@ -387,7 +387,7 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert!(text.contains("not named: ") && text.contains("PidParamJoint3.csv (joint 4). "), "{text}");
     assert!(error_of(&[&all[..], &all[..1]].concat()).contains("joint 1"));
 
-    // One file is missing in the directory.
+    // A file is missing in the directory.
     std::fs::remove_file(&all[3]).unwrap();
     let text = ParameterFile::load(dir.path()).unwrap_err().to_string();
     assert!(text.contains("PidParamJoint3.csv (joint 4)") && !text.contains("(joint 5)"), "{text}");

@@ -143,8 +143,9 @@ impl<'a> Chain<'a> {
         frame.inverse().direction(&GRAVITY).map(|v| if v.abs() < 1e-9 { 0.0 } else { v })
     }
 
-    /// Finds the joints from the last link to the flange. They are the path to `tip`, or, without a tip, one fixed joint on
-    /// the last link. If the last link has several, the joint with a usual name of a flange is used, or else the first.
+    /// Finds the joints from the last link to the flange. These joints are the path to `tip`, or, without a tip, one fixed
+    /// joint on the last link. If the last link has several, the joint with a usual name of a flange is used, or else the
+    /// first.
     fn find_flange(&mut self, tip: Option<&str>) {
         let last = &self.rotary[JOINTS - 1].child.link;
         if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
@@ -241,7 +242,7 @@ impl<'a> Chain<'a> {
         Ok(model)
     }
 
-    /// Reports joints below the base of the arm. They do not move, but an offset changes the place of the base.
+    /// Reports joints below the base of the arm. These joints do not move, but an offset changes the place of the base.
     fn look_below(&mut self, base: &str) {
         let mut at = base.to_owned();
         for _ in 0..self.robot.joints.len() {

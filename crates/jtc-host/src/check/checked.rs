@@ -13,7 +13,7 @@ use crate::error::CheckError;
 use crate::plan::{PlanError, Planner};
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Number for the next check that passes. It distinguishes trajectories that are otherwise equal.
+/// Number for the next check that passes. The number distinguishes trajectories that are otherwise equal.
 static PASSED: AtomicU64 = AtomicU64::new(1);
 
 /// Options for the check of a trajectory before a run.
@@ -67,7 +67,7 @@ pub struct CheckedTrajectory {
     verdict: Verdict,
     delay_ticks: u8,
     number: u64,
-    /// Arm and settings with which the trajectory was checked.
+    /// Arm and settings of the check.
     basis: Arc<(Arm, Config)>,
 }
 
@@ -86,7 +86,7 @@ impl fmt::Debug for CheckedTrajectory {
 impl CheckedTrajectory {
     /// Checks `trajectory` for a run by `arm` from the measured pose `start` (rad, base to wrist).
     ///
-    /// Of the limits of arm and controller the tighter one is used ([`Arm::config_on_device`]). The torques come from the
+    /// The tighter one of the limits of arm and controller is used ([`Arm::config_on_device`]). The torques come from the
     /// arm model with the arm's friction, and with the gravity and rotor inertia of the controller.
     ///
     /// # Errors

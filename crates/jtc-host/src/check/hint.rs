@@ -34,7 +34,7 @@ impl Verdict {
         (speed < 1.0).then(|| (now_pct * speed).floor()).filter(|&percent| percent >= 1.0)
     }
 
-    /// Returns the next command or action that helps. It contains `FILE` instead of the trajectory's file.
+    /// Returns the next command or action that helps. The result contains `FILE` instead of the trajectory's file.
     pub fn hint(&self) -> Next {
         self.hint_for("FILE", 100.0)
     }

@@ -14,8 +14,8 @@ use super::{HOLD_SHARE, ProblemKind, Verdict};
 /// Joint speed up to which a joint is considered at rest, rad/s. The smallest velocity in a frame is about 0.1 mrad/s.
 const STANDS: f64 = 0.001;
 
-/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit where the path stands still. If
-/// `stands_at_start` is set, the start is not checked, because the arm is held there even without the motion.
+/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit while the path stands still.
+/// If `stands_at_start` is set, the start is not checked, because the arm is held there even without the motion.
 pub(super) fn holds(
     config: &Config,
     dynamics: &Dynamics,

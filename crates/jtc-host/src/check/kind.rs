@@ -71,7 +71,8 @@ kinds! {
     NoStop, "no stop in time" in "N·m";
     /// The positions move faster than the velocity limit, independent of the velocities in the file.
     PositionSpeed, "positions move faster than the velocity limit" in "rad/s";
-    /// The positions move at another speed than the velocities in the file. It is a warning if this happens at few places.
+    /// The positions move at another speed than the velocities in the file. The problem is a warning if this happens at
+    /// few places.
     VelocityMismatch, "positions and velocities disagree" in "rad/s";
     /// The first or last point is not at rest.
     NotAtRest, "not at rest at an end" in "rad/s";

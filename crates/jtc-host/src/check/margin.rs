@@ -24,7 +24,7 @@ pub struct TorqueMargin {
     pub torque_nm: f64,
     /// Torque limit, N·m.
     pub limit_nm: f64,
-    /// Bearing temperature of the friction, °C. Of the checked temperatures, it is the one with the greater torque.
+    /// Bearing temperature of the friction, °C. The checked temperature with the greater torque is used.
     pub temperature_c: f64,
 }
 

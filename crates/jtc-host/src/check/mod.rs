@@ -1,5 +1,5 @@
-//! Check of a trajectory before it is sent. It covers limits at and between the points, jumps, contradictions, torque, the
-//! torque to hold the arm at rest, the ability to stop, and the start pose.
+//! Check of a trajectory before it is sent. The check covers limits at and between the points, jumps, contradictions,
+//! torque, the torque to hold the arm at rest, the ability to stop, and the start pose.
 //!
 //! Between points the check runs the controller's own interpolation once per millisecond, with the rounded numbers of the
 //! frames. So the check gets the same values as the controller. The controller's own check (J-36) uses them too, so it

@@ -14,7 +14,8 @@ use super::{ProblemKind, Verdict};
 
 /// Distance between the checked places, along the path and along each ramp, ms.
 const SPACING: f64 = 10.0;
-/// Lengths of the ramps that are tried from every place, as shares of the allowed time. One feasible ramp is sufficient.
+/// Lengths of the ramps that are tried from every place, as shares of the allowed time. A single feasible ramp is
+/// sufficient.
 const LENGTHS: [f64; 3] = [1.0, 0.7, 0.4];
 /// Share of a ramp's time in which its slope rises, and in which it falls again.
 const CORNER: f64 = 0.2;

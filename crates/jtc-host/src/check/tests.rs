@@ -147,7 +147,7 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
         (ProblemKind::PositionSpeed, Joint::from_number(3)),
         "{verdict}"
     );
-    // The peak is 15/8 of 2.5 rad in 0.3 s. It lies between the points.
+    // The peak is 15/8 of 2.5 rad in 0.3 s. The peak lies between the points.
     assert!((verdict.joints[2].velocity_peak_rad_s - 15.625).abs() < 0.01);
     assert!(verdict.hint().to_string().contains("--speed 9`"), "{}", verdict.hint());
     let slow = check(&plan::at_speed(&t, 9.0).unwrap());

@@ -12,7 +12,7 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Number of places with contradicting channels that is tolerated. Existing files have such places where their pieces meet.
+/// Number of places with contradicting channels that is tolerated. Existing files have such places between their pieces.
 const SEAMS: usize = 20;
 
 /// Values of a joint along the path.

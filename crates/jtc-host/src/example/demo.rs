@@ -9,8 +9,9 @@ const STEP_MS: u16 = 10;
 const MOTION: [(f64, f64, f64); 6] =
     [(0.0, 1.5, 1.0), (0.45, 0.4, 2.0), (-1.5, 0.35, 2.0), (0.5, 0.6, 2.0), (0.9, 0.7, 1.0), (0.0, 0.5, 3.0)];
 
-/// Returns the motion of `jtc demo`, a smooth motion of all joints from the zero pose and back. It is the sum of a
-/// deflection and windowed swings. It begins and ends at rest, without a step in position, velocity or acceleration.
+/// Returns the motion of `jtc demo`, a smooth motion of all joints from the zero pose and back. The motion is the sum
+/// of a deflection and windowed swings. The motion begins and ends at rest, without a step in position, velocity or
+/// acceleration.
 pub fn demo_motion() -> Trajectory {
     let count = (TIME * 1e3) as usize / usize::from(STEP_MS) + 1;
     let omega = std::f64::consts::TAU / TIME;

@@ -65,7 +65,8 @@ impl Asked {
         self.same_device == Some(true)
     }
 
-    /// Returns the reasons why the flash needs a confirmation. Whether the line belongs to the board is checked elsewhere.
+    /// Returns the reasons why the flash needs a confirmation. This method does not check if the line belongs to the
+    /// board.
     fn doubts(&self) -> Option<String> {
         match &self.answers {
             Answers::Nothing { bytes: 0 } => None,

@@ -48,7 +48,7 @@ pub struct Drive {
 pub struct UsbDevice {
     /// Folder in the device tree of the operating system. Its name contains the USB connector.
     pub folder: PathBuf,
-    /// Number on the bus. It changes each time the device is plugged in.
+    /// Number on the bus. The number changes each time the device is plugged in.
     pub number: String,
 }
 
@@ -174,7 +174,7 @@ fn text(folder: &Path, file: &str) -> Option<String> {
     Some(String::from_utf8_lossy(&bytes[..bytes.len().min(TEXT_MAX)]).into_owned())
 }
 
-/// Returns the first four digits after `code=`. They are the number of the board.
+/// Returns the first four digits after `code=`. These digits are the number of the board.
 fn code(page: &str) -> Option<String> {
     let (_, behind) = page.split_once("code=")?;
     let code = behind.get(..4)?;

@@ -1,4 +1,4 @@
-//! Flash image of a board. It is read from a file and checked before it is used.
+//! Flash image of a board. The image is read from a file and checked before it is used.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -287,7 +287,7 @@ mod tests {
         assert!(!Image::read(&path).unwrap().is_whole());
         catalogue(folder.path(), &["nucleo-h743zi2"]);
         assert!(Image::read(&path).unwrap().is_whole());
-        // Cuts the file at a place where the file itself does not show the cut.
+        // Cuts the file so that the file itself does not show the cut.
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..0xFF0]).unwrap();
         assert!(parsed(bytes[..0xFF0].to_vec()).is_ok());

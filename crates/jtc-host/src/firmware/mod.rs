@@ -3,9 +3,9 @@
 //!
 //! The debugger on a Nucleo board presents a *drive* on USB. If a binary file is copied to the drive, the ST-LINK writes it
 //! to the flash of the processor, beginning at the first byte, and then resets the processor. The drive is not a real
-//! memory. It contains two small files about itself, and `FAIL.TXT` after a failure. A missing `FAIL.TXT` does not prove
-//! success: if the bytes arrive in an unexpected order, parts of the flash stay empty without a report. So the controller
-//! itself must report the content of its flash over its serial line.
+//! memory. The drive contains two small files about itself, and `FAIL.TXT` after a failure. A missing `FAIL.TXT` does not
+//! prove success: if the bytes arrive in an unexpected order, parts of the flash stay empty without a report. So the
+//! controller itself must report the content of its flash over its serial line.
 //!
 //! A flash uses, in this order: [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`],
 //! [`prove`]. If the operator is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] are repeated

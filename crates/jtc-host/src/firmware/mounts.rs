@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Drive, FirmwareError, UsbDevice};
 
-/// Locations where the operating system lists drives and ports.
+/// Locations of the operating system's lists of drives and ports.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// Mount table in the format of Linux.
@@ -82,8 +82,8 @@ impl Places {
         Err(FirmwareError::Changed { what: format!("{}: {what}", drive.path.display()) })
     }
 
-    /// Returns the current state of the drive. It is found at its path. If its USB device is known, it is also found in
-    /// another folder after it was plugged in again.
+    /// Returns the current state of the drive. The drive is found at its path. If its USB device is known, it is also
+    /// found in another folder after it was plugged in again.
     pub fn again(&self, drive: &Drive) -> Option<Drive> {
         let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
         let own = connector(drive);
@@ -183,7 +183,7 @@ fn unescaped(text: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// Returns a path with these bytes. They need not be valid text.
+/// Returns a path with these bytes. The bytes need not be valid text.
 #[cfg(unix)]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     use std::os::unix::ffi::OsStringExt as _;

@@ -24,8 +24,8 @@ pub struct Account {
 }
 
 impl Account {
-    /// Replays a log. `other` is an arm with its image. It is used instead of the arm that is stored with the log. `source`
-    /// is the location from which the log was read.
+    /// Replays a log. `other` is an arm with its image. This arm is used instead of the arm that is stored with the log.
+    /// `source` is the location from which the log was read.
     pub fn of(log: FlightLog, other: Option<(Arm, Vec<u8>)>, source: &str) -> Self {
         let (arm, image) = other.unzip();
         let replayed = log.replay(image.as_deref());

@@ -18,8 +18,8 @@ impl Planner<'_> {
     pub const ASIDE: f64 = THINNED + BLEND;
 
     /// Plans a motion on the path of a trajectory, independent of the times of the trajectory. The motion is within the
-    /// limits, begins and ends at rest, deviates by at most [`Planner::ASIDE`], and is not faster than the original. It is
-    /// meant for measured paths: their splines contain encoder noise, and their ends may be in motion.
+    /// limits, begins and ends at rest, deviates by at most [`Planner::ASIDE`], and is not faster than the original. The
+    /// method is meant for measured paths: their splines contain encoder noise, and their ends may be in motion.
     ///
     /// # Errors
     ///

@@ -21,8 +21,9 @@ pub struct MoveSpeed {
 }
 
 impl MoveSpeed {
-    /// Returns the speed that the user gave, or else the default for the controller with this identity. It is 25 % of the
-    /// limits for a simulator, and 10 % for every other controller, including one that reports no identity.
+    /// Returns the speed that the user gave, or else the default for the controller with this identity. The default for a
+    /// simulator is 25 % of the limits. The default is 10 % for every other controller, including one that reports no
+    /// identity.
     pub fn of(named: Option<f64>, info: Option<&Info>) -> Self {
         let is_simulated = info.is_some_and(|info| info.board.as_str() == SIMULATOR);
         let default = if is_simulated { SIMULATED_PCT } else { DEFAULT_PCT };

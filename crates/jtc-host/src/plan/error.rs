@@ -40,7 +40,7 @@ pub enum PlanError {
         /// Requested value, %.
         percent: f64,
     },
-    /// The blend is too large. It was probably given in another unit.
+    /// The blend is too large. The value was probably given in another unit.
     #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
     Blend {
         /// Requested value.
@@ -60,7 +60,7 @@ pub enum PlanError {
         /// Maximum number of corners.
         most: usize,
     },
-    /// The motion takes so long that the points of its trajectory are too far apart for its corners.
+    /// The motion takes too long: the points of its trajectory are too far apart for its corners.
     #[error(
         "the motion takes {seconds:.0} s: {POINTS_MAX} points are {step_ms} ms apart then, too far to follow its corners"
     )]
@@ -196,7 +196,7 @@ mod tests {
 
     use super::*;
 
-    /// The messages of a move contain "where the arm stands" and the goal instead of waypoint numbers.
+    /// The messages of a move name the current pose of the arm and the goal instead of waypoint numbers.
     #[test]
     fn a_move_is_refused_with_the_words_of_its_waypoint() {
         let joint = Joint::ALL[2];

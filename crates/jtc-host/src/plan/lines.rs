@@ -107,8 +107,7 @@ fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -
     most
 }
 
-/// Of the joint-space legs to the waypoints `legs`, returns the one on which the flange deviates most from the straight
-/// line.
+/// Returns the joint-space leg to one of the waypoints `legs` on which the flange deviates most from the straight line.
 pub fn furthest_aside(planned: &Planned, model: &ArmModel, legs: &[usize]) -> Option<Aside> {
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
     let times = &planned.waypoint_times;

@@ -1,9 +1,9 @@
 //! Planner: moves to a goal, motions through waypoints, and trajectories at another speed.
 //!
-//! The motions come from `jtc-plan`. They are as fast as the limits of velocity, acceleration, jerk and torque allow. This
-//! module turns a motion into a trajectory with points at a fixed step, in the form in which it is sent. Before the planner
-//! returns a trajectory, it must pass the [check](crate::check) that files also pass. If rounding, a pause on the path
-//! (J-33) or friction exceed a limit, the planner slows the motion down and reports this in [`Planned::notes`].
+//! The motions come from `jtc-plan`. The motions are as fast as the limits of velocity, acceleration, jerk and torque
+//! allow. This module turns a motion into a trajectory with points at a fixed step, in the form in which it is sent. Before
+//! the planner returns a trajectory, it must pass the [check](crate::check) that files also pass. If rounding, a pause on
+//! the path (J-33) or friction exceed a limit, the planner slows the motion down and reports this in [`Planned::notes`].
 //!
 //! ```
 //! use jtc_host::{Arm, plan::Planner};
@@ -65,12 +65,12 @@ const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Bearing temperature that a plan assumes, °C: that of a cold hall. Friction is higher than at the usual temperature.
 pub const COLD: f64 = 20.0;
-/// Maximum factor by which a motion is slowed down. A motion that needs more is rejected.
+/// Maximum factor for slowing a motion down. A motion that needs more is rejected.
 const SLOWEST: f64 = 50.0;
-/// Minimum and maximum factor by which one iteration slows a motion down.
+/// Minimum and maximum factor for slowing a motion down in one iteration.
 const SLOWER: (f64, f64) = (1.01, 2.0);
-/// Minimum factor by which one iteration slows a motion down for the torque margin. It is small, because rounding exceeds
-/// the margin only slightly.
+/// Minimum factor for slowing a motion down in one iteration for the torque margin. The factor is small, because rounding
+/// exceeds the margin only slightly.
 const SLOWER_FOR_MARGIN: f64 = 1.002;
 /// A motion that is slowed down for the torque margin by more than this factor gets a note.
 const NOTED: f64 = 1.01;
@@ -129,8 +129,8 @@ pub struct Planned {
 }
 
 impl<'a> Planner<'a> {
-    /// Creates a planner with full speed and a stop at each waypoint. It uses only the limits of `config`. If a model is
-    /// set, the planner keeps [`MARGIN_PCT`] of each torque limit free.
+    /// Creates a planner with full speed and a stop at each waypoint. The planner uses only the limits of `config`. If a
+    /// model is set, the planner keeps [`MARGIN_PCT`] of each torque limit free.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
         Self {
@@ -146,9 +146,10 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Plans a motion from rest to rest between two positions (rad, base to wrist). It is straight in joint space, unless
-    /// that is slower. If a joint is outside its limits by up to the start tolerance, the motion begins at the nearest
-    /// position inside (J-58). If the goal is outside by at most the rounding of a frame, it is moved to the limit (J-36).
+    /// Plans a motion from rest to rest between two positions (rad, base to wrist). The motion is straight in joint space,
+    /// unless that is slower. If a joint is outside its limits by up to the start tolerance, the motion begins at the
+    /// nearest position inside (J-58). If the goal is outside by at most the rounding of a frame, it is moved to the limit
+    /// (J-36).
     ///
     /// # Errors
     ///
@@ -373,8 +374,8 @@ struct Within {
     limits: Limits,
 }
 
-/// Returns the factor by which the motion must be slowed down to solve the problems. Returns `None` if a slower motion does
-/// not solve them.
+/// Returns the factor for slowing the motion down to solve the problems. Returns `None` if a slower motion does not solve
+/// them.
 fn slower(verdict: &Verdict) -> Option<f64> {
     use ProblemKind::{Acceleration, FrictionVelocity, NoStop, PositionSpeed, Torque, Velocity};
     let factors = verdict.refusals().map(|p| {

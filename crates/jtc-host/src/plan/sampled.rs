@@ -26,7 +26,7 @@ const PARTS: usize = 4;
 /// A motion as a trajectory.
 pub(super) struct Sampled {
     pub trajectory: Trajectory,
-    /// Factor by which times of the motion are multiplied to get times of the trajectory.
+    /// Times of the trajectory, divided by times of the motion.
     pub scale: f64,
 }
 

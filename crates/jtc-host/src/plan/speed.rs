@@ -1,4 +1,4 @@
-//! The same path at another speed, and the set values of a trajectory at each millisecond.
+//! A path at another speed, and the set values of a trajectory at each millisecond.
 
 use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate, position_speed};
 

@@ -1,4 +1,4 @@
-//! Path through the waypoints of a file. It goes through joint positions, or along lines and arcs of the flange.
+//! Path through the waypoints of a file. The path goes through joint positions, or along lines and arcs of the flange.
 
 use super::kinematics::Route;
 use super::{Aside, PlanError, Planned, Planner, Waypoint, corners, furthest_aside};
@@ -31,7 +31,7 @@ pub struct Way<'a> {
 #[derive(Debug)]
 enum Course {
     Joints(Vec<Waypoint>),
-    /// Alternative routes, of which the fastest is used, and the times of the waypoints.
+    /// Alternative routes (the fastest is used), and the times of the waypoints.
     Lines(Vec<Route>, Vec<Option<f64>>),
 }
 

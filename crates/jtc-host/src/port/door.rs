@@ -29,7 +29,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// the same path.
 pub struct Door {
     path: PathBuf,
-    /// Device and inode of the socket. They show if another program has since created a socket at the same path.
+    /// Device and inode of the socket. Both show if another program has since created a socket at the same path.
     file: (u64, u64),
     line: Arc<Line>,
     thread: Option<JoinHandle<()>>,

@@ -28,9 +28,9 @@ pub(super) const REQUEST_MAX: usize = 1024;
 const ANSWER_MAX: usize = 4096;
 /// Maximum size of an end, bytes.
 pub(super) const END_MAX: usize = 1024;
-/// Timeout for the answer of the program that holds the port. It is longer than writing a Stop eight times.
+/// Timeout for the answer of the program that holds the port. This timeout is longer than writing a Stop eight times.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Timeout for the final message. It is longer than a stopped arm needs to come to rest.
+/// Timeout for the final message. This timeout is longer than a stopped arm needs to come to rest.
 const REST: Duration = Duration::from_secs(6);
 
 /// Command that a program requests from the holder of the port.
@@ -207,7 +207,7 @@ fn process(stream: &UnixStream) -> Option<i32> {
     return None.filter(|_: &i32| stream.peer_addr().is_ok());
 }
 
-/// Returns the socket name of a port. It contains the device number, which is the same for all names of the port.
+/// Returns the socket name of a port. The name contains the device number, which is the same for all names of the port.
 #[cfg(unix)]
 pub(super) fn socket_name(port: &str) -> Option<String> {
     use std::os::unix::fs::MetadataExt as _;
@@ -339,7 +339,7 @@ mod tests {
         assert_eq!((peer(&one), peer(&other)), (Some(own), Some(own)));
     }
 
-    /// The next step is to wait, because the emergency stop would drop an arm that is lowering its load.
+    /// The message tells the user to wait, because the emergency stop would drop an arm that is lowering its load.
     #[test]
     fn j70_an_arm_that_still_moves_in_a_held_stop_is_waited_for() {
         let standstill = Standstill::after(Halt::Stop);

@@ -1,4 +1,4 @@
-//! The two directions of a serial line. They are used by the owner of the port, and by the [door](super::door) through
+//! The two directions of a serial line. Both are used by the owner of the port, and by the [door](super::door) through
 //! which other programs stop the arm.
 //!
 //! The thread of the door writes the Stop of another program even while the owner is busy. The Stop is written between two
@@ -22,7 +22,7 @@ use super::{Halts, PortError, line_time};
 
 /// Timeout for a write that makes no progress.
 const STALL: Duration = Duration::from_secs(5);
-/// Bytes per write. It limits how late a stalled line is noticed, and how late a Stop is sent.
+/// Bytes per write. This number limits how late a stalled line is noticed, and how late a Stop is sent.
 const CHUNK: usize = 256;
 /// Gap on the line after an abandoned frame: the 5 ms of J-03, plus reserve for adapters that shorten the gap.
 const GAP: Duration = Duration::from_millis(8);
@@ -215,8 +215,8 @@ impl Line {
         Halts { all: self.halts.load(Ordering::SeqCst), stops }
     }
 
-    /// Permits the frames of a motion that was requested after `after` halts. They stay blocked if there were further halts
-    /// since, or if the last halt is less than 3 s old.
+    /// Permits the frames of a motion that was requested after `after` halts. The frames stay blocked if there were further
+    /// halts since, or if the last halt is less than 3 s old.
     pub fn ask_to_move(&self, after: u64) {
         self.open_gate(after, |_| true);
     }

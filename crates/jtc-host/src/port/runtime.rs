@@ -73,7 +73,7 @@ pub fn is_own(folder: &Path) -> bool {
     folder.is_dir()
 }
 
-/// Creates the folder. Returns `None` if there is no location to which only this user can write.
+/// Creates the folder. Returns `None` without a location to which only this user can write.
 ///
 /// # Errors
 ///

@@ -37,7 +37,7 @@ pub struct Resumption {
 }
 
 impl BrokenOff {
-    /// Returns the point at which the run on `trajectory` can be resumed without leaving out a part. It is the last
+    /// Returns the point at which the run on `trajectory` can be resumed without leaving out a part. The point is the last
     /// position that the recording shows. A later point is used if the controller's `status` shows that the motion
     /// continued to that point, and the arm is there. The position of the arm alone proves nothing, because a user may have
     /// moved the arm along the path. A controller that was restarted or that received another motion reports no point of
@@ -109,8 +109,8 @@ impl Diagnose for NothingLeft {
 }
 
 impl Recording {
-    /// Returns the progress of the last run in this recording along `trajectory`. It ends at the last sample in motion, or,
-    /// after a stop, at the later position at which the recording shows the arm at rest.
+    /// Returns the progress of the last run in this recording along `trajectory`. The progress ends at the last sample in
+    /// motion, or, after a stop, at the later position at which the recording shows the arm at rest.
     ///
     /// # Errors
     ///
@@ -179,9 +179,9 @@ impl Recording {
     }
 }
 
-/// Returns the path time at which a stop brought the arm to rest, ms. It is the first position after `last_ms`, the last
-/// one in motion, that matches the arm at rest. If the arm had no torque, it may have left its path, and its position
-/// proves nothing.
+/// Returns the path time at which a stop brought the arm to rest, ms. The result is the first position after `last_ms`,
+/// the last one in motion, that matches the arm at rest. If the arm had no torque, it may have left its path, and its
+/// position proves nothing.
 fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u32> {
     let held = |s: &Sample| s.errors == 0 && s.state.known().is_none_or(ControllerState::has_torque);
     let rest = behind.last().filter(|_| behind.iter().all(held))?;
@@ -209,7 +209,7 @@ fn is_on(sample: &Sample, trajectory: &Trajectory) -> bool {
     let Some(at) = trajectory.at_ms(sample.point) else { return false };
     (0..JOINTS).all(|j| {
         let joint = &sample.joints[j];
-        // Measured positions lag behind and contain the tracking error.
+        // Measured positions are late and contain the tracking error.
         let (value, same) =
             if joint.set_position.is_finite() { (joint.set_position, SAME) } else { (joint.position, 0.1) };
         (value - at.position[j]).abs() <= same

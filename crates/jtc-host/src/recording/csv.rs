@@ -1,6 +1,6 @@
 //! CSV files: a header with units, then one row per sample. An unknown value is an empty field. If a run was not finished,
-//! comment lines that begin with `#` report how it ended. They follow after all rows, so that a reader without support for
-//! comments still gets the whole table.
+//! comment lines that begin with `#` report how it ended. These lines follow after all rows, so that a reader without
+//! support for comments still gets the whole table.
 
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;

@@ -6,8 +6,8 @@ use super::cdr::Encoder;
 use crate::arm::frame_name;
 use crate::sample::Sample;
 
-/// Length of the intervals of time with at most one message of transforms each, ns. It corresponds to the display rate of
-/// a viewer.
+/// Length of the intervals of time with at most one message of transforms each, ns. The intervals correspond to the
+/// display rate of a viewer.
 const EVERY_NS: u64 = 20_000_000;
 
 /// A rotation as a unit quaternion: x, y, z, w.

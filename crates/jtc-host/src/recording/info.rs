@@ -106,7 +106,7 @@ pub struct RecordingInfo {
     pub device: Option<DeviceIdentity>,
     /// End of the run.
     pub ending: Ending,
-    /// Complete trajectory of the run, in MCAP files. It is needed to resume an interrupted run.
+    /// Complete trajectory of the run, in MCAP files. The trajectory is needed to resume an interrupted run.
     pub commanded: Option<Arc<Trajectory>>,
     /// Number of runs that the user requested, including the first, in MCAP files. `None` if not recorded.
     pub runs: Option<u32>,

@@ -1,5 +1,5 @@
-//! Messages about an arm, in CDR with ROS 2 schemas. They are used in recordings, and live for viewers that can also show
-//! recordings.
+//! Messages about an arm, in CDR with ROS 2 schemas. The messages are used in recordings, and live for viewers that can
+//! also show recordings.
 
 use super::cdr::Encoder;
 use super::frames::Frames;
@@ -27,7 +27,7 @@ pub enum Topic {
     Control,
     /// State, error words and point of the trajectory.
     State,
-    /// Robot description (URDF) of the arm. It does not change.
+    /// Robot description (URDF) of the arm. The description does not change.
     Description,
     /// Poses of the arm's links.
     Transforms,

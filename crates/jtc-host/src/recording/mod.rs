@@ -1,5 +1,5 @@
-//! Recordings of a run. They are written as MCAP or CSV, depending on the extension of the file name, and read again for
-//! reports.
+//! Recordings of a run. Recordings are written as MCAP or CSV, depending on the extension of the file name, and read
+//! again for reports.
 //!
 //! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so
 //! that Foxglove, PlotJuggler and Rerun plot it directly. The parts of the torque are on `/jtc/control`, and the states are

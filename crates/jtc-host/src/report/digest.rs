@@ -9,8 +9,8 @@ use crate::sample::Sample;
 
 /// Samples reduced to the content of a report: figures, curves with their extremes, and the first error.
 ///
-/// It takes about 20 MB, whether the recording lasts a minute or a day. For up to 16,000 samples the plots show each
-/// sample.
+/// A digest takes about 20 MB, whether the recording lasts a minute or a day. For up to 16,000 samples the plots show
+/// each sample.
 #[derive(Clone, Debug)]
 pub struct Digest {
     samples: u64,

@@ -64,16 +64,16 @@ pub struct RunFailure {
 }
 
 impl RunFailure {
-    /// Returns the first error since the start of the execution. Without an execution, searches all samples. `None` if there
-    /// is no error.
+    /// Returns the first error since the start of the execution. Without an execution, searches all samples. `None` if the
+    /// samples show no error.
     pub fn find(info: &RecordingInfo, samples: &[Sample]) -> Option<Self> {
         let begin = begin(samples);
         let at = begin + samples.get(begin..)?.iter().position(is_bad)?;
         Some(Self::found(info, &Around::of(samples, at)))
     }
 
-    /// Returns the failure of a recorded run. It is an error in the samples, or else the recorded reason for the end, or
-    /// else the fact that the recording does not show the end.
+    /// Returns the failure of a recorded run. The failure is an error in the samples, or else the recorded reason for
+    /// the end, or else the fact that the recording does not show the end.
     pub fn of_recording(info: &RecordingInfo, samples: &[Sample], ending: &Ending) -> Option<Self> {
         if let Some(found) = Self::find(info, samples) {
             return Some(found);

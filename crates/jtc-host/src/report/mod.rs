@@ -1,8 +1,8 @@
 //! Report of a run: figures per joint, an HTML page with interactive plots that needs no other files, and a small picture.
 //!
 //! [`Digest`] receives the samples one after the other, and keeps the data that a report needs. [`Summary`] contains the
-//! figures. [`html`] creates the page. It can be opened offline, because it contains the plot library, the styles and the
-//! data. [`picture_svg`] draws the commanded and measured positions and the tracking error as one SVG.
+//! figures. [`html`] creates the page. The page can be opened offline, because it contains the plot library, the styles
+//! and the data. [`picture_svg`] draws the commanded and measured positions and the tracking error as one SVG.
 
 mod curves;
 mod digest;
@@ -45,7 +45,7 @@ pub struct ReportInput<'a> {
     pub digest: &'a Digest,
     /// Tables to show next to the plots.
     pub facts: &'a [Facts],
-    /// First error if the run failed. It is shown at the top of the page.
+    /// First error if the run failed. The error is shown at the top of the page.
     pub failure: Option<&'a RunFailure>,
     /// Binding limits of a motion that was planned but not run. `None` for a run.
     pub plan: Option<&'a [Bound]>,

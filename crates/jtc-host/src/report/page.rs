@@ -13,7 +13,7 @@ const SCRIPT: &str = include_str!("assets/report.js");
 const PLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const PLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 
-/// Returns the complete page. It can be written to a file and opened without a network.
+/// Returns the complete page. The page can be written to a file and opened without a network.
 pub fn html(input: &ReportInput<'_>) -> String {
     // `<` is escaped so that no text can end the script element.
     let data = data(input).to_string().replace('<', "\\u003c");
@@ -60,7 +60,7 @@ fn data(input: &ReportInput<'_>) -> Value {
         (0..6).map(|j| pack(&curves.values(curve, j))).collect()
     };
     let start_s = digest.span_s().map_or(0.0, |(first, _)| first);
-    // JSON has no NaN. It becomes `null`, which the page shows as unknown.
+    // JSON has no NaN. NaN becomes `null`, which the page shows as unknown.
     let joints: Value = (0..6)
         .map(|j| {
             let joint = &info.joints[j];

@@ -7,7 +7,7 @@ use super::{ReportInput, escape};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
-/// Points per line. They are enough for the width in pixels.
+/// Points per line. This number is enough for the width in pixels.
 const POINTS: usize = 260;
 /// Minimum and maximum number of grid lines of an axis.
 const TICKS: (usize, usize) = (3, 12);
@@ -72,7 +72,7 @@ impl Panel {
     }
 }
 
-/// Returns the picture as SVG. It adapts to the reader's light or dark setting.
+/// Returns the picture as SVG. The picture adapts to the reader's light or dark setting.
 pub fn picture_svg(input: &ReportInput<'_>) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">\n<style>{STYLE}</style>\n\
@@ -197,7 +197,7 @@ fn margin(v: f64) -> f64 {
     1e-9 * v.abs()
 }
 
-/// Returns the axis for positions from `low` to `high`. It has a margin even if the joint does not move.
+/// Returns the axis for positions from `low` to `high`. The axis has a margin even if the joint does not move.
 fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
     let margin = ((high - low) * 0.08).max(0.02).max(margin(low)).max(margin(high));
     (low - margin, high + margin)

@@ -21,7 +21,8 @@ pub struct JointSummary {
     pub torque_limit_nm: Option<f64>,
     /// Peak torque as a share of the limit, from 0 to 1.
     pub torque_share: Option<f64>,
-    /// Largest magnitude of the speed, rad/s. It is the measured speed, or the commanded one if no speed was measured.
+    /// Largest magnitude of the speed, rad/s. The measured speed is used, or the commanded one if no speed was
+    /// measured.
     pub peak_velocity_rad_s: Option<f64>,
     /// Highest bearing temperature, °C.
     pub peak_temperature_c: Option<f64>,
@@ -54,12 +55,13 @@ impl Summary {
     }
 }
 
-/// Figures of streamed samples. They are collected over all samples, and over an execution, which may begin later.
+/// Figures of streamed samples. The figures are collected over all samples, and over an execution, which may begin
+/// later.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figures {
     /// Times of the first and the last sample.
     recorded: Option<(f64, f64)>,
-    /// Sums over the samples before an execution. If there is none, these are all samples.
+    /// Sums over the samples before an execution. Without an execution, these are all samples.
     before: Sums,
     executed: Sums,
 }

@@ -19,7 +19,7 @@ pub(super) struct Watch {
     /// Start of the run, computed from the last sample in motion. Before a motion it is the time of the first sample.
     start_s: Option<f64>,
     in_motion: bool,
-    /// First error before an execution, and first error since its start. The former is used only if there is no execution.
+    /// First error before an execution, and first error since its start. The former is used only without an execution.
     before: Option<Around>,
     since: Option<Around>,
 }

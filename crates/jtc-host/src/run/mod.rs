@@ -92,7 +92,7 @@ pub struct Ended {
     pub cut: bool,
 }
 
-/// Receiver of the samples of a motion. It is called while the arm moves.
+/// Receiver of the samples of a motion. The receiver is called while the arm moves.
 pub type SampleReceiver = Box<dyn FnMut(&Sample)>;
 
 /// Front end of a run. [`run`] calls the methods in the order of this list.
@@ -103,7 +103,8 @@ pub trait Observer<P: Port> {
     /// Converts the reason why a motion does not begin into an error of the front end.
     fn refused(&mut self, error: StartError) -> Self::Failure;
 
-    /// Converts an error before a motion began. It is [`Error::Cancelled`] if [`Observer::is_cancelled`] ended the run.
+    /// Converts an error before a motion began. The error is [`Error::Cancelled`] if [`Observer::is_cancelled`] ended
+    /// the run.
     fn failed(&mut self, error: Error) -> Self::Failure;
 
     /// Returns `true` once the run must end before its next motion. During a motion, [`Observer::status`] decides instead.

@@ -30,7 +30,7 @@ pub enum StartError {
     /// An approach of the run is not possible.
     #[error("the straight way from where the arm stands to the first point is refused: {0}")]
     Approach(#[from] ApproachError),
-    /// The next run cannot begin where the run before it ends.
+    /// The next run cannot begin at the end of the run before it.
     #[error(transparent)]
     Open(#[from] OpenPath),
 }

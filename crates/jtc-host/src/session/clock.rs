@@ -6,7 +6,7 @@ use jtc_wire::Status;
 
 /// Maximum transmission delay of a status that the clock assumes, s.
 const DELAY_S: f64 = 0.1;
-/// Minimum time between two statuses, s. It keeps statuses apart that a slow computer reads at once.
+/// Minimum time between two statuses, s. This time keeps statuses apart that a slow computer reads at once.
 const APART_S: f64 = 1e-6;
 
 /// Clock for statuses. While the controller moves along the path, the clock uses the milliseconds of the controller, which

@@ -339,7 +339,7 @@ impl<P: Port> Session<P> {
 
     /// Waits until the controller holds the arm in HoldPos, and all drives are enabled, except those of joints that are
     /// marked as absent. Returns an error at once if the controller reports errors. The positions in the returned status
-    /// are measured. They are the pose from which a run starts.
+    /// are measured. A run starts from these positions.
     ///
     /// # Errors
     ///

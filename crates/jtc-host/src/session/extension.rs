@@ -20,7 +20,7 @@ pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Maximum time that a device needs to store an arm, including the erasing of a flash sector.
 const STORING: Duration = Duration::from_secs(30);
 
-/// What the session knows about the extensions of the device.
+/// Knowledge of the session about the extensions of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Extensions {
     /// The session has not asked yet.
@@ -226,7 +226,8 @@ impl<P: Port> Session<P> {
         matches!(self.extensions, Extensions::Asked(_))
     }
 
-    /// Returns the speed override (path seconds per second, J-57). It is 1 if the device does not have this setting.
+    /// Returns the speed override (path seconds per second, J-57). The override is 1 if the device does not have this
+    /// setting.
     ///
     /// # Errors
     ///

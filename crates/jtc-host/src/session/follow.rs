@@ -93,7 +93,7 @@ impl<P: Port> Session<P> {
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
                 (Some(TrajectoryState::Stop), _) if begun => return Ok(Outcome::Stopped(status)),
-                // The trajectory was deleted, or nodes are no longer in operation.
+                // The trajectory was deleted, or nodes have left operation.
                 (Some(TrajectoryState::Null), _)
                 | (_, Some(ControllerState::Start | ControllerState::Init))
                     if begun =>
@@ -152,7 +152,8 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the occurred errors of the joints. They include errors to which the controller reacts by itself (J-66).
+/// Returns the occurred errors of the joints. The result includes errors to which the controller reacts by itself
+/// (J-66).
 fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }

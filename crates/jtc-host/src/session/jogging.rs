@@ -95,7 +95,7 @@ impl<P: Port> Session<P> {
             standstill.see(self.now(), &status);
             let late = self.now() > end;
             if late || standstill.is_reached() {
-                // The controller may lower a load for longer than that. It is then in a held stop.
+                // The controller may lower a load for longer than that. The controller is then in a held stop.
                 self.without_held_stop(&status)?;
             }
             if standstill.is_reached() {

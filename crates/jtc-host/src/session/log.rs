@@ -11,7 +11,7 @@ use crate::port::Port;
 /// State of a flight recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogStatus {
-    /// What the recorder is doing, or the reason why it has stopped.
+    /// Activity of the recorder, or the reason why it has stopped.
     pub state: LogState,
     /// Number after the number of the newest block.
     pub end: u32,
@@ -88,7 +88,7 @@ impl<P: Port> Session<P> {
             if ended() {
                 return Err(Error::Cancelled);
             }
-            // The first answer shows where the log begins.
+            // The first answer shows the beginning of the log.
             let (block, offset) =
                 (first.unwrap_or(0) + (bytes.len() / BLOCK_BYTES) as u32, bytes.len() % BLOCK_BYTES);
             let page = self.log_page(block, offset as u16)?;

@@ -1,4 +1,5 @@
-//! Session with the controller. It is the only writer, receives the stream of statuses, and gets each request confirmed.
+//! Session with the controller. The session is the only writer, receives the stream of statuses, and gets each request
+//! confirmed.
 //!
 //! Records of the controller are one-shot (J-04): for each received frame, exactly one status contains its record, in the
 //! order of the frames. The session queues the records and passes each one to the request that waits for it.

@@ -71,8 +71,8 @@ impl Presence {
         self.commanded.is_some() && (self.moves || self.waits)
     }
 
-    /// Returns the time between two requests. It is short enough for at least three requests within the controller's
-    /// timeout.
+    /// Returns the time between two requests. This time is short enough for at least three requests within the
+    /// controller's timeout.
     fn period(&self) -> Duration {
         match self.host_timeout_ms {
             Some(ms) if ms > 0.0 => Duration::from_secs_f64(ms / 3000.0).clamp(SHORTEST, ASK_AGAIN),

@@ -44,8 +44,8 @@ const PERSON_TIME: Duration = Duration::from_secs(60);
 
 impl<P: Port> Session<P> {
     /// Brings the controller to HoldPos without errors. `parameters` gives friction, gains and arm model if the controller
-    /// lacks some of them. If there is no source, or the source is incomplete, an error is returned before anything is
-    /// sent. A trajectory is never resumed.
+    /// lacks some of them. If the source is missing or incomplete, an error is returned before anything is sent. A
+    /// trajectory is never resumed.
     ///
     /// # Errors
     ///

@@ -18,7 +18,7 @@ use crate::{Arm, Error};
 #[must_use = "a run may have failed: look at its outcome"]
 pub struct Run {
     /// How the run ended. If it failed, it is an error of [`Session::execute`] or of [`Session::follow`]. A failed run also
-    /// has samples, with which the failure can be analysed.
+    /// has samples, for an analysis of the failure.
     pub outcome: Result<Outcome, Error>,
     /// Samples, oldest first. The commanded values are those of the trajectory at the point that the controller reports.
     pub samples: Vec<Sample>,

@@ -8,7 +8,7 @@
 //!   velocities and accelerations. The velocity at the first and at the last sample is 0. The acceleration there is not 0,
 //!   so the motion begins and ends with a step in acceleration.
 //! - **Positions and velocities**: for each joint, a cubic spline through the velocities gives the accelerations. So the
-//!   rounding of positions has no effect on them. It is a natural spline: the jerk is 0 at the ends. The velocities are
+//!   rounding of positions has no effect on them. The spline is natural: the jerk is 0 at the ends. The velocities are
 //!   used unchanged, at the ends too.
 //! - **All three channels**: nothing is derived.
 //!
@@ -55,7 +55,7 @@ use super::{Point, Trajectory};
 /// Samples of a motion, as read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// Times, s. They strictly increase. The first one need not be 0.
+    /// Times, s. The times strictly increase. The first one need not be 0.
     pub times: Vec<f64>,
     /// Positions in rad, one row for each time.
     pub position: Vec<[f64; JOINTS]>,

@@ -1,4 +1,4 @@
-//! Trajectories: points at a fixed step. They can be read from common file formats.
+//! Trajectories: points at a fixed step. Trajectories can be read from common file formats.
 
 mod csv;
 pub mod fit;
@@ -106,8 +106,8 @@ impl Loaded {
         read.map_err(|e| e.in_file(path))
     }
 
-    /// Reads the measured motion of a recording instead of the commanded one. It is the last motion by hand, or, if there
-    /// is none, the last execution.
+    /// Reads the measured motion of a recording instead of the commanded one. The result is the last motion by hand, or
+    /// else the last execution.
     ///
     /// # Errors
     ///

@@ -17,7 +17,7 @@ pub struct Overshoot {
     pub after: usize,
 }
 
-/// Smallest overshoot that is reported, rad. It moves a point at a distance of one metre by 1 mm.
+/// Smallest overshoot that is reported, rad. Such an overshoot moves a point at a distance of one metre by 1 mm.
 const LEAST: f64 = 1e-3;
 
 /// Returns the largest overshoot of each joint that has one. The curve consists of the cubics with these positions and
@@ -82,8 +82,8 @@ mod tests {
         let loaded = Loaded::parse(text, None).unwrap();
         let [over] = loaded.overshoot[..] else { panic!("{:?}", loaded.overshoot) };
         assert_eq!((over.joint.number(), over.after), (1, 2));
-        // The spline goes through 0, 0.5, 0.5, 0 with rest at both ends. It turns at 1.5 s, with slopes of ±0.5 rad/s at
-        // the two middle points.
+        // The spline goes through 0, 0.5, 0.5, 0 with rest at both ends. The spline turns at 1.5 s, with slopes of ±0.5
+        // rad/s at the two middle points.
         assert!(
             (over.beyond_rad - 0.125).abs() < 1e-9 && (over.position_rad - 0.625).abs() < 1e-9,
             "{over:?}"

@@ -53,8 +53,8 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     loaded.map_err(|e| e.in_file(path))
 }
 
-/// Returns the trajectory that is stored in the recording of a run. It is exactly the trajectory of the run, and complete
-/// even if the run was interrupted.
+/// Returns the trajectory that is stored in the recording of a run. The result is exactly the trajectory of the run, and
+/// complete even if the run was interrupted.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
     let note = match recording.broken_off(whole) {
@@ -89,7 +89,7 @@ fn read(path: &Path) -> Result<Recording, FileError> {
     })
 }
 
-/// Reads a recording and extracts the measured motion. It is the last teaching, or, if there is none, the last execution.
+/// Reads a recording and extracts the measured motion. The result is the last teaching, or else the last execution.
 pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
     let mut loaded = measured(&recording.samples).map_err(|e| e.in_file(path))?;
@@ -99,8 +99,8 @@ pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the last measured motion, without the standstill before and after it. It is a motion by hand, or, if there is
-/// none, a motion along a trajectory.
+/// Returns the last measured motion, without the standstill before and after it. The result is a motion by hand, or else
+/// a motion along a trajectory.
 fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let by_hand = samples.iter().any(|s| s.state == ControllerState::Teaching);
     let timed = if by_hand { led(samples) } else { followed(samples) };
@@ -337,7 +337,7 @@ mod tests {
         let (first, last) = (led.points[0], led.points.last().unwrap());
         assert!(first.position[3].abs() < 2e-3 && (last.position[3] - 0.4).abs() < 2e-3);
         assert_eq!((first.velocity, last.velocity), ([0.0; JOINTS], [0.0; JOINTS]));
-        // If there is no motion by hand, the last execution is used.
+        // Without a motion by hand, the last execution is used.
         let run: Vec<Sample> = (0..50)
             .map(|k| Sample {
                 time_s: f64::from(k) * 0.04,

@@ -55,7 +55,7 @@ fn every_int16_value_round_trips() {
     }
 }
 
-/// Section 1: an encoder rejects a value outside the scale. It never wraps or clips the value.
+/// Section 1: an encoder rejects a value outside the scale. The encoder never wraps or clips the value.
 #[test]
 fn values_outside_the_scale_are_refused_by_name() {
     let mut point = Point::default();

@@ -1,4 +1,4 @@
-//! Flange poses in files: ten values, of which three are the position, and three or four the orientation.
+//! Flange poses in files: ten values; three give the position, and three or four the orientation.
 
 use jtc_plan::kinematics::Orientation;
 

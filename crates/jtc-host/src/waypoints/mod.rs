@@ -1,4 +1,4 @@
-//! Waypoint files: positions for a motion, with or without times. They are used by [`plan`](crate::plan).
+//! Waypoint files: positions for a motion, with or without times. The files are used by [`plan`](crate::plan).
 //!
 //! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a pose
 //! of the flange in the base frame (m, with a quaternion or roll, pitch and yaw). If a flange pose has several solutions,

@@ -36,7 +36,8 @@ fn the_forms_say_the_same() {
     }
 }
 
-/// The flange pose of a joint position is written with a quaternion or with angles. It is converted back to that position.
+/// The flange pose of a joint position is written with a quaternion or with angles. The pose is converted back to that
+/// position.
 #[test]
 fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     let arm = arm();

@@ -26,8 +26,8 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     (0..positions.len()).filter(|i| keep[*i]).collect()
 }
 
-/// Returns the distance of `p` from the leg between `a` and `b`, at the point of the leg nearest to `p`. It is the distance
-/// of the joint with the largest one, rad.
+/// Returns the distance of `p` from the leg between `a` and `b`, at the point of the leg nearest to `p`. The result is the
+/// distance of the joint with the largest one, rad.
 fn distance(p: &[f64; JOINTS], a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
     let dot =
         |u: &dyn Fn(usize) -> f64, v: &dyn Fn(usize) -> f64| (0..JOINTS).map(|j| u(j) * v(j)).sum::<f64>();

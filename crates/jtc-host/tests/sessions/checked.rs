@@ -117,7 +117,7 @@ fn only_what_was_uploaded_is_executed() {
     refused(&mut s, &second);
     s.upload(&second, |_| Flow::Continue).unwrap();
     refused(&mut s, &first);
-    // After a cancelled upload there is no trajectory to execute.
+    // After a cancelled upload the session has no trajectory to execute.
     assert!(matches!(s.upload(&first, |_| Flow::Cancel), Err(Error::Cancelled)));
     refused(&mut s, &first);
     refused(&mut s, &second);

@@ -11,7 +11,7 @@ use jtc_host::{
 };
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
 
-/// Denial that arrives with the next bytes that are read. It may belong to the last frame or to an earlier one.
+/// Denial that arrives with the next bytes that are read. The denial may belong to the last frame or to an earlier one.
 #[derive(Clone, Default)]
 struct Denials(Rc<RefCell<Option<&'static str>>>);
 

@@ -50,7 +50,7 @@ mod answers {
     }
 }
 
-/// J-34: resume continues a paused motion. It does not start another motion.
+/// J-34: resume continues a paused motion. Resume does not start another motion.
 #[test]
 fn j34_resume_only_after_a_pause() {
     use TrajectoryState::{Execute, Finish, Null, Stop};

@@ -76,7 +76,7 @@ pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
 }
 
 /// Adds the velocity limit 0 to each limit without a velocity, because the reader requires one. The value 0 means that
-/// there is no limit.
+/// the velocity is not limited.
 pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !tag.text.contains("velocity");
     let places: Vec<usize> = tags(text).filter(lacks).map(|tag| tag.begin + "<limit".len()).collect();

@@ -24,7 +24,8 @@ fn an_arm_with_torque_is_not_dropped() {
             asked => assert!(asked.is_ok() && idle, "{state}: {asked:?}"),
         }
     }
-    // One drive that may hold is sufficient. This includes a transition, the reaction to a fault, and a calibration.
+    // A single drive that may hold is sufficient. This includes a transition, the reaction to a fault, and a
+    // calibration.
     board.set_status(|status| status.state = ControllerState::Error.into());
     for code in 0..=255 {
         board.set_status(|status| status.joints[5].state = NodeState::new(code));
@@ -207,7 +208,8 @@ fn an_image_goes_onto_its_own_board_only() {
     }
 }
 
-/// A report that is not understood may come from any board. It is not treated like a device that reports nothing.
+/// A report that is not understood may come from any board. The controller is not treated like a device that reports
+/// nothing.
 #[test]
 fn a_controller_that_does_not_report_its_board_has_an_unknown_supply() {
     let link = StLink::new("NOD_H745ZIQ", &Board::running(H745, None), Behaviour::Ignores);

@@ -15,7 +15,7 @@ pub enum ParameterSource<'a> {
     None,
     /// Defaults of the controller, which are built into it or stored in it.
     ControllerDefaults,
-    /// All parameters of an arm. They are sent to every controller without torque.
+    /// All parameters of an arm. The parameters are sent to every controller without torque.
     Arm {
         /// Name of the arm or its file.
         name: &'a str,

@@ -1,6 +1,6 @@
 //! Parser for sizes of files and folders in options.
 
-/// Parses a number of bytes such as `500MB`, `2 GB`, `1GiB` or a plain number. It must be at least `least`.
+/// Parses a number of bytes such as `500MB`, `2 GB`, `1GiB` or a plain number. The number must be at least `least`.
 ///
 /// # Errors
 ///

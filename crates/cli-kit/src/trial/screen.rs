@@ -1,5 +1,5 @@
-//! Terminal emulation: shows the output of a program. It supports the functions that live views and progress bars
-//! use.
+//! Terminal emulation: shows the output of a program. The emulation supports the functions that live views and
+//! progress bars use.
 
 /// Cells of a terminal.
 pub struct Picture {

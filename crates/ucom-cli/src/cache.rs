@@ -13,7 +13,7 @@ use crate::args::{CacheArgs, LinkArgs};
 const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 impl LinkArgs {
-    /// Loads the signal table; an empty one if there is no file.
+    /// Loads the signal table. Without a file, the table is empty.
     pub fn signal_table(&self) -> Result<SignalTable, Failure> {
         let here = Path::new(SIGNAL_TABLE);
         let path = match &self.edges {
@@ -31,7 +31,7 @@ impl CacheArgs {
         Cache::new(self.directory(), self.fresh)
     }
 
-    /// Returns the folder of the cache; `None` if there is none.
+    /// Returns the folder of the cache; `None` if the folder is unknown.
     fn directory(&self) -> Option<PathBuf> {
         self.cache.clone().or_else(|| Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom")))
     }

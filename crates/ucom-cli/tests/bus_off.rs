@@ -21,8 +21,8 @@ fn bus_off_is_not_for_ever() {
     assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
 }
 
-/// A client learns of its own bus-off from an error frame, and `ucom` prints a message with the next step. It is not
-/// only printed on the simulator's stderr.
+/// A client learns of its own bus-off from an error frame, and `ucom` prints a message with the next step. The
+/// bus-off is not only reported on the simulator's stderr.
 #[test]
 fn the_bus_off_controller_is_named() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

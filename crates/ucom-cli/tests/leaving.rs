@@ -62,7 +62,7 @@ fn of(board: u8, name: &str) -> impl Fn(&Value) -> bool {
     move |event| event["event"] == name && event["board"] == board
 }
 
-/// One board misses the PC's heartbeats (D-50) and leaves its loop, while the other board continues.
+/// A board misses the PC's heartbeats (D-50) and leaves its loop, while the other board continues.
 #[test]
 fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

@@ -108,8 +108,8 @@ fn files_are_not_written_over() {
     }
 }
 
-/// If a file cannot be written, this is detected before any frame is sent. If there is no result, the file created
-/// for it is removed.
+/// If a file cannot be written, this is detected before any frame is sent. Without a result, the file created for
+/// it is removed.
 #[test]
 fn outputs_are_opened_before_anything_is_sent() {
     let (sim, _) = started();

@@ -66,7 +66,7 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     signal(&child, "-INT");
     let (code, err) = over(child);
     assert_eq!((code, err.contains("token")), (Some(0), false), "{err}");
-    // The user requests the link. It is still not printed, because the reader of the output may store it.
+    // The user requests the link. The link is still not printed, because the reader of the output may store it.
     let (child, again) = serve(dir.path(), &["--sim", "--link"]);
     signal(&child, "-INT");
     let (code, err) = over(child);

@@ -56,7 +56,7 @@ fn d24_every_command_names_it_and_changes_nothing() {
         doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire behind"),
         "{doctor}"
     );
-    // After `init` has given new numbers, there is no error.
+    // After `init` has given new numbers, the commands succeed.
     sim.ucom(&["init"]).ends(0);
     sim.ucom(&["info", "all"]).ends(0);
 }

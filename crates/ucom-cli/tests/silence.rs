@@ -5,7 +5,7 @@ use crate::common;
 use cli_kit::trial::ended;
 use common::Sim;
 
-/// A recorder of a silent bus reports this once, only to users. It does not report it if frames arrive.
+/// A recorder of a silent bus reports this once, only to users. The recorder does not report this if frames arrive.
 #[test]
 fn a_recorder_of_a_silent_bus_reports_it_once() {
     let sim = Sim::start(&["--boards", "2"]);

@@ -52,7 +52,7 @@ fn d41_the_header_names_the_board_if_wanted() {
     }
 }
 
-/// Exit codes 2 and 4, with which no board is changed.
+/// With the exit codes 2 and 4 no board is changed.
 #[test]
 fn d46_refusals_change_nothing() {
     let sim = chain("3");
@@ -156,7 +156,8 @@ fn p13_a_killed_update_is_recovered_by_the_next() {
     assert_eq!(update["outcome"], "verified", "{update}");
 }
 
-/// The board loses power in the second cycle. It comes up without an application, and `init` and an update repair it.
+/// The board loses power in the second cycle. The board comes up without an application, and `init` and an update
+/// repair it.
 #[test]
 fn d46_power_loss_in_mid_update() {
     let mut sim = chain("2");

@@ -41,7 +41,7 @@ fn d62_data_memory_is_never_taken_as_proven() {
     }
 }
 
-/// D-62: the same bytes at another address are written. If there is no record, no frame is sent and no board is
+/// D-62: the same bytes at another address are written. Without a record, no frame is sent and no board is
 /// verified.
 #[test]
 fn d62_another_address_is_written() {

@@ -86,7 +86,7 @@ fn io_value((known, initial): &Described) -> Value {
     })
 }
 
-/// Returns the known meaning of a signal's words; null if there is no table.
+/// Returns the known meaning of a signal's words; null if the signal is not in a table.
 fn signal_value(signal: &Signal) -> Value {
     if !signal.known {
         return Value::Null;

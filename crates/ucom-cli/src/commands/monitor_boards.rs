@@ -1,5 +1,5 @@
-//! Boards as rows of the live view. It shows as many columns as fit, and always a board's state, status bits and
-//! heartbeat.
+//! Boards as rows of the live view. The view shows as many columns as fit, and always a board's state, status bits
+//! and heartbeat.
 
 use ratatui::layout::Constraint;
 use ratatui::style::{Color, Modifier, Style, Stylize};

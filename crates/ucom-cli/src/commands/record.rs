@@ -40,7 +40,7 @@ pub struct Silence {
 }
 
 impl Silence {
-    /// Starts to listen. For programs there is no note, because they detect silence themselves.
+    /// Starts to listen. Programs get no note, because they detect silence themselves.
     pub fn begins(out: &Output) -> Self {
         Self { since: Instant::now(), over: out.is_json() }
     }

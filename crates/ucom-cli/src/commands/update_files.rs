@@ -190,7 +190,7 @@ mod tests {
         let raw = Profile { prog_date: DateForm::Raw, ..fat };
         assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
         assert!(day(None, &raw).is_err_and(|e| e.next.to_string().contains("0x3AC1")));
-        // Without a header there is no date.
+        // A profile without a header has no date.
         let none = Profile { prog_plan: Plan::Raw, ..fat };
         assert_eq!(day(None, &none).ok(), Some(0));
         assert!(day(Some("2009-06-01"), &none).is_err());

@@ -99,7 +99,7 @@ proptest! {
         let asks = [FrameType::GetInfo, FrameType::TrajSetExecStatus];
         let mut sent = [Vec::new(), Vec::new(), Vec::new()];
         for (client, kind) in frames {
-            // The first client commands; all clients send requests, but only the first one sends commands.
+            // All clients send questions. Only the first client also sends commands.
             let frame: Vec<u8> = match (client, kind) {
                 (_, 0) => fixed::GET_INFO.to_vec(),
                 (_, 1) => fixed::get_arm(256).to_vec(),
@@ -306,8 +306,8 @@ fn a_client_that_sends_without_end_is_put_out() {
     assert_eq!(board.line.take_deliveries(a), None);
 }
 
-/// The controller begins Teaching only in position hold, and refuses a Stop before. Without the end of Teaching, the arm would
-/// become compliant after the Stop.
+/// The controller begins Teaching only in position hold, and refuses a Stop until then. Without the end of Teaching, the arm
+/// would become compliant after the Stop.
 #[test]
 fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     for damaged in [0, 10] {

@@ -14,7 +14,7 @@ pub struct Given {
     pub settings: usize,
     /// `true` if the controller has the name of the arm.
     pub named: bool,
-    /// Parts of friction, gains and model that the controller has confirmed.
+    /// Reports of the parameters (friction, gains, model) that the controller has confirmed.
     pub parts: Vec<PushReport>,
     /// Hash of the arm, if all parameters were read back without a difference.
     pub hash: Option<u64>,

@@ -246,7 +246,7 @@ impl Client {
         VecDeque::into(taken)
     }
 
-    /// Queues a delivery, if the client has not left too many bytes unread.
+    /// Queues a delivery. Returns an error if the client has left too many bytes unread.
     pub fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
         self.unread += delivery.len();
         self.deliveries.push_back(delivery);

@@ -104,8 +104,8 @@ impl SharedLine {
         None
     }
 
-    /// Refuses queued frames of clients that have lost the lease. A client that still wants to command takes the lease
-    /// again, if the lease is free.
+    /// Refuses queued frames of clients that have lost the lease. A client whose lease has lapsed takes the lease again,
+    /// if the lease is free and the client's policy lets its motion continue.
     fn refuse_without_lease(&mut self, now: Duration) {
         let holder = self.lease.as_ref().map(|lease| lease.holder);
         let waits = |client: &Client| client.waiting.front().is_some_and(|frame| frame.class.needs_lease());

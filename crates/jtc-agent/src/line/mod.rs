@@ -392,8 +392,8 @@ impl SharedLine {
     }
 
     /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to be at rest, because the
-    /// last status is older than the last command. If the controller refuses the command, other clients are not
-    /// affected. Returns true if the arm may have been moving.
+    /// last status is older than the last command. In this case the controller may refuse the command, and other
+    /// clients are not affected. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.moving.may_move(self.status.as_ref(), now);
         if moved {

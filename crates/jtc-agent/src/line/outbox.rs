@@ -131,8 +131,8 @@ impl Outbox {
                 passed.extend(self.writing.take().map(|writing| Passed::Abandoned(writing.outgoing)));
                 return (bytes, passed);
             }
-            // The next piece is written when at most one piece is still queued. Writing it earlier would not make it
-            // arrive sooner.
+            // The urgent frame is written when it fits, with the remainder of the current frame, within the limit of
+            // queued bytes. Writing it earlier would not make it arrive sooner.
             let needed =
                 self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
             if queued == 0 || needed <= room {

@@ -1,4 +1,4 @@
-//! Holding registers, and the handshake that turns them into commands: Each command is executed once, even if writes
+//! Holding registers, and the handshake that turns them into commands. Each command is executed once, even if writes
 //! are repeated or answers are lost.
 use super::codes::{Command, Outcome};
 use super::map::{HOLDINGS, WATCHDOG_MIN, holding};
@@ -25,7 +25,7 @@ pub struct Order {
 
 /// Holding registers of the commanding PLC, and its last command.
 ///
-/// A command must have the next sequence number after the last command. With any other number, no command is executed.
+/// A command must have the sequence number after that of the last command. With any other number, no command is executed.
 /// So a write that is repeated after a lost answer has no effect. A PLC may repeat values that it has written before
 /// the agent was started. These values have no effect either, because each agent starts with a different number.
 #[derive(Clone, Debug)]

@@ -309,7 +309,7 @@ impl Plc {
 }
 
 impl Operator {
-    /// Returns `true` if the commanding connection has been silent for too long.
+    /// Returns `true` if the commanding connection is closed, or has been silent for too long.
     fn is_gone(&self, handshake: &Handshake) -> bool {
         let after = match handshake.watchdog_ms() {
             0 => GONE_UNWATCHED,

@@ -27,7 +27,7 @@ const AGAIN: Duration = Duration::from_secs(5);
 enum Message {
     Begin(Box<RecordingInfo>),
     Sample(Box<Sample>),
-    /// End of the recording, and the number of samples that were lost because the queue was full.
+    /// End of the recording, and the number of samples that did not get into the queue.
     End(Ending, u64),
 }
 

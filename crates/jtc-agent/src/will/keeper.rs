@@ -150,7 +150,7 @@ impl Writer {
                 None => file::remove(&self.path),
             };
             if done.is_err() {
-                // The contents of the file are outdated. Without a valid file the next agent stops the arm.
+                // The contents of the file are outdated. If the file is not valid, the next agent stops the arm.
                 file::spoil(&self.path);
             }
             self.there = done.is_ok().then_some(wanted);

@@ -223,7 +223,7 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     let mut err = BufReader::new(child.stderr.take().unwrap());
     until(&mut err, at);
     cli_kit::trial::signal(&child, "-INT");
-    // The test reads the remaining output, so that a full pipe does not block the command.
+    // From here on stderr is not read. A full pipe must not block the command.
     let mut out = String::new();
     child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
     let code = child.wait().unwrap().code().unwrap_or(-1);

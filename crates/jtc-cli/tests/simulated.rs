@@ -346,7 +346,7 @@ fn a_recording_is_looked_at_checked_and_run_again() {
 /// A host whose frame comes byte by byte does not delay the arm: statuses continue meanwhile.
 #[test]
 fn time_goes_on_while_a_frame_arrives() {
-    // A single tick per byte would give too few statuses.
+    // In real time a status comes every 25 ms, so at least 12 come meanwhile. A single tick per piece would give only 6.
     for (options, least) in [(&["--no-throttle"][..], 8), (&["--speed", "max", "--no-throttle"], 50)] {
         let sim = Sim::start(options);
         let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&sim.port).unwrap();

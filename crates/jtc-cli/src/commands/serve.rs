@@ -186,8 +186,8 @@ fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     })
 }
 
-/// Stores which client's policy applies to a motion, for the next agent in case this agent is killed. First applies the
-/// policy that a killed agent has stored.
+/// Begins to store which client's policy applies to a motion, for the next agent in case this agent is killed. Also
+/// returns the policy that a killed agent has stored, which `act_on` applies.
 fn keep_policies(
     port: &str,
     log: &Arc<Mutex<CommandLog>>,

@@ -4,8 +4,8 @@ use cli_kit::{Failure, Output};
 
 use crate::args::SimArgs;
 
-/// Notice about the simulated brakes. The constants after it are the notices about a stand, and about an arm without
-/// support.
+/// Notice about the simulated brakes, which carry the arm while no drive does. The constants after it are the notices
+/// about a stand, and about an arm without support.
 #[cfg(unix)]
 const BRAKES: &str =
     "note: simulated holding brakes keep the arm up after an error; the known drives have none";

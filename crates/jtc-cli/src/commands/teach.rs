@@ -127,7 +127,7 @@ fn record(
     failed.map_or(written, Err)
 }
 
-/// Returns the failure if another program, or an error, has ended teaching.
+/// Returns the failure if another program has ended teaching.
 fn taught_no_more(status: &Status) -> Failure {
     let message = format!("another program ended teaching: state {}; the recording ends there", status.state);
     Failure::new(ErrorKind::Fault, "not-teaching", message).next("`jtc teach record FILE` starts a new one")

@@ -8,7 +8,7 @@ use jtc_host::trajectory::Loaded;
 use jtc_sim::{HandPath, TypedEvent, World};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-/// Interval of the checks if the program is in the foreground of its terminal.
+/// Interval at which the program checks if it is in the foreground of its terminal.
 const LOOK: Duration = Duration::from_millis(200);
 /// Longest line.
 const LINE_MAX: usize = 4096;

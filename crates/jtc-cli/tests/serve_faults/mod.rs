@@ -56,7 +56,7 @@ fn an_agent_that_is_killed_leaves_the_motion_to_the_controller_and_says_so_to_it
     let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");
     let message = report["error"]["message"].as_str().unwrap_or_default().to_owned();
     assert!(message.contains("MAY BE MOVING"), "{report}");
-    // The controller has the whole motion, and every client can read it.
+    // The controller has the whole motion and completes it, and every client can see this in the status.
     let port = cell.sim.as_ref().expect("it is there").port.to_str().expect("a name").to_owned();
     let baud = |words: &[&str]| {
         let mut command = cell.jtc(words);

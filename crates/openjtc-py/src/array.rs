@@ -1,4 +1,4 @@
-//! Converts numpy arrays to arrays of joints, and back: An array has one row per state and one column per joint, base
+//! Converts numpy arrays to arrays of joints, and back. An array has one row per state and one column per joint, base
 //! to wrist.
 
 use jtc_core::JOINTS;

@@ -73,7 +73,7 @@ def test_the_jacobian_maps_velocities_and_forces(arm, states):
     here = dynamics.forward_kinematics(q)[:, :3, :3]
     spin = (after - before)[:, :3, :3] / (2 * h) @ here.transpose(0, 2, 1)
     assert np.allclose(np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1), twist[:, 3:], rtol=0, atol=1e-7)
-    # The torques of a point mass at the flange are its weight times the transposed Jacobian.
+    # The torques of a point mass at the flange are the transposed Jacobian times its weight.
     more = Dynamics(arm, Payload(1.0)).gravity(q) - dynamics.gravity(q)
     force = -arm.gravity
     assert np.allclose(np.einsum("nij,i->nj", dynamics.jacobian(q)[:, :3], force), more, rtol=0, atol=1e-9)

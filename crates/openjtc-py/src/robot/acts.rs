@@ -83,7 +83,7 @@ impl Machine {
         }
     }
 
-    /// Updates from the last status if the motion of this connection has ended.
+    /// Notes the end of the motion of this connection, if the last status shows it.
     pub fn look(&mut self) {
         if !self.shared.moves() || !self.session.port().is_shown() {
             return;

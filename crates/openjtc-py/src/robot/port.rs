@@ -141,7 +141,7 @@ impl AnyPort {
         }
         let due = now.1 != self.done.1 || self.shared.moves();
         if due && self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
-            // No Stop is written here, because existing devices would take it for a part of the frame.
+            // The Stop is not written yet, because existing devices would take it for a part of the frame.
             return Ok(());
         }
         self.done = now;

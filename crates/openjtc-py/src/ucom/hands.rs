@@ -94,8 +94,8 @@ impl Hands {
         Ok(())
     }
 
-    /// Stops the boards if the program makes no call within the deadline. Heartbeats only show that this computer works. Heartbeats
-    /// do not show that the commanding program works.
+    /// Stops the boards if the program makes no call within the deadline. Heartbeats show only that this computer works, not that
+    /// the commanding program works.
     fn keep_deadline(&mut self) {
         if let Some(deadline) = self.deadline
             && self.shared.silence() >= deadline

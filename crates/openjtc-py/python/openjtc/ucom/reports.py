@@ -193,7 +193,7 @@ class UpdateReport:
         program_id: Program ID that the boards must show; None: the Program ID is not known.
         flash_date: Flash date of the image, ``YYYY-MM-DD``; None: no header has a date.
         bytes: Bytes of both cycles.
-        unverifiable: Reason why the written image cannot be verified; None: the image is verified.
+        unverifiable: Reason why the written image cannot be verified; None: the image can be verified.
         boards: Results in the order of board numbers.
     """
 

@@ -1,4 +1,4 @@
-// Base of the tests of a chain's page: an agent with simulated boards, its page, and a browser.
+// Test harness of a chain's page: an agent with simulated boards, its page, and a browser.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';

@@ -1,4 +1,4 @@
-// Base of the tests of the built page: an agent with a simulated arm, its page, and a browser.
+// Test harness of the built page: an agent with a simulated arm, its page, and a browser.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -233,7 +233,7 @@ export async function until(what, condition, within = 120_000) {
   }
 }
 
-/** Calls `act` while another client holds the lease. */
+/** Takes the lease as another client, and calls `act` with the key of this lease. */
 export async function commanding(agent, act, name = 'test') {
   const grant = await agent.ask('POST', '/api/lease', { name, lasts_s: 60 });
   if (grant.status !== 200) throw new Error(JSON.stringify(grant));

@@ -11,7 +11,7 @@ import { boardWords, busWords, type BusWords, eventWords, jobResult, jobWords, s
 const ROWS = 3000;
 /** Shortest interval between two updates of displayed text, ms. */
 const READ_MS = 120;
-/** Age above which outputs are shown as outdated, ms. The agent reports ages above half a second. */
+/** Age above which outputs are shown as outdated, ms. The agent reports outputs as outdated after half a second. */
 const OLD_MS = 900;
 const TICK_MS = 250;
 

@@ -1,4 +1,4 @@
-//! Rule coverage: checks that a test in the Rust sources mentions every rule of the protocol pages.
+//! Rule coverage: checks that each rule of the protocol pages is mentioned by a test in the Rust sources.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};

@@ -20,7 +20,7 @@ const ROUNDS: usize = 15;
 /// Inputs of the controller in one tick.
 struct Seen {
     bus: Vec<Frame>,
-    /// Index of the host's frame that was sent in this tick.
+    /// Index of the host's frame that was offered in this tick. A frame is offered until the controller has handled it.
     host: Option<usize>,
 }
 

@@ -118,7 +118,7 @@ impl Existing {
         Request::Move { torque: self.torque(), pump: false }.emit()
     }
 
-    /// Returns the next request of the bring-up: alternately a Move and another request, until all joints are enabled.
+    /// Returns the next frame of the bring-up, until all joints are enabled: every fourth tick the next request, else a Move.
     fn bring_up(&mut self) -> Frame {
         const TORQUE_MODE: u8 = 1;
         let states = self.states;

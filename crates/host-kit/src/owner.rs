@@ -243,8 +243,13 @@ impl<D, T> Place<'_, D, T> {
         self.0.waiting.iter().filter(|request| is_it(request.kind)).count()
     }
 
-    /// Puts the request: a command or an update before all questions.
+    /// Puts the request: a command or an update before all questions. A command or an update from before the last Stop is refused.
     pub fn put(mut self, request: Request<D, T>) {
+        if request.is_late(self.0.stops) {
+            // Without the lock, because the function of the request may use the queue.
+            drop(self);
+            return (request.act)(Err(Refused::Stopped));
+        }
         let waiting = &mut self.0.waiting;
         let is_command = request.kind != Kind::Question;
         let behind = waiting.iter().position(|other| is_command && other.kind == Kind::Question);
@@ -362,7 +367,7 @@ mod tests {
         bench.serve();
         assert_eq!(bench.device, [6, 5, 3]);
         let stopped = Some(Refused::Stopped);
-        assert_eq!(bench.log()[1..], [(1, stopped), (2, stopped), (4, stopped), (5, None), (3, None)]);
+        assert_eq!(bench.log(), [(4, stopped), (6, None), (1, stopped), (2, stopped), (5, None), (3, None)]);
     }
 
     #[test]
@@ -384,18 +389,45 @@ mod tests {
     #[test]
     fn nothing_is_done_for_a_request_that_is_refused() {
         let queue = Arc::new(Queue::<Done, u32>::default());
-        let own = queue.clone();
-        let act: Act<Done> = Box::new(move |device| {
-            assert_eq!(device, Err(Refused::Stopped));
-            assert!(!own.has(|tag| *tag == 1));
-        });
-        queue.put(Request { kind: Kind::Command, after: 0, tag: 1, act });
-        queue.stop(2, Box::new(|_| {}));
+        let log = Log::default();
+        // The function of each refused request uses the queue.
+        let put = |tag, after| {
+            let (own, log) = (queue.clone(), log.clone());
+            let act: Act<Done> = Box::new(move |device| {
+                assert!(!own.has(|other| *other == tag));
+                log.lock().expect("log").push((tag, device.err()));
+            });
+            queue.put(Request { kind: Kind::Command, after, tag, act });
+        };
         let mut device = Done::new();
+        put(1, 0);
+        queue.stop(0, Box::new(|_| {}));
         while let Some(turn) = queue.take() {
             turn.run(&mut device);
             queue.done();
         }
+        put(2, 1);
+        queue.stop(0, Box::new(|_| {}));
+        queue.refuse_late();
+        put(3, 1);
+        put(4, 2);
+        queue.cancel(|tag| *tag == 4);
+        put(5, 2);
+        queue.close();
+        put(6, 2);
+        let [stopped, cancelled, closed] = [Refused::Stopped, Refused::Cancelled, Refused::Closed].map(Some);
+        let all = [(1, stopped), (2, stopped), (3, stopped), (4, cancelled), (5, closed), (6, closed)];
+        assert_eq!(*log.lock().expect("log"), all);
+    }
+
+    #[test]
+    fn a_stop_does_not_cancel_the_one_before() {
+        let bench = Bench::default();
+        bench.stop(1);
+        let turn = bench.queue.take().expect("it waits");
+        bench.stop(2);
+        assert!(!bench.queue.is_cancelled());
+        drop(turn);
     }
 
     #[test]
@@ -435,11 +467,17 @@ mod tests {
     fn a_closed_queue_refuses_all_requests() {
         let mut bench = Bench::default();
         bench.request(Kind::Command, 0, 1);
+        // Its owner breaks off in the middle of it.
+        drop(bench.queue.take());
+        bench.request(Kind::Command, 0, 2);
+        bench.stop(3);
         bench.queue.close();
-        bench.stop(2);
+        assert!(!bench.queue.has(|_| true));
+        bench.stop(4);
+        bench.request(Kind::Question, 0, 5);
         assert!(bench.queue.place().is_none());
         bench.serve();
         let closed = Some(Refused::Closed);
-        assert_eq!((bench.log(), bench.device.len()), (vec![(1, closed), (2, closed)], 0));
+        assert_eq!((bench.log(), bench.device.len()), ([3, 2, 4, 5].map(|tag| (tag, closed)).to_vec(), 0));
     }
 }

@@ -147,6 +147,34 @@ def test_a_stop_from_another_thread_goes_first(numbered: ucom.SimulatedChain, nu
         assert not numbered_bus.started(1) and not numbered_bus.started(2)
 
 
+def test_a_stop_refuses_what_waits_for_the_end_of_an_update(numbered: ucom.SimulatedChain) -> None:
+    image = bytes(i * i % 241 for i in range(60_000))
+    begun = threading.Event()
+    failed: list[errors.Error] = []
+    with ucom.connect(numbered) as chain:
+
+        def program() -> None:
+            chain.update(image, 1, raw=True, force=True, progress=lambda _: begun.set())
+
+        def scan() -> None:
+            try:
+                chain.scan()
+            except errors.Error as error:
+                failed.append(error)
+
+        update, scanning, stopping = [threading.Thread(target=act) for act in (program, scan, chain.stop)]
+        update.start()
+        assert begun.wait(30)
+        scanning.start()
+        time.sleep(0.1)
+        stopping.start()
+        scanning.join(30)
+        assert update.is_alive(), "the update goes on"
+        assert failed[0].code == "cancelled"
+        update.join()
+        stopping.join()
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_a_stop_ends_a_run_that_still_reads_its_file(
     numbered: ucom.SimulatedChain, numbered_bus: Bus, tmp_path: Path
@@ -162,7 +190,7 @@ def test_a_stop_ends_a_run_that_still_reads_its_file(
             except errors.Error as error:
                 failed.append(error)
 
-        thread = threading.Thread(target=run)
+        thread = threading.Thread(target=run, daemon=True)
         thread.start()
         # The run reads the pipe from here on.
         with file.open("w") as pipe:

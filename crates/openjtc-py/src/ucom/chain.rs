@@ -140,12 +140,13 @@ impl Chain {
     }
 
     fn init<'py>(&self, py: Python<'py>, renew: bool, force: bool, check: bool) -> Object<'py> {
+        let after = self.owner.now()?;
         let file = self.inventory_file.as_deref();
         // Read here, because the session's thread must not wait for a disk.
         let read = py.detach(|| file.filter(|file| file.exists()).map(Inventory::read).transpose());
         let listed = read.map_err(|e| Failure::usage(e.to_string()))?;
         let init = move |hands: &mut _| procedures::init(hands, listed, (renew, force, check));
-        let (value, made) = self.owner.call(py, init)?;
+        let (value, made) = self.owner.call_after(py, after, init)?;
         if let (Some(file), Some(made)) = (file, made) {
             py.detach(|| made.write(file)).map_err(|e| Failure::usage(e.to_string()))?;
         }
@@ -214,7 +215,7 @@ impl Chain {
         texts: bool,
         force: bool,
     ) -> Object<'py> {
-        let after = self.owner.now();
+        let after = self.owner.now()?;
         let boards = self::boards(boards)?;
         let (inputs, parameters) = (assignments(inputs)?, assignments(parameters)?);
         let file = file.map(|file| self.parameter_file(py, &file)).transpose()?;
@@ -277,7 +278,7 @@ impl Chain {
     }
 
     fn apply_parameters(&self, py: Python<'_>, path: PathBuf, dry_run: bool, force: bool) -> PyResult<usize> {
-        let after = self.owner.now();
+        let after = self.owner.now()?;
         let file = self.parameter_file(py, &path)?;
         let apply = move |hands: &mut _| values::apply_parameters(hands, &file, dry_run, force);
         self.owner.call_after(py, after, apply)
@@ -314,7 +315,7 @@ impl Chain {
         flags: [bool; 10],
         progress: Option<Bound<'py, PyAny>>,
     ) -> Object<'py> {
-        let after = self.owner.now();
+        let after = self.owner.now()?;
         let source = |(file, bytes): (Option<PathBuf>, Option<Vec<u8>>)| {
             file.map(Source::File).or_else(|| bytes.map(Source::Bytes))
         };
@@ -358,7 +359,7 @@ impl Chain {
         image: Option<PathBuf>,
         force: bool,
     ) -> Object<'py> {
-        let after = self.owner.now();
+        let after = self.owner.now()?;
         let image = py.detach(|| image.as_deref().map(procedures::probed_image).transpose())?;
         let options = ProbeOptions { init, alive, image, force };
         plain(py, self.owner.call_after(py, after, move |hands| procedures::probe(hands, options))?)

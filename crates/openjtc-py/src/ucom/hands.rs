@@ -124,6 +124,7 @@ impl Hands {
     pub fn settle(&mut self) {
         // The next turn reports a lost bus.
         let _ = self.driver.turn(Duration::ZERO);
+        self.shared.queue.done();
     }
 
     /// Waits at most 0.5 s for the first outputs of boards that were just started, so that their values are known.

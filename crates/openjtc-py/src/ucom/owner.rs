@@ -65,7 +65,8 @@ impl Owner {
         py: Python<'_>,
         act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
-        self.call_after(py, self.now(), act)
+        let after = self.now()?;
+        self.call_after(py, after, act)
     }
 
     /// Like [`Self::call`], for a request that was made after the Stop with this number: see [`Self::now`].
@@ -80,8 +81,10 @@ impl Owner {
 
     /// Returns the number of the last Stop. A method that reads files before its request takes the number first, so that a Stop in that
     /// time is not overlooked.
-    pub fn now(&self) -> u64 {
-        self.shared.queue.stops()
+    pub fn now(&self) -> Result<u64, Failure> {
+        // In a forked process the lock of the queue may be held for ever.
+        self.is_here()?;
+        Ok(self.shared.queue.stops())
     }
 
     /// Like [`Self::call_after`]; `progress` is called with each report.
@@ -97,6 +100,7 @@ impl Owner {
         let (id, act, answers) = self.request(act);
         self.shared.queue.put(Request { kind, after, tag: id, act });
         loop {
+            self.is_here()?;
             let reported = match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
                 Received::Progress(value) => progress.map_or(Ok(()), |progress| {

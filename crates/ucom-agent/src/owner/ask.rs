@@ -77,6 +77,7 @@ impl Shared {
         hands: Result<&'a mut Hands, Refused>,
         asked: Option<Asked>,
     ) -> Result<&'a mut Hands, Problem> {
+        // A refusal may come in a thread that holds the leases. Their lock is taken only below, in the owner's thread.
         let hands = hands.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),

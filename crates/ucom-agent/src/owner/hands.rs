@@ -82,7 +82,8 @@ impl Hands {
             }
             self.rest();
         }
-        Ok(())
+        // A Stop that was requested just before the end is sent.
+        self.turn()
     }
 
     /// Runs one turn of the bus. Also checks the leases: see [`Hand`].

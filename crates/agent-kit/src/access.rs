@@ -43,7 +43,7 @@ pub enum Refusal {
     #[error("a page of {0} may not use this agent")]
     Origin(String),
     /// Token that does not belong to this agent.
-    #[error("the token is none of this agent's")]
+    #[error("the token is not valid for this agent")]
     WrongToken,
     /// Request without a token.
     #[error("a token is needed: `Authorization: Bearer …`")]

@@ -112,7 +112,7 @@ pub enum Denied {
     #[error("commands need a lease")]
     NoKey,
     /// The key belongs to no lease.
-    #[error("this key is of no lease, or of one that lapsed long ago")]
+    #[error("this key belongs to no lease, or to a lease that lapsed long ago")]
     Unknown,
     /// Too many clients are registered.
     #[error("too many clients have come for the lease")]

@@ -21,7 +21,7 @@ pub enum OpenError {
         kind: &'static str,
     },
     /// The adapter's protocol does not support the rate.
-    #[error("{url}: no {what} of {rate} bit/s; possible are {possible}")]
+    #[error("{url}: {what} of {rate} bit/s is not supported; possible are {possible}")]
     Rate {
         /// The bus.
         url: String,

@@ -107,7 +107,7 @@ pub enum PutOut {
     )]
     TooMuch,
     /// The lease holder was silent for seconds.
-    #[error("it commanded, and nothing was received from it for some seconds")]
+    #[error("it held the lease, and nothing was received from it for some seconds")]
     Silent,
     /// The client does not read.
     #[error("it has left more than {UNREAD_MAX} bytes unread")]

@@ -21,7 +21,7 @@ pub enum FirmwareError {
         source: io::Error,
     },
     /// The file is not firmware for these boards.
-    #[error("{}: no firmware for a board of this project: {why}", path.display())]
+    #[error("{}: not firmware for a board of this project: {why}", path.display())]
     NoImage {
         /// The file.
         path: PathBuf,
@@ -52,7 +52,7 @@ pub enum FirmwareError {
     },
     /// A file differs from the file of the release.
     #[error(
-        "{}: {bytes} bytes with the SHA-256 {sha256}, and {} with {} were released", path.display(), listed.bytes, listed.sha256
+        "{}: this is not the released file: {bytes} bytes with the SHA-256 {sha256}, expected {} with {}", path.display(), listed.bytes, listed.sha256
     )]
     Damaged {
         /// The file.

@@ -22,7 +22,7 @@ pub enum PoseError {
         length: f64,
     },
     /// A matrix that is not a rotation matrix.
-    #[error("the rotation matrix is none: its axes miss length 1 and right angles by {deviation:.2e}")]
+    #[error("the matrix is not a rotation: its axes miss length 1 and right angles by {deviation:.2e}")]
     NotRotation {
         /// Largest entry of RᵀR − 1, or 2 for a reflection.
         deviation: f64,

@@ -83,7 +83,7 @@ pub enum UpdateFailure {
     #[error("{0}")]
     After(Box<Error>),
     /// The board had dropped out of the group and does not answer. Frames to the group may have erased it.
-    #[error("it may be erased, the group's frames went past it: {0}")]
+    #[error("it may be erased, because frames of the group could reach it: {0}")]
     MayBeErased(Box<Error>),
     /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]

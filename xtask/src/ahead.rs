@@ -20,7 +20,12 @@ impl Ahead {
     /// Begins the builds. The slowest ones come first.
     pub fn begin() -> Self {
         let (sender, receiver) = mpsc::channel();
-        let make = move || shell::in_background(|| drop(make(&receiver)));
+        let make = move || {
+            if let Err(error) = shell::in_background(|| make(&receiver)) {
+                // The steps do the builds themselves, but the run takes longer.
+                println!("-- building ahead ended: {error:#}");
+            }
+        };
         Self { workspace_is_built: Some(sender), making: Some(std::thread::spawn(make)) }
     }
 

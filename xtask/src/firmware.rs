@@ -81,6 +81,7 @@ const FAST: &str = "15000000";
 /// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. This build has
 /// its own directory, so that the two builds do not invalidate each other.
 pub fn build_fast() -> Result<PathBuf> {
+    add_target()?;
     let target = directory().join("fast");
     run(cargo_for(BOARDS[0], "build")?.env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;
     let built = target.join(TARGET).join("release/openjtc-firmware");

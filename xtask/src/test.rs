@@ -59,6 +59,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         // The longest first: most of these checks wait for simulated arms and browsers.
         let all = [web::browser()].into_iter().chain(board).chain(package).chain(references);
         beside::steps(&mut tally, all.collect());
+        emulate::step_alone(&mut tally);
         dist::steps(&mut tally);
     }
     tally.step("the working tree is as it was", || {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::beside::{self, Ended};
+use crate::beside;
 use crate::python;
 use crate::shell::{self, Scratch, root, run};
 use crate::suite;
@@ -53,8 +53,8 @@ pub fn build() -> Result<PathBuf> {
     made.next().context("Maturin left no wheel")
 }
 
-/// Runs the steps of the wheel, and returns the check that tests it.
-pub fn checks<'a>(tally: &mut Tally) -> Vec<beside::Check<'a>> {
+/// The steps of `cargo xtask test`. They run alone: many of these tests watch simulated arms in real time.
+pub fn steps(tally: &mut Tally) {
     let mut wheel = None;
     tally.step("Python package: wheel", || {
         wheel = Some(build()?);
@@ -64,18 +64,10 @@ pub fn checks<'a>(tally: &mut Tally) -> Vec<beside::Check<'a>> {
         let wheel = wheel.as_deref().context("there is no wheel")?;
         fresh(wheel).map(|()| Outcome::Passed)
     });
-    let test = move |wheel: PathBuf| beside::Check {
-        title: "Python package: types and tests".into(),
-        run: Box::new(move |log| tested(&wheel, log).map(Some)),
-        outcome: |ended| {
-            let counts = counted(&ended.output);
-            ensure!(ended.passed || counts.failed > 0, "the tests broke off");
-            ensure!(counts.passed > 0, "no test was run at all");
-            Ok(Outcome::Counted(counts, tally::failures(&ended.output, "FAILURES").to_owned()))
-        },
-        missing: String::new(),
-    };
-    wheel.into_iter().map(test).collect()
+    tally.step("Python package: types and tests", || {
+        let wheel = wheel.as_deref().context("there is no wheel")?;
+        tested(wheel)
+    });
 }
 
 /// Tests the wheel as on a computer with only Python.
@@ -89,7 +81,7 @@ fn fresh(wheel: &Path) -> Result<()> {
 }
 
 /// Checks the types of the installed wheel and runs its tests.
-fn tested(wheel: &Path, log: &Path) -> Result<Ended> {
+fn tested(wheel: &Path) -> Result<Outcome> {
     let python = python::environment(REQUIREMENTS)?;
     run(python::pip_install(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     let programs = suite::programs()?;
@@ -103,12 +95,17 @@ fn tested(wheel: &Path, log: &Path) -> Result<Ended> {
     mypy(&["mypy.stubtest", "openjtc._native"])?;
     let mut tests = shell::command(&python);
     tests
-        .args(["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "-n", "2"])
+        .args(["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "-n", "3"])
         .arg(root().join("crates/openjtc-py/tests"));
     tests.env("JTC", programs.join("jtc")).env("UCOM", programs.join("ucom"));
     tests.env("OPENJTC_ROBOTS", python::robots());
     tests.env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "agg").current_dir(scratch.path());
-    beside::run(&mut tests, log)
+    let ended = beside::run(&mut tests, &scratch.path().join("log"))?;
+    println!("{}\n({:.1} s)", ended.output.trim_end(), ended.seconds);
+    let counts = counted(&ended.output);
+    ensure!(ended.passed || counts.failed > 0, "the tests broke off");
+    ensure!(counts.passed > 0, "no test was run at all");
+    Ok(Outcome::Counted(counts, tally::failures(&ended.output, "FAILURES").to_owned()))
 }
 
 /// Returns the counts in the last line of pytest.

@@ -54,12 +54,12 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         let references = python::checks(&mut tally, scratch.path());
-        let package = package::checks(&mut tally);
         let board = emulate::checks(&mut tally);
         // The longest first: most of these checks wait for simulated arms and browsers.
-        let all = [web::browser()].into_iter().chain(board).chain(package).chain(references);
+        let all = [web::browser()].into_iter().chain(board).chain(references);
         beside::steps(&mut tally, all.collect());
         emulate::step_alone(&mut tally);
+        package::steps(&mut tally);
         dist::steps(&mut tally);
     }
     tally.step("the working tree is as it was", || {

@@ -195,7 +195,7 @@ def test_a_stop_ends_a_run_that_still_reads_its_file(
         # The run reads the pipe from here on.
         with file.open("w") as pipe:
             chain.stop()
-            pipe.write("boards:\n  - board: 1\n    program_id: any\n    par:\n      kp: 1\n")
+            pipe.write("boards:\n  - board: 1\n    flash_number: 0x0021\n    program_id: any\n    par:\n      kp: 1\n")
         thread.join(30)
         assert failed[0].code == "cancelled"
         assert not numbered_bus.started(1)

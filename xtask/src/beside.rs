@@ -82,7 +82,7 @@ pub fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
             tally.step(&check.title, || match ended? {
                 None => Ok(Outcome::Skipped(check.missing)),
                 Some(ended) => {
-                    println!("{}\n({:.1} s, beside others)", ended.output.trim_end(), ended.seconds);
+                    println!("{}\n({:.1} s, in parallel)", ended.output.trim_end(), ended.seconds);
                     (check.outcome)(&ended)
                 }
             });
@@ -90,7 +90,7 @@ pub fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
     );
     match ran {
         Ok(passed_alone) => tally.passed_alone(passed_alone),
-        Err(error) => tally.step("checks beside each other", || Err(error)),
+        Err(error) => tally.step("checks in parallel", || Err(error)),
     }
 }
 

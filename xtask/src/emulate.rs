@@ -28,7 +28,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut tally = Tally::new(None);
     let checks = checks(&mut tally);
     beside::steps(&mut tally, checks);
-    step_alone(&mut tally);
+    steps_alone(&mut tally);
     Ok(tally.finish())
 }
 
@@ -46,26 +46,24 @@ pub fn checks<'a>(tally: &mut Tally) -> Vec<beside::Check<'a>> {
         programs()?;
         suite::programs().map(|_| Outcome::Passed)
     });
-    let check = |title: &str, run: fn(&Path) -> Result<Ended>, outcome| beside::Check {
-        title: title.into(),
-        run: Box::new(move |log| run(log).map(Some)),
-        outcome,
+    vec![beside::Check {
+        title: "board: figures".into(),
+        run: Box::new(|_| figures().map(Some)),
+        outcome: beside::whole,
         missing: String::new(),
-    };
-    vec![
-        check("board: sessions on the emulated chip", sessions, counted),
-        check("board: figures", figures, beside::whole),
-    ]
+    }]
 }
 
-/// Runs the step whose simulated arms need the processors for themselves, because its jogs end after a time.
-pub fn step_alone(tally: &mut Tally) {
-    tally.step("board: arms of other people's robot descriptions", || {
-        let scratch = Scratch::new("board-arms")?;
-        let ended = driving(&scratch.path().join("log"))?;
+/// Runs the steps that need the processors for themselves: sessions and jogs in real time.
+pub fn steps_alone(tally: &mut Tally) {
+    let alone = |run: fn(&Path) -> Result<Ended>| -> Result<Ended> {
+        let scratch = Scratch::new("board")?;
+        let ended = run(&scratch.path().join("log"))?;
         println!("{}", ended.output.trim_end());
-        beside::whole(&ended)
-    });
+        Ok(ended)
+    };
+    tally.step("board: sessions on the emulated chip", || counted(&alone(sessions)?));
+    tally.step("board: arms of other people's robot descriptions", || beside::whole(&alone(driving)?));
 }
 
 /// Unicorn is built from C: cmake, and libclang for its bindings.
@@ -120,8 +118,7 @@ fn lints() -> Result<()> {
 fn sessions(log: &Path) -> Result<Ended> {
     let mut test = cargo(&["test", "--release", "--no-fail-fast"]);
     test.env("OPENJTC_JTC", shell::target().join("release/jtc"));
-    // Nearly all sessions run in virtual time: parallel programs that watch a clock have priority.
-    beside::run(&mut shell::nice(&test, 10), log)
+    beside::run(&mut test, log)
 }
 
 /// Counts the results of cargo's tests.
@@ -144,7 +141,7 @@ fn driving(log: &Path) -> Result<Ended> {
 }
 
 /// Measures, and compares with the stored figures.
-fn figures(_: &Path) -> Result<Ended> {
+fn figures() -> Result<Ended> {
     let start = Instant::now();
     let mut output = measured()?;
     let kept = shell::root().join(FIGURES);

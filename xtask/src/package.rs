@@ -53,7 +53,7 @@ pub fn build() -> Result<PathBuf> {
     made.next().context("Maturin left no wheel")
 }
 
-/// The steps of `cargo xtask test`. They run alone: many of these tests watch simulated arms in real time.
+/// Runs the steps of `cargo xtask test`. No other check runs at the same time: many of these tests watch simulated arms in real time.
 pub fn steps(tally: &mut Tally) {
     let mut wheel = None;
     tally.step("Python package: wheel", || {

@@ -42,7 +42,7 @@ pub fn cargo(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// Lets cargo compile the packages of the workspace with Clippy, which is the compiler with more warnings. One build then makes the
+/// Lets cargo compile the packages of the workspace with Clippy, which is the compiler with more warnings. A single build then makes the
 /// programs and finds what `cargo clippy` finds; that command alone would compile all dependencies once more.
 pub fn lint(cargo: &mut Command) -> Result<&mut Command> {
     let sysroot = read(command("rustc").args(["--print", "sysroot"]))?;

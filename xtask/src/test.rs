@@ -58,7 +58,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         // The longest first: most of these checks wait for simulated arms and browsers.
         let all = [web::browser()].into_iter().chain(board).chain(references);
         beside::steps(&mut tally, all.collect());
-        emulate::step_alone(&mut tally);
+        emulate::steps_alone(&mut tally);
         package::steps(&mut tally);
         dist::steps(&mut tally);
     }

@@ -62,7 +62,7 @@ pub enum PlanError {
     },
     /// The motion takes too long: the points of its trajectory are too far apart for its corners.
     #[error(
-        "the motion takes {seconds:.0} s: its {POINTS_MAX} points would be {step_ms} ms apart, too far to follow its corners"
+        "the motion takes {seconds:.0} s: {POINTS_MAX} points are {step_ms} ms apart then, too far to follow its corners"
     )]
     TooFine {
         /// Duration, s.

@@ -1,14 +1,12 @@
 //! `cargo xtask emulate`: the boards' programs in an emulator of the chip: tests, figures, or a live controller on a serial port.
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use std::time::Instant;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
-use crate::beside::{self, Ended};
-use crate::shell::{self, Scratch, run, works};
+use crate::shell::{self, run, run_lines, works};
 use crate::suite::{self, count_results};
-use crate::tally::{self, Counts, Outcome, Tally};
+use crate::tally::{Counts, Outcome, Tally};
 use crate::{firmware, python, size};
 
 /// Figures of the boards' programs, kept in the repository so that a change to them is a decision.
@@ -22,18 +20,13 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let update = shell::flag(&mut arguments, "--update");
     shell::nothing_left(&arguments)?;
-    if update {
-        write_figures()?;
-    }
     let mut tally = Tally::new(None);
-    let checks = checks(&mut tally);
-    beside::steps(&mut tally, checks);
-    steps_alone(&mut tally);
+    steps(&mut tally, update);
     Ok(tally.finish())
 }
 
-/// Runs the steps of the boards' programs, and returns the checks that run them in the emulator: `cargo xtask test` has them, too.
-pub fn checks<'a>(tally: &mut Tally) -> Vec<beside::Check<'a>> {
+/// Runs the steps, as a part of `cargo xtask test`, too.
+pub fn steps(tally: &mut Tally, update: bool) {
     tally.step("board: lints, every unsafe block explained", || firmware::lints().map(|()| Outcome::Passed));
     tally.step("board: tests of what needs no hardware", firmware::tests);
     tally.step("board: programs, sizes, no panic within reach of the tick", || {
@@ -42,28 +35,9 @@ pub fn checks<'a>(tally: &mut Tally) -> Vec<beside::Check<'a>> {
         }
         Ok(Outcome::Passed)
     });
-    tally.step("board: the emulated chip", || {
-        programs()?;
-        suite::programs().map(|_| Outcome::Passed)
-    });
-    vec![beside::Check {
-        title: "board: figures".into(),
-        run: Box::new(|_| figures().map(Some)),
-        outcome: beside::whole,
-        missing: String::new(),
-    }]
-}
-
-/// Runs the steps that need the processors for themselves: sessions and jogs in real time.
-pub fn steps_alone(tally: &mut Tally) {
-    let alone = |run: fn(&Path) -> Result<Ended>| -> Result<Ended> {
-        let scratch = Scratch::new("board")?;
-        let ended = run(&scratch.path().join("log"))?;
-        println!("{}", ended.output.trim_end());
-        Ok(ended)
-    };
-    tally.step("board: sessions on the emulated chip", || counted(&alone(sessions)?));
-    tally.step("board: arms of other people's robot descriptions", || beside::whole(&alone(driving)?));
+    tally.step("board: sessions on the emulated chip", tests);
+    tally.step("board: arms of other people's robot descriptions", driving);
+    tally.step("board: figures", || figures(update).map(|()| Outcome::Passed));
 }
 
 /// Unicorn is built from C: cmake, and libclang for its bindings.
@@ -114,60 +88,36 @@ fn lints() -> Result<()> {
     run(&mut cargo(&["clippy", "--release", "--all-targets", "--", "-D", "warnings"]))
 }
 
-/// Runs the sessions.
-fn sessions(log: &Path) -> Result<Ended> {
-    let mut test = cargo(&["test", "--release", "--no-fail-fast"]);
-    test.env("OPENJTC_JTC", shell::target().join("release/jtc"));
-    beside::run(&mut test, log)
-}
-
-/// Counts the results of cargo's tests.
-fn counted(ended: &Ended) -> Result<Outcome> {
+fn tests() -> Result<Outcome> {
+    install_tools()?;
+    let jtc = suite::programs()?.join("jtc");
+    firmware::build_fast()?;
+    lints()?;
     let mut counts = Counts::default();
-    ended.output.lines().for_each(|line| count_results(line, &mut counts));
-    ensure!(ended.passed || counts.failed > 0, "the tests broke off");
-    ensure!(counts.passed > 0, "cargo ran no test at all");
-    Ok(Outcome::Counted(counts, tally::failures(&ended.output, "failures:").to_owned()))
+    let mut test = cargo(&["test", "--release", "--no-fail-fast"]);
+    let result = run_lines(test.env("OPENJTC_JTC", jtc), |line| count_results(line, &mut counts));
+    if counts.failed == 0 {
+        result?;
+        ensure!(counts.passed > 0, "cargo ran no test at all");
+    }
+    Ok(Outcome::Counted(counts, String::new()))
 }
 
 /// From a robot description to a motion, on the program that is flashed.
-fn driving(log: &Path) -> Result<Ended> {
+fn driving() -> Result<Outcome> {
+    let jtc = suite::programs()?.join("jtc");
+    run(&mut cargo(&["build", "--release"]))?;
     let emulator = shell::target().join("emulator/release/openjtc-emulate");
     let mut script = shell::command(python::environment("requirements.txt")?);
-    script.arg("references/arms/check_driving.py").arg(shell::target().join("release/jtc"));
+    script.arg("references/arms/check_driving.py").arg(jtc);
     script.arg("--board").arg(emulator).arg(firmware::elf(firmware::BOARDS[0]));
     script.env("OPENJTC_ROBOTS", python::robots());
-    beside::run(script.env("PYTHONDONTWRITEBYTECODE", "1"), log)
+    run(script.env("PYTHONDONTWRITEBYTECODE", "1")).map(|()| Outcome::Passed)
 }
 
-/// Measures, and compares with the stored figures.
-fn figures() -> Result<Ended> {
-    let start = Instant::now();
-    let mut output = measured()?;
-    let kept = shell::root().join(FIGURES);
-    let old = std::fs::read_to_string(&kept).with_context(|| kept.display().to_string())?;
-    let changes = changes(&old, &output);
-    if let Some(changes) = &changes {
-        let help = "if that is meant: cargo xtask emulate --update";
-        output += &format!("the figures are not those of {FIGURES}; {help}\n{changes}");
-    }
-    Ok(Ended { output, passed: changes.is_none(), seconds: start.elapsed().as_secs_f64() })
-}
-
-/// Measures, and stores the figures.
-fn write_figures() -> Result<()> {
+/// Measures, prints, and compares with the stored figures.
+fn figures(update: bool) -> Result<()> {
     install_tools()?;
-    for board in firmware::BOARDS {
-        firmware::build(board)?;
-    }
-    let kept = shell::root().join(FIGURES);
-    std::fs::write(&kept, measured()?).with_context(|| kept.display().to_string())?;
-    println!("written to {FIGURES}");
-    Ok(())
-}
-
-/// Measures the programs of all boards.
-fn measured() -> Result<String> {
     let mut text = String::new();
     for board in firmware::BOARDS {
         text += &format!("{board}\n{}", size::regions(board)?);
@@ -176,14 +126,26 @@ fn measured() -> Result<String> {
         )?;
         text.push('\n');
     }
-    Ok(text)
+    print!("{text}");
+    let kept = shell::root().join(FIGURES);
+    if update {
+        std::fs::write(&kept, &text).with_context(|| kept.display().to_string())?;
+        println!("written to {FIGURES}");
+        return Ok(());
+    }
+    compare(&kept, &text)
 }
 
-/// Returns the lines that differ; `None`: the figures are equal.
-fn changes(old: &str, new: &str) -> Option<String> {
-    let (old, new): (Vec<&str>, Vec<&str>) = (lasting(old).collect(), lasting(new).collect());
-    let differ = || old.iter().zip(&new).filter(|(old, new)| old != new);
-    (old != new).then(|| differ().map(|(old, new)| format!("- {old}\n+ {new}\n")).collect())
+fn compare(kept: &Path, text: &str) -> Result<()> {
+    let old = std::fs::read_to_string(kept).with_context(|| kept.display().to_string())?;
+    let (old, new): (Vec<&str>, Vec<&str>) = (lasting(&old).collect(), lasting(text).collect());
+    if old == new {
+        return Ok(());
+    }
+    for (old, new) in old.iter().zip(&new).filter(|(old, new)| old != new) {
+        println!("- {old}\n+ {new}");
+    }
+    bail!("the figures are not those of {FIGURES}; if that is meant: cargo xtask emulate --update")
 }
 
 /// Returns the lines that are equal in every build. The begin of an interrupt depends on when bytes meet ticks, to the

@@ -54,12 +54,11 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         let references = python::checks(&mut tally, scratch.path());
-        let board = emulate::checks(&mut tally);
         // The longest first: most of these checks wait for simulated arms and browsers.
-        let all = [web::browser()].into_iter().chain(board).chain(references);
+        let all = [web::browser()].into_iter().chain(references);
         beside::steps(&mut tally, all.collect());
-        emulate::steps_alone(&mut tally);
         package::steps(&mut tally);
+        emulate::steps(&mut tally, false);
         dist::steps(&mut tally);
     }
     tally.step("the working tree is as it was", || {

@@ -1,9 +1,7 @@
 //! The command for all tasks of the workspace. `cargo xtask help` lists them.
 #![forbid(unsafe_code)]
 
-mod ahead;
 mod bench;
-mod beside;
 mod book;
 mod deny;
 mod dependencies;
@@ -12,6 +10,8 @@ mod docs;
 mod emulate;
 mod firmware;
 mod links;
+mod parallel;
+mod prebuild;
 // Used by the checks of the board's program.
 mod package;
 mod panics;

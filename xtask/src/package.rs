@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::beside;
+use crate::parallel;
 use crate::python;
 use crate::shell::{self, Scratch, root, run};
 use crate::suite;
@@ -100,7 +100,7 @@ fn tested(wheel: &Path) -> Result<Outcome> {
     tests.env("JTC", programs.join("jtc")).env("UCOM", programs.join("ucom"));
     tests.env("OPENJTC_ROBOTS", python::robots());
     tests.env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "agg").current_dir(scratch.path());
-    let ended = beside::run(&mut tests, &scratch.path().join("log"))?;
+    let ended = parallel::run(&mut tests, &scratch.path().join("log"))?;
     println!("{}\n({:.1} s)", ended.output.trim_end(), ended.seconds);
     let counts = counted(&ended.output);
     ensure!(ended.passed || counts.failed > 0, "the tests broke off");

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::beside::{self, Ended};
+use crate::parallel::{self, Ended};
 use crate::shell::{self, apt_install, command, root, run, works};
 use crate::suite;
 use crate::tally::{Outcome, Tally};
@@ -99,7 +99,7 @@ static CHECKS: [Check; 24] = [
 ];
 
 /// Runs the steps before the references, and returns a check for each reference; `demo` is the folder of the demo's files.
-pub fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<beside::Check<'a>> {
+pub fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<parallel::Check<'a>> {
     let mut python = None;
     tally.step("Python environment of the references", || {
         python = Some(environment("requirements.txt")?);
@@ -128,10 +128,10 @@ pub fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<beside::Check<'a>> {
     };
     let check = |check: &'static Check| {
         let python = python.clone();
-        beside::Check {
+        parallel::Check {
             title: format!("references/{}", check.script),
             run: Box::new(move |log| check.run((&python, demo), log)),
-            outcome: beside::whole,
+            outcome: parallel::whole,
             missing: "the demo left no file for it".into(),
         }
     };
@@ -151,6 +151,6 @@ impl Check {
         script.args(self.demo_files.iter().map(|name| demo.join(name)));
         script.env("JTC_EXAMPLES", release.join("examples")).env("OPENJTC_ROBOTS", robots());
         script.env("PYTHONDONTWRITEBYTECODE", "1");
-        beside::run(&mut script, log).map(Some)
+        parallel::run(&mut script, log).map(Some)
     }
 }

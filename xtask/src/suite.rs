@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
-use crate::beside::{self, Ended};
+use crate::parallel::{self, Ended};
 use crate::shell::{self, cargo, run_lines};
 use crate::tally::{self, Counts, Outcome};
 
@@ -176,9 +176,9 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
         if program.package.file_name().is_some_and(|name| name.to_string_lossy().starts_with("ucom")) {
             command.env("RUST_TEST_THREADS", &threads);
         }
-        beside::run(&mut command, log)
+        parallel::run(&mut command, log)
     };
-    let passed_alone = beside::beside(programs, run, ended)?;
+    let passed_alone = parallel::run_all(programs, run, ended)?;
     counts.passed_alone += passed_alone;
     Ok(failures)
 }

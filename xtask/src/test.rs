@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
-use crate::ahead::Ahead;
+use crate::prebuild::Prebuild;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
 use crate::{
-    beside, book, deny, dependencies, dist, emulate, firmware, links, package, plain_words, python, rules,
+    book, deny, dependencies, dist, emulate, firmware, links, package, parallel, plain_words, python, rules,
     size, suite, test_files, web, worked_bytes,
 };
 
@@ -26,8 +26,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     shell::nothing_left(&arguments)?;
 
     let before = tree();
-    let ahead = (!quick && only.is_none()).then(Ahead::begin);
-    let built = || ahead.iter().for_each(Ahead::workspace_is_built);
+    let prebuild = (!quick && only.is_none()).then(Prebuild::begin);
+    let built = || prebuild.iter().for_each(Prebuild::workspace_is_built);
     let mut tally = Tally::new(only);
     tally.step("formatting", || passed(run(&mut cargo(&["fmt", "--all", "--", "--check"]))));
     tally.step("every rule has a test that names it", || passed(rules::check()));
@@ -49,14 +49,14 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
         });
         // From here on they are run.
-        drop(ahead);
+        drop(prebuild);
         tally.step("book: made, every link leads somewhere", || passed(book::made()));
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         let references = python::checks(&mut tally, scratch.path());
         // The longest first: most of these checks wait for simulated arms and browsers.
         let all = [web::browser()].into_iter().chain(references);
-        beside::steps(&mut tally, all.collect());
+        parallel::steps(&mut tally, all.collect());
         package::steps(&mut tally);
         emulate::steps(&mut tally, false);
         dist::steps(&mut tally);

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::beside::{self, Ended};
+use crate::parallel::{self, Ended};
 use crate::python;
 use crate::shell::{self, Scratch, run};
 use crate::tally::{self, Counts, Outcome, Tally};
@@ -44,7 +44,7 @@ pub fn steps(tally: &mut Tally) {
         run(command("npm")?.args(["run", "--silent", "check"]))?;
         let scratch = Scratch::new("web")?;
         let mut test = command("npm")?;
-        let ended = beside::run(test.args(["run", "--silent", "test"]), &scratch.path().join("log"))?;
+        let ended = parallel::run(test.args(["run", "--silent", "test"]), &scratch.path().join("log"))?;
         println!("{}", ended.output.trim_end());
         counted(&ended)
     });
@@ -98,8 +98,8 @@ pub fn install_browser() -> Result<()> {
 }
 
 /// Returns the check that uses the dashboard in a browser.
-pub fn browser<'a>() -> beside::Check<'a> {
-    beside::Check {
+pub fn browser<'a>() -> parallel::Check<'a> {
+    parallel::Check {
         title: "dashboard: used in a browser".into(),
         run: Box::new(use_in_browser),
         outcome: counted,
@@ -118,7 +118,7 @@ fn use_in_browser(log: &Path) -> Result<Option<Ended>> {
     npm.args(["run", "--silent", "e2e"]);
     npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
     // The browser draws 3D without hardware support, so parallel programs that depend on the time get priority.
-    beside::run(&mut shell::nice(&npm, 5), log).map(Some)
+    parallel::run(&mut shell::nice(&npm, 5), log).map(Some)
 }
 
 /// Returns the counts of Node's own test runner.

@@ -10,7 +10,7 @@ use tokio::time::{Instant, MissedTickBehavior};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::api::Problem;
-use crate::journal::{Entry, Excerpt, Happening, Journal};
+use crate::journal::{Entry, Excerpt, Journal, JournalEvent};
 use crate::socket::{ended, pass};
 
 /// Longest wait of a request for an event, in seconds.
@@ -97,7 +97,7 @@ impl Events {
     /// # Errors
     ///
     /// The requested wait is longer than allowed.
-    pub async fn ask<E: Happening>(
+    pub async fn ask<E: JournalEvent>(
         &self,
         journal: &Journal<E>,
         request: EventsRequest,
@@ -126,7 +126,7 @@ impl Events {
     /// Sends events on a socket as they occur, and the messages that `show` returns. `show` also returns the time of
     /// its next call; it is called earlier if `changes` announces a change. Ends when the client disconnects, does
     /// not read, or sends a message that is not expected.
-    pub async fn stream<E: Happening + Serialize, M: Serialize>(
+    pub async fn stream<E: JournalEvent + Serialize, M: Serialize>(
         &self,
         (journal, request): (&Journal<E>, StreamRequest),
         mut socket: WebSocket,

@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 const KEPT: usize = 4096;
 
 /// Event of a journal.
-pub trait Happening: Clone {
+pub trait JournalEvent: Clone {
     /// Returns the job that the event belongs to.
     fn job(&self) -> Option<u64>;
 }
@@ -59,7 +59,7 @@ impl<E> Default for Journal<E> {
     }
 }
 
-impl<E: Happening> Journal<E> {
+impl<E: JournalEvent> Journal<E> {
     /// Sets the callback for each further event; it runs in the thread that writes the event. Only the first call has
     /// an effect.
     pub fn follow(&self, follower: impl Fn(&E) + Send + Sync + 'static) {
@@ -114,7 +114,7 @@ mod tests {
     #[derive(Clone)]
     struct Note(u64);
 
-    impl Happening for Note {
+    impl JournalEvent for Note {
         fn job(&self) -> Option<u64> {
             Some(self.0)
         }

@@ -16,7 +16,7 @@ mod signal;
 mod size;
 mod stdout;
 #[cfg(feature = "trial")]
-pub mod trial;
+pub mod testing;
 pub mod usage;
 pub mod variables;
 pub mod view;

@@ -137,7 +137,7 @@ impl Line {
     }
 
     /// Returns the name of the lease holder.
-    pub fn commander(&self) -> Option<String> {
+    pub fn http_session(&self) -> Option<String> {
         self.with(|line, _| line.introduction(line.lease()?.holder).map(|client| client.name.clone()))
     }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use jtc_agent::jobs::{Jobs, Stage, Store};
-use jtc_agent::line::Class;
+use jtc_agent::line::FrameClass;
 use jtc_agent::log::{CommandLog, LIMIT};
 use jtc_agent::modbus::codes::{Command, Outcome};
 use jtc_agent::modbus::map::holding;
@@ -31,7 +31,7 @@ struct Cell {
     _server: Server,
     address: SocketAddr,
     /// Frames that change something.
-    sent: Arc<Mutex<Vec<Class>>>,
+    sent: Arc<Mutex<Vec<FrameClass>>>,
 }
 
 impl Cell {
@@ -43,7 +43,7 @@ impl Cell {
     fn with_faults(allowed: &[&str], faults: Vec<Fault>) -> Self {
         let arm = Arm::avena();
         let config = SimConfig { baud: Some(921_600), ..SimConfig::new(arm.config(), &arm.parameters()) };
-        let sent: Arc<Mutex<Vec<Class>>> = Arc::default();
+        let sent: Arc<Mutex<Vec<FrameClass>>> = Arc::default();
         let seen = sent.clone();
         let observer = Box::new(move |_, event: &LineEvent| {
             if let LineEvent::Sent { class, .. } = event {

@@ -421,7 +421,7 @@ mod tests {
     #[test]
     fn the_command_line_is_sound_and_has_an_example_for_each_command() {
         Cli::command().debug_assert();
-        cli_kit::trial::check_help_is_wrapped_once(&Cli::command());
+        cli_kit::testing::check_help_is_wrapped_once(&Cli::command());
         fn walk(command: &clap::Command, path: &str) {
             for sub in command.get_subcommands() {
                 let path = format!("{path} {}", sub.get_name());

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use cli_kit::{Failure, Output};
 use jtc_host::port::Port;
 use jtc_host::sample::is_measured;
-use jtc_host::{Session, session, words};
+use jtc_host::{Session, labels, session};
 use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 use serde_json::{Value, json};
 
@@ -63,7 +63,7 @@ impl Progress {
     /// the arm moves or may be moved, measured values are reported at a limited rate.
     pub fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);
-        let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": words::causes(s) });
+        let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": labels::causes(s) });
         match self.0.reported.replace(Some(now)) {
             None => {
                 let mut value = self.0.link.borrow().clone();

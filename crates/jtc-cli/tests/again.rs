@@ -63,7 +63,7 @@ fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     let sim = Sim::start(&["--no-throttle"]).held();
     let (file, record) = (sim.file("motion.csv", &slow_motion(50)), sim.path("part.csv"));
     let run = moving_while(&sim, &["traj", "run", &file, "--record", &record], 1.5);
-    cli_kit::trial::signal(&run, "-INT");
+    cli_kit::testing::signal(&run, "-INT");
     run.wait_with_output().unwrap();
     let refused = sim.jtc(&["traj", "replay", &record, "--approach"]).ends(4);
     assert!(refused.err.contains(" --measured` the part that was measured"), "{}", refused.err);
@@ -99,7 +99,7 @@ fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
         sim.file("arm.toml", include_str!("../../../arms/avena.toml")),
     );
     let mut run = moving_while(&sim, &["traj", "run", &file], 0.1);
-    cli_kit::trial::signal(&run, "-KILL");
+    cli_kit::testing::signal(&run, "-KILL");
     run.wait().unwrap();
     let refused = sim.jtc(&["pose", "save", "there", "--arm", &arm]).ends(4);
     assert!(refused.err.contains("the arm is on the path of a trajectory"), "{}", refused.err);
@@ -154,7 +154,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     for (record, signal) in [("stopped.mcap", "-INT"), ("killed.mcap", "-KILL")] {
         let record = sim.path(record);
         let mut child = moving(&sim, &file, &record);
-        cli_kit::trial::signal(&child, signal);
+        cli_kit::testing::signal(&child, signal);
         child.wait().unwrap();
         if signal == "-KILL" {
             sim.jtc(&["traj", "stop"]).ends(0);
@@ -176,7 +176,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     // A trajectory at another speed has other points, so it does not match the recording.
     let half = sim.path("half.csv");
     let mut child = moving_with(&sim, &[&file, "--speed", "80", "--record", &half]);
-    cli_kit::trial::signal(&child, "-INT");
+    cli_kit::testing::signal(&child, "-INT");
     child.wait().unwrap();
     let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
     assert!(output.err.contains("at another speed"), "{}", output.err);
@@ -222,12 +222,12 @@ fn the_runs_that_are_left_are_run() {
     let (file, run, rest) = (sim.file("motion.csv", &slow_motion(20)), path("run.mcap"), path("rest.mcap"));
     let words = ["traj", "run", &file, "--repeat", "3", "--record", &run];
     let child = moving_after(&sim, &words, "run 1 of 3 finished", 0.7);
-    cli_kit::trial::signal(&child, "-INT");
+    cli_kit::testing::signal(&child, "-INT");
     child.wait_with_output().unwrap();
     // Interrupts the command again, in the last run.
     let words = ["traj", "continue", &run, "--record", &rest];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
-    cli_kit::trial::signal(&child, "-KILL");
+    cli_kit::testing::signal(&child, "-KILL");
     child.wait_with_output().unwrap();
     std::thread::sleep(std::time::Duration::from_secs(3));
     let output = sim.jtc(&["traj", "continue", &rest]).ends(4);
@@ -247,7 +247,7 @@ fn the_runs_that_are_left_are_run() {
     let csv = path("run.csv");
     let words = ["traj", "run", &file, "--repeat", "2", "--record", &csv];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
-    cli_kit::trial::signal(&child, "-INT");
+    cli_kit::testing::signal(&child, "-INT");
     child.wait_with_output().unwrap();
     let output = sim.jtc(&["--json", "traj", "continue", &csv, "--trajectory", &file]).ends(0);
     assert!(output.err.contains("does not hold how often"), "{}", output.err);

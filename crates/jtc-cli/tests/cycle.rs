@@ -152,7 +152,7 @@ fn broken_off() {
         done(&desk, "jtc move --to 0,0,0,0,0,0 --speed 100");
         let in_motion = |jtc: &std::process::Child, _: &Sim| {
             std::thread::sleep(std::time::Duration::from_millis(1500));
-            cli_kit::trial::signal(jtc, "-INT");
+            cli_kit::testing::signal(jtc, "-INT");
         };
         desk.moving(&run, in_motion).blurred()
     });

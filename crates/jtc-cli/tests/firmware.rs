@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use cli_kit::trial::{CommandOutput, run};
+use cli_kit::testing::{CommandOutput, run};
 use common::{Dir, Sim, command};
 use serde_json::Value;
 
@@ -186,7 +186,7 @@ fn a_controller_that_holds_its_arm_or_is_another_one_is_not_reset() {
 mod with_a_board {
     use std::time::Duration;
 
-    use cli_kit::trial::Terminal;
+    use cli_kit::testing::Terminal;
     use common::agent::Agent;
     use jtc_wire::ControllerState;
 

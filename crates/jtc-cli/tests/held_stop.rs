@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 use std::process::Stdio;
 use std::time::Duration;
 
-use cli_kit::trial::run;
+use cli_kit::testing::run;
 use serde_json::Value;
 use test_kit::http::Http;
 use test_kit::patience::Patience;

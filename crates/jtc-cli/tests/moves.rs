@@ -338,7 +338,7 @@ fn ur5() -> String {
 fn j33_a_move_is_stopped_on_its_path() {
     let sim = Sim::start(&["--no-throttle"]).held();
     let child = moving_while(&sim, &["move", "--to", "1.5,0,0,0,0,0", "--speed", "30"], 0.6);
-    cli_kit::trial::signal(&child, "-INT");
+    cli_kit::testing::signal(&child, "-INT");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(5));
     let value: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -31,7 +31,7 @@ fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
         assert!(!error["message"].as_str().unwrap().is_empty(), "{error}");
     }
     let by_variable = common::command().env("JTC_JSON", "1").args(["traj", "rum"]).output().unwrap();
-    assert!(String::from_utf8_lossy(&by_variable.stdout).contains("unrecognized subcommand 'rum'"));
+    assert!(String::from_utf8_lossy(&by_variable.stdout).contains("unrecognised subcommand 'rum'"));
     assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
 }
 
@@ -246,7 +246,7 @@ fn a_result_that_cannot_be_printed_is_an_error() {
             .stderr(std::process::Stdio::piped());
         let mut child = child.spawn().unwrap();
         std::io::Write::write_all(&mut child.stdin.take().unwrap(), b"0 0 0 0 0 0\n").ok();
-        let output = cli_kit::trial::ended(child);
+        let output = cli_kit::testing::ended(child);
         assert_eq!(output.code, 2, "{words:?}");
         assert!(output.err.contains("No space left"), "{words:?}: {}", output.err);
     }

@@ -76,7 +76,7 @@ impl Session {
     }
 
     fn signal(&self, signal: &str) {
-        cli_kit::trial::signal(&self.child, signal);
+        cli_kit::testing::signal(&self.child, signal);
     }
 
     /// Waits until it has printed `words`.
@@ -222,7 +222,7 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
         .unwrap();
     let mut err = BufReader::new(child.stderr.take().unwrap());
     until(&mut err, at);
-    cli_kit::trial::signal(&child, "-INT");
+    cli_kit::testing::signal(&child, "-INT");
     // From here on stderr is not read. A full pipe must not block the command.
     let mut out = String::new();
     child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
@@ -289,8 +289,8 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
         .unwrap();
     let mut err = BufReader::new(child.stderr.take().unwrap());
     until(&mut err, "moving");
-    cli_kit::trial::signal(&child, "-INT");
-    let output = cli_kit::trial::ended(child).ends(5);
+    cli_kit::testing::signal(&child, "-INT");
+    let output = cli_kit::testing::ended(child).ends(5);
     let value = output.json();
     assert_eq!(
         (value["outcome"].as_str(), value["phase"].as_str()),

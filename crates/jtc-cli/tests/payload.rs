@@ -132,7 +132,7 @@ fn j60_a_paused_motion_goes_on_with_another_payload_only_if_it_can() {
     let sim = Sim::start(&["--no-throttle"]).held();
     let (far, other) = (sim.file("far.csv", &stretched()), sim.file("bent.csv", BENT));
     let mut run = moving_while(&sim, &["traj", "run", &far], 0.4);
-    cli_kit::trial::signal(&run, "-KILL");
+    cli_kit::testing::signal(&run, "-KILL");
     run.wait().unwrap();
     sim.jtc(&["traj", "pause"]).ends(0);
     std::thread::sleep(std::time::Duration::from_millis(1000));

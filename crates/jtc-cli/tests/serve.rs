@@ -6,7 +6,7 @@ use crate::common;
 use std::io::{BufRead as _, BufReader};
 use std::process::{Command, Stdio};
 
-use cli_kit::trial::{Terminal, run, signal};
+use cli_kit::testing::{Terminal, run, signal};
 use common::Sim;
 use common::agent::{self, Agent, command_in};
 use serde_json::Value;

@@ -6,7 +6,7 @@ use crate::common;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use cli_kit::trial::run;
+use cli_kit::testing::run;
 use common::agent::{Agent, command_in};
 use jtc_host::recording::Recording;
 use serde_json::Value;

@@ -9,7 +9,7 @@ use std::os::unix::fs::FileTypeExt as _;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use cli_kit::trial::{CommandOutput, run, signal};
+use cli_kit::testing::{CommandOutput, run, signal};
 use common::{Sim, command, jtc, motion, place, slow_motion};
 use jtc_host::port::SerialPort;
 use jtc_host::session::Flow;

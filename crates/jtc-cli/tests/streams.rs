@@ -6,7 +6,7 @@ use crate::common;
 use std::io::Write;
 use std::process::Stdio;
 
-use cli_kit::trial::CommandOutput;
+use cli_kit::testing::CommandOutput;
 use common::{Sim, jtc, motion};
 use serde_json::Value;
 use test_kit::patience::until;
@@ -131,7 +131,7 @@ fn j33_a_reader_that_does_not_read_holds_no_run() {
     until("25 lines of the recording", || {
         std::fs::read_to_string(&recording).is_ok_and(|text| text.lines().count() > 25)
     });
-    cli_kit::trial::signal(&run, "-INT");
+    cli_kit::testing::signal(&run, "-INT");
     until("its end", || run.try_wait().unwrap().is_some());
     drop(reader);
     let output = run.wait_with_output().unwrap();

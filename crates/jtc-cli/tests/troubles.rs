@@ -111,7 +111,7 @@ fn moving(page: &mut Page) {
     );
     page.case_of_a_moment("Ctrl-C", run, || {
         let desk = ready(&[]);
-        desk.moving(run, |jtc, _| cli_kit::trial::signal(jtc, "-INT")).blurred()
+        desk.moving(run, |jtc, _| cli_kit::testing::signal(jtc, "-INT")).blurred()
     });
     page.case_of_a_moment("The cable is pulled", run, || {
         let desk = ready(&[]);

@@ -4,7 +4,7 @@
 
 use crate::common;
 
-use cli_kit::trial::{CommandOutput, run};
+use cli_kit::testing::{CommandOutput, run};
 use common::{Dir, Sim, command, jtc};
 
 /// Runs `jtc` with one more variable.

@@ -6,7 +6,7 @@ use crate::common;
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
-use cli_kit::trial::{Terminal, signal};
+use cli_kit::testing::{Terminal, signal};
 use common::{Sim, motion, slow_motion};
 
 /// Starts a slow motion that continues after its command has ended.

@@ -5,10 +5,10 @@
 //! commanded, which stops every load that it can hold. Meanwhile the set position *sags* towards the joint, by as much as the computed
 //! torque exceeds the limit. So the joint comes to rest at the position at which the limit has stopped it. If it were held at its old
 //! position instead, the joint would be thrown upwards and fall again; with little friction this would never end.
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::deceleration::moves;
 use crate::limits::JointConfig;
-use crate::remembered::remembered;
 
 /// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. This time is longer than the
 /// reversal of a swing.
@@ -35,7 +35,7 @@ pub(crate) struct Catch {
     grew: bool,
 }
 
-remembered!(Catch { left_ms, busy_ms, settled, sag, peak, peak_before, grew });
+bit_codec!(Catch { left_ms, busy_ms, settled, sag, peak, peak_before, grew });
 
 impl Catch {
     /// Begins the catch of a joint that was just enabled.

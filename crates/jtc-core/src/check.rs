@@ -16,11 +16,11 @@ mod tests;
 
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
 
+use crate::bit_codec::{BitCodec, BitSink, BitSource, bit_codec};
 use crate::config::Config;
 use crate::friction;
 use crate::interpolation::{SetPoint, interpolate};
 use crate::parameters::TableOf;
-use crate::remembered::{BitSink, BitSource, Remembered, remembered};
 use crate::{JOINTS, joint_error};
 use curve::{Leaves, bound_crossed, leaves};
 pub use range::PathRange;
@@ -70,7 +70,7 @@ impl Quantity {
     ];
 }
 
-impl Remembered for Quantity {
+impl BitCodec for Quantity {
     fn write<S: BitSink>(&self, to: &mut S) {
         to.put(*self as u32, 3);
     }
@@ -100,7 +100,7 @@ pub struct Violation {
     pub limit: f64,
 }
 
-remembered!(Violation { point, fraction, joint, quantity, value, limit });
+bit_codec!(Violation { point, fraction, joint, quantity, value, limit });
 
 /// Bounds of one joint.
 #[derive(Clone, Copy, Debug)]
@@ -134,7 +134,7 @@ pub(crate) struct Passed {
     coming_in: [bool; JOINTS],
 }
 
-remembered!(Passed { speeds, coming_in });
+bit_codec!(Passed { speeds, coming_in });
 
 impl Violation {
     /// Returns the error that this violation would cause in motion (J-43), as a bit of [`crate::joint_error`].

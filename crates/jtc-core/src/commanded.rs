@@ -4,9 +4,9 @@
 //! measurement acts even later. The *due* position is the position that was commanded this *delay* ([`Config::delay_ticks`](crate::Config))
 //! ago; a joint that follows exactly would measure it now. The difference between the measured and the due position is therefore an error
 //! of the joint. This difference does not contain the distance that the joint has moved meanwhile.
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::SetPoint;
-use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Number of stored set values: a power of two, so that an index needs no comparison.
@@ -23,7 +23,7 @@ pub(crate) struct Commanded {
     now: u8,
 }
 
-remembered!(Commanded { position, velocity, now });
+bit_codec!(Commanded { position, velocity, now });
 
 impl Commanded {
     /// Age of the oldest stored set values, ticks.

@@ -7,18 +7,18 @@ use crate::errors::Errors;
 use crate::execution::phase::Phase;
 use crate::extension::Extensions;
 use crate::held_stop::LastStop;
-use crate::host::overtaking::Overtaking;
+use crate::host::priority::Priority;
 use crate::host::slices::SliceProgress;
 use crate::host::upload::LineUpload;
-use crate::late::LateTicks;
+use crate::host_parameters::HostParameters;
 use crate::motion::Motion;
 use crate::nodes::{Goal, Nodes};
 use crate::path::PathClock;
-use crate::received::ReceivedParameters;
 use crate::response_queue::{HOST_LINES, ResponseQueues};
 use crate::states::{Conditions, next_state};
 use crate::store::Store;
 use crate::telemetry::Observed;
+use crate::tick_overruns::TickOverruns;
 use crate::{ControllerState, TrajectoryState};
 
 /// The joint trajectory controller. `M` is the memory for the trajectory: [`crate::POINTS_MAX`] points.
@@ -32,7 +32,7 @@ pub struct Controller<M> {
     pub(crate) errors: Errors,
     pub(crate) nodes: Nodes,
     // Received from the host.
-    pub(crate) parameters: ReceivedParameters,
+    pub(crate) parameters: HostParameters,
     pub(crate) teaching: bool,
     /// Milliseconds for which teaching has waited until the arm is held.
     pub(crate) teaching_waits_ms: u32,
@@ -53,11 +53,11 @@ pub struct Controller<M> {
     pub(crate) last_stop: LastStop,
     // The link to the host.
     pub(crate) slice_progress: SliceProgress,
-    pub(crate) overtaking: [Overtaking; HOST_LINES],
+    pub(crate) overtaking: [Priority; HOST_LINES],
     pub(crate) uploads: [LineUpload; HOST_LINES],
     pub(crate) records: ResponseQueues,
     pub(crate) since_status_ms: u16,
-    pub(crate) late_ticks: LateTicks,
+    pub(crate) tick_overruns: TickOverruns,
     pub(crate) status_frame: [u8; STATUS_LEN],
     pub(crate) observed: Observed,
     pub(crate) extensions: Extensions,
@@ -70,7 +70,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             state: ControllerState::Start,
             errors: Errors::default(),
             nodes: Nodes::new(&config),
-            parameters: ReceivedParameters::new(&config),
+            parameters: HostParameters::new(&config),
             teaching: false,
             teaching_waits_ms: 0,
             pump: false,
@@ -85,11 +85,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             motion: Motion::default(),
             last_stop: LastStop::default(),
             slice_progress: SliceProgress::Begin,
-            overtaking: [Overtaking::default(); HOST_LINES],
+            overtaking: [Priority::default(); HOST_LINES],
             uploads: [LineUpload::default(); HOST_LINES],
             records: ResponseQueues::new(),
             since_status_ms: 0,
-            late_ticks: LateTicks::default(),
+            tick_overruns: TickOverruns::default(),
             status_frame: [0; STATUS_LEN],
             observed: Observed::default(),
             extensions: Extensions::new(),

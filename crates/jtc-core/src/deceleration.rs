@@ -1,10 +1,10 @@
 //! Deceleration to rest of a joint that still moves when position hold begins, because a hand was leading it, or because it sagged or fell
 //! while it was enabled (J-16, J-25).
 use crate::DT;
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
-use crate::remembered::remembered;
 
 /// Highest speed at which a joint is considered at rest, rad/s.
 const STANDING: f64 = 0.02;
@@ -33,7 +33,7 @@ pub(crate) struct Deceleration {
     falls: bool,
 }
 
-remembered!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
+bit_codec!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
     /// Creates the deceleration of a joint that a hand leads, from a measured position (rad) and velocity (rad/s), within `length_ms`. The

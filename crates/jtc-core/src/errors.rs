@@ -1,5 +1,5 @@
 //! Errors latch (J-21). This module stores the errors that have occurred, and the errors that hold the controller in Error.
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 use crate::{JOINTS, error};
 
 /// Latched and occurred errors.
@@ -24,7 +24,7 @@ pub(crate) struct Errors {
     occurred: u16,
 }
 
-remembered!(Errors {
+bit_codec!(Errors {
     emergency_input,
     device,
     external_joints,

@@ -7,11 +7,11 @@ use core::f64::consts::TAU;
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::StopKind;
 
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
 use crate::parameters::PidGains;
-use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
@@ -80,7 +80,7 @@ pub(crate) struct FeltInertia {
     joints: [f64; JOINTS],
 }
 
-remembered!(FeltInertia { joints });
+bit_codec!(FeltInertia { joints });
 
 impl FeltInertia {
     /// Start value before the first pose.
@@ -155,8 +155,8 @@ pub(crate) struct Trial {
     again_ms: u16,
 }
 
-remembered!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
-remembered!(PidGains { kp, ki, kd, int_min, int_max });
+bit_codec!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
+bit_codec!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
     /// Begins a trial: a host sent the gains `given` under torque, in place of `before`.

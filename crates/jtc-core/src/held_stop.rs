@@ -1,9 +1,9 @@
 //! Held stops (J-69): moving joints come to rest, the arm is held, and the cause is kept for the host.
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, Reactions, StopCause, StopKind};
 
+use crate::bit_codec::bit_codec;
 use crate::controller::Controller;
 use crate::motion::RUSH;
-use crate::remembered::remembered;
 use crate::teach::too_fast;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
@@ -15,8 +15,8 @@ pub(crate) struct LastStop {
     tick: u64,
 }
 
-remembered!(StopCause { kind, joint, value, limit });
-remembered!(LastStop { cause, tick });
+bit_codec!(StopCause { kind, joint, value, limit });
+bit_codec!(LastStop { cause, tick });
 
 /// Returns this `error` for each joint of a mask.
 fn errors_of(joints: u8, error: u16) -> [u16; JOINTS] {

@@ -5,8 +5,8 @@
 //! at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its rate when no joint is at its
 //! limit any more.
 use crate::JOINTS;
+use crate::bit_codec::bit_codec;
 use crate::path::PathClock;
-use crate::remembered::remembered;
 
 /// Time for which the inertia of the arm is assumed to be constant, ms.
 const INERTIA_MS: u16 = 60;
@@ -40,7 +40,7 @@ pub(crate) struct HoldBack {
     pressed: u8,
 }
 
-remembered!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_ms, run_ms, pressed });
+bit_codec!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_ms, run_ms, pressed });
 
 /// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

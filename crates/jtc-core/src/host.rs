@@ -1,5 +1,5 @@
 //! The host's commands: executed in bounded slices, with one response record each (J-04, J-06).
-pub(crate) mod overtaking;
+pub(crate) mod priority;
 pub(crate) mod slices;
 pub(crate) mod upload;
 
@@ -14,12 +14,12 @@ use crate::defaults;
 use crate::errors::Errors;
 use crate::friction::celsius;
 use crate::held_stop::LastStop;
+use crate::host_parameters::{HostParameters, read_pid};
 use crate::io::{HostEvent, Inputs};
 use crate::nodes::GRIPPER;
 use crate::parameters::PidGains;
-use crate::received::{ReceivedParameters, read_pid};
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
-use overtaking::Overtaking;
+use priority::Priority;
 use slices::{SliceOutcome, SliceProgress};
 use upload::LineUpload;
 
@@ -85,7 +85,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let Some(overtaking) = self.overtaking.get_mut(received.line) else { return Served::Quickly };
         let mut plain = received.plain;
         if !received.overtaken {
-            *overtaking = Overtaking::default();
+            *overtaking = Priority::default();
         }
         let (response, noise, served) = match received.event {
             LinkEvent::Bad(response) => (response, false, Served::Quickly),
@@ -287,12 +287,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Takes a model in slices. `taken` passes a slice to the parameters.
     fn take_model(
         &mut self,
-        taken: impl FnOnce(
-            &mut ReceivedParameters,
-            SliceProgress,
-            Option<&[f64; JOINTS]>,
-            &Config,
-        ) -> SliceOutcome,
+        taken: impl FnOnce(&mut HostParameters, SliceProgress, Option<&[f64; JOINTS]>, &Config) -> SliceOutcome,
     ) -> SliceOutcome {
         let at = self.nodes.known_positions();
         let outcome = taken(&mut self.parameters, self.slice_progress, at, &self.config);

@@ -7,7 +7,7 @@ use core::array::from_fn;
 
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
 
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 use crate::{DT, JOINTS};
 
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of every joint.
@@ -21,7 +21,7 @@ pub struct SetPoint {
     pub acceleration: [f64; JOINTS],
 }
 
-remembered!(SetPoint { position, velocity, acceleration });
+bit_codec!(SetPoint { position, velocity, acceleration });
 
 impl SetPoint {
     /// Returns a standstill at `position`.

@@ -3,11 +3,11 @@
 //! so that all joints stop as quickly as on a path (J-33).
 use jtc_dynamics::sqrt;
 
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::SetPoint;
 use crate::limits::JointConfig;
 use crate::path::PathClock;
-use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Time without a new command after which the joints come to rest, ticks.
@@ -49,8 +49,8 @@ pub(crate) struct Jog {
     clock: PathClock,
 }
 
-remembered!(JointJog { wanted, most, velocity, acceleration });
-remembered!(Jog { joints, silent_ms, clock });
+bit_codec!(JointJog { wanted, most, velocity, acceleration });
+bit_codec!(Jog { joints, silent_ms, clock });
 
 impl Jog {
     /// Creates a jog that begins at rest.

@@ -2,6 +2,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod bit_codec;
 mod bounds;
 mod catch;
 pub mod check;
@@ -11,7 +12,7 @@ mod controller;
 mod deceleration;
 mod defaults;
 #[cfg(test)]
-mod drawn;
+mod docs_check;
 mod errors;
 mod execution;
 mod extension;
@@ -20,10 +21,10 @@ mod gains;
 mod held_stop;
 mod hold_back;
 mod host;
+mod host_parameters;
 mod interpolation;
 mod io;
 mod jog;
-mod late;
 mod limits;
 mod load;
 mod motion;
@@ -34,9 +35,7 @@ mod path;
 mod payload;
 mod pid;
 mod reaction;
-mod received;
 pub mod recorder;
-mod remembered;
 mod report;
 mod response_queue;
 mod safety_input;
@@ -48,6 +47,7 @@ mod store;
 mod teach;
 mod telemetry;
 mod tick;
+mod tick_overruns;
 mod yielding;
 
 pub use bounds::{OutOfBounds, ParameterBounds};

@@ -1,7 +1,7 @@
 //! Limits of a joint (J-43), and its other settings.
+use crate::bit_codec::bit_codec;
 use crate::interpolation::ROUNDING;
 use crate::joint_error;
-use crate::remembered::remembered;
 
 /// Settings of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,7 @@ pub(crate) struct Recent {
     count: u16,
 }
 
-remembered!(Recent { history, count });
+bit_codec!(Recent { history, count });
 
 impl Recent {
     /// Adds a tick to the window. `has`: the tick has the property. Returns `true` if it has, and more than `most` of the last 100 ticks
@@ -77,7 +77,7 @@ pub(crate) struct Saturation {
     over: Recent,
 }
 
-remembered!(Saturation { saturated, over });
+bit_codec!(Saturation { saturated, over });
 
 impl Saturation {
     /// Returns the torque to command, within its limit, and `true` if the joint is overloaded: the computed torque was above the limit,
@@ -119,7 +119,7 @@ pub(crate) struct Turns {
     upper: bool,
 }
 
-remembered!(Turns { at, count, upper });
+bit_codec!(Turns { at, count, upper });
 
 impl Turns {
     /// Records a tick in which the torque is at a limit. Returns `true` if the torque has been at both limits, twice each, within

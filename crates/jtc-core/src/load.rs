@@ -1,7 +1,7 @@
 //! The load that a joint carries and that the model lacks. The load is learned from the integral of the position controller.
 use crate::DT;
+use crate::bit_codec::bit_codec;
 use crate::limits::JointConfig;
-use crate::remembered::remembered;
 
 /// Ticks between two observations of the same joint. Each tick observes a single joint.
 const PERIOD: f64 = crate::JOINTS as f64;
@@ -29,7 +29,7 @@ pub(crate) struct Load {
     observations: u16,
 }
 
-remembered!(Load { torque, known, steady, observations });
+bit_codec!(Load { torque, known, steady, observations });
 
 impl Load {
     /// Clears the load, so that the joint must find it again.

@@ -13,6 +13,7 @@ mod transfer;
 use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
+use crate::bit_codec::bit_codec;
 use crate::catch::Catch;
 use crate::config::Config;
 use crate::deceleration::moves;
@@ -22,7 +23,6 @@ use crate::nodes::Nodes;
 use crate::overspeed::OverSpeed;
 use crate::parameters::PidGains;
 use crate::path::PathClock;
-use crate::remembered::remembered;
 use crate::teach::Taught;
 use law::ControlLaw;
 pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
@@ -50,7 +50,7 @@ pub(crate) struct Motion {
     pub hold_back: HoldBack,
 }
 
-remembered!(Motion { set, law, limiter, over_speed, ramp, hold_back });
+bit_codec!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
     /// Turns the torque off: no joint is held, and no torque is stored. Each part is reset in place, so that it is not built on the stack

@@ -1,7 +1,7 @@
 //! Measured over-speed of a joint under torque (J-35), which no check of commanded values can detect.
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::nodes::Nodes;
-use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
 /// Time for which each joint has been above its threshold.
@@ -11,7 +11,7 @@ pub(crate) struct OverSpeed {
     ticks: [u16; JOINTS],
 }
 
-remembered!(OverSpeed { ticks });
+bit_codec!(OverSpeed { ticks });
 
 impl OverSpeed {
     /// Returns the joint errors of this tick: joints whose measured speed has been above [`Config::overspeed_factor`] times their limit for

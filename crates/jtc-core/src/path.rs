@@ -9,7 +9,7 @@
 use jtc_dynamics::sqrt;
 
 use crate::DT;
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 
 /// Path time and its rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ pub struct PathClock {
     hurried: bool,
 }
 
-remembered!(PathClock { time, rate, slope, target, halting_ms, hurried });
+bit_codec!(PathClock { time, rate, slope, target, halting_ms, hurried });
 
 /// Lowest and highest slope of path time, 1/s. If no slope is possible, the first value is above the second.
 pub type Bounds = (f64, f64);

@@ -3,7 +3,7 @@
 use jtc_dynamics::{Dynamics, LinkInertias};
 
 use crate::JOINTS;
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 
 /// Length of the blend, ms.
 pub(crate) const BLEND_MS: u16 = 500;
@@ -27,7 +27,7 @@ pub(crate) struct BlendState {
     from: Option<[[f64; 7]; JOINTS]>,
 }
 
-remembered!(BlendState { left_ms, mass, from });
+bit_codec!(BlendState { left_ms, mass, from });
 
 impl PayloadBlend {
     /// Returns the state of the blend.

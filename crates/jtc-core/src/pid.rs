@@ -1,7 +1,7 @@
 //! PID controller of one joint (J-41).
 use crate::DT;
+use crate::bit_codec::bit_codec;
 use crate::parameters::PidGains;
-use crate::remembered::remembered;
 
 /// Ticks over which the derivative is taken.
 const WINDOW: usize = 5;
@@ -35,8 +35,8 @@ pub struct PidTorque {
     pub d: f64,
 }
 
-remembered!(Pid { integral, errors, settled });
-remembered!(PidTorque { p, i, d });
+bit_codec!(Pid { integral, errors, settled });
+bit_codec!(PidTorque { p, i, d });
 
 impl PidTorque {
     /// Returns the sum, N·m.

@@ -20,9 +20,9 @@ mod tests;
 
 use jtc_wire::{Answer, LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState, RawPoint};
 
+use crate::bit_codec::{BitCodec, BitSink};
 use crate::controller::Controller;
 use crate::io::{Inputs, Outputs};
-use crate::remembered::{BitSink, Remembered};
 use inputs::Reference;
 use memory::Writer;
 

@@ -1,9 +1,9 @@
 //! The trajectory store: acceptance of segments (J-30), and memory of the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
+use crate::bit_codec::bit_codec;
 use crate::check::{Passed, SpeedRange, Violation};
 use crate::interpolation::{SetPoint, Step};
-use crate::remembered::remembered;
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 /// If the time is less than this share of a step before a point, it is taken as the time of the point.
@@ -60,7 +60,7 @@ impl StoreState {
     }
 }
 
-remembered!(StoreState {
+bit_codec!(StoreState {
     received,
     next_segment,
     segments,

@@ -9,10 +9,10 @@ mod joint;
 
 use jtc_dynamics::Dynamics;
 
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
-use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};
@@ -105,7 +105,7 @@ pub(crate) struct Taught {
     turn: u8,
 }
 
-remembered!(Taught { joints, carried, found, mass, unit, driven_ms, sinks_ms, haste, turn });
+bit_codec!(Taught { joints, carried, found, mass, unit, driven_ms, sinks_ms, haste, turn });
 
 impl Taught {
     /// Begins Teaching of an arm at rest at `q` (rad) that has found these loads (N·m).

@@ -1,7 +1,7 @@
 //! Values that a tick computed, for recordings and tests.
 use jtc_bus::NodeState;
 
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// Telemetry of one joint in one tick.
@@ -80,7 +80,7 @@ pub(crate) struct Observed {
     pub torque: [f64; JOINTS],
 }
 
-remembered!(Observed { tick, torque });
+bit_codec!(Observed { tick, torque });
 
 #[cfg(test)]
 mod tests {

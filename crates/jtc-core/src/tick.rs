@@ -68,7 +68,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.end_fast_teaching(inputs.missed_ticks);
         }
         self.pump &= !self.nodes.gripper_lost();
-        if self.late_ticks.count(inputs.missed_ticks) {
+        if self.tick_overruns.count(inputs.missed_ticks) {
             self.errors.raise_device();
         }
     }

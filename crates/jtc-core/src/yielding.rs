@@ -7,9 +7,9 @@
 //!
 //! A joint that lowers a load has no spring. The damper alone lets the load sink slowly, at any torque within the limit. The torque that
 //! the damper needs becomes part of the load, so a load that the limit can hold comes to rest.
+use crate::bit_codec::bit_codec;
 use crate::limits::{JointConfig, within};
 use crate::pid::PidTorque;
-use crate::remembered::remembered;
 use crate::soft_end;
 use crate::{DT, JOINTS};
 
@@ -104,7 +104,7 @@ pub(crate) struct Yield {
     sinks_ms: u16,
 }
 
-remembered!(Yield {
+bit_codec!(Yield {
     lowers,
     stays,
     set,
@@ -320,7 +320,7 @@ pub(crate) struct Yielded {
     since_ms: u16,
 }
 
-remembered!(Yielded { times, since_ms });
+bit_codec!(Yielded { times, since_ms });
 
 impl Yielded {
     /// Runs one tick.

@@ -9,7 +9,7 @@ use jtc_wire::{ControllerState, Joint, NodeState, Reactions, Status, StopCause, 
 
 use crate::held_stop::{self, HeldStop};
 use crate::port::Port;
-use crate::{Error, Session, words};
+use crate::{Error, Session, labels};
 
 /// Rates that are tried if bytes are received that contain no frame.
 pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
@@ -225,7 +225,7 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
             next!("make the cell safe, release it, then {}", Recover),
         );
     }
-    for flag in words::can_flags(s.can_current) {
+    for flag in labels::can_flags(s.can_current) {
         all.add(
             Problem,
             format!("joint bus: {flag}"),
@@ -234,8 +234,8 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
         );
     }
     for (j, joint) in s.joints.iter().enumerate() {
-        let who = words::node(j);
-        for word in words::joint_errors(joint.internal) {
+        let who = labels::node(j);
+        for word in labels::joint_errors(joint.internal) {
             let what = format!("{who}: {word}");
             if told {
                 continue;
@@ -252,7 +252,8 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
                 );
             }
         }
-        for word in words::node_errors(joint.errors).into_iter().chain(words::motor_faults(joint.mc_current))
+        for word in
+            labels::node_errors(joint.errors).into_iter().chain(labels::motor_faults(joint.mc_current))
         {
             all.add(
                 Problem,
@@ -261,7 +262,7 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
                 next!("{}, then {}", Explain, Recover),
             );
         }
-        for word in words::node_warnings(joint.warnings) {
+        for word in labels::node_warnings(joint.warnings) {
             let severity = if joint.warnings & warning::SAFETY_LINE != 0 { Problem } else { Warning };
             all.add(severity, format!("{who}: {word}"), "reported by the drive", Action::Explain);
         }
@@ -270,13 +271,13 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
         }
     }
     if s.state == ControllerState::Error && !all.has_problem() {
-        all.add(Problem, "an error is latched whose cause is gone", words::errors_line(s), Action::Recover);
+        all.add(Problem, "an error is latched whose cause is gone", labels::errors_line(s), Action::Recover);
     }
 }
 
 fn set_up(s: &Status, all: &mut Findings) {
     use Severity::{Problem, Warning};
-    let missing = words::missing_parameters(s.jtc_init);
+    let missing = labels::missing_parameters(s.jtc_init);
     if !missing.is_empty() {
         all.add(
             Problem,
@@ -289,14 +290,14 @@ fn set_up(s: &Status, all: &mut Findings) {
             ),
         );
     }
-    for n in words::nodes_in(s.node_init) {
+    for n in labels::nodes_in(s.node_init) {
         let (state, warnings) = match (s.joints.get(n), s.gripper) {
             (Some(j), _) => (j.state, j.warnings),
             (None, Some(g)) => (g.state, g.warnings),
             (None, None) => (NodeState::START, 0),
         };
         let why = match (state, warnings & warning::POSITION_NOT_ACCURATE != 0) {
-            _ if words::is_silent(s, n) => "it does not answer",
+            _ if labels::is_silent(s, n) => "it does not answer",
             (NodeState::START, _) => "it has not answered yet, or it starts",
             (_, true) => "its position is not accurate yet",
             (NodeState::INIT, _) => "its configuration was not accepted yet",
@@ -304,7 +305,7 @@ fn set_up(s: &Status, all: &mut Findings) {
             (state, _) if state.is_transition() => "it is changing its state (the first enable takes 4 s)",
             _ => "it is being brought up",
         };
-        let what = format!("{} is not ready ({})", words::node(n), state.name());
+        let what = format!("{} is not ready ({})", labels::node(n), state.name());
         all.add(
             if s.is_coming_up() { Problem } else { Warning },
             what,
@@ -325,7 +326,7 @@ fn temperatures(s: &Status, all: &mut Findings) {
     for (j, joint) in s.joints.iter().enumerate() {
         // A byte of 200 or more is a negative temperature.
         if (HOT..200).contains(&joint.temperature) {
-            let what = format!("{}: bearing at {} °C", words::node(j), joint.temperature);
+            let what = format!("{}: bearing at {} °C", labels::node(j), joint.temperature);
             all.add(Severity::Warning, what, "long motion at high torque", next!("let it cool; {}", Monitor));
         }
     }

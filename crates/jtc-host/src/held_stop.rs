@@ -5,7 +5,7 @@ use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopK
 use serde::Serialize;
 
 use crate::explain::{self, Page};
-use crate::words;
+use crate::labels;
 
 /// Returns the next step after an encoder has jumped (J-35).
 pub fn after_encoder_jump() -> Next {
@@ -162,9 +162,9 @@ pub fn next_step(status: &Status, cause: Option<&StopCause>) -> Next {
     match cause.map(|cause| cause.kind) {
         Some(StopKind::EncoderJump) => after_encoder_jump(),
         Some(kind) if status.is_held_stop() && status.state != ControllerState::Teaching => {
-            words::after_removing(&remedy(kind))
+            labels::after_removing(&remedy(kind))
         }
-        _ => words::next_step(status),
+        _ => labels::next_step(status),
     }
 }
 
@@ -224,7 +224,7 @@ mod tests {
             next.to_string().starts_with(&remedy(StopKind::Push)) && next.to_string().contains("`jtc clear`"),
             "{next}"
         );
-        assert_eq!(next_step(&held, None), words::next_step(&held));
+        assert_eq!(next_step(&held, None), labels::next_step(&held));
         let jump = StopCause { kind: StopKind::EncoderJump, ..PUSH };
         assert!(next_step(&held, Some(&jump)).to_string().contains("`jtc disable`"));
         let taught = Status { state: ControllerState::Teaching.into(), ..held };

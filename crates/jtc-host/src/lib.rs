@@ -14,6 +14,7 @@ pub mod frame;
 #[doc(hidden)]
 pub mod fuzzing;
 pub mod held_stop;
+pub mod labels;
 pub mod log;
 pub mod plan;
 pub mod port;
@@ -24,7 +25,6 @@ pub mod sample;
 pub mod session;
 pub mod trajectory;
 pub mod waypoints;
-pub mod words;
 
 pub use arm::Arm;
 pub use check::{CheckOptions, CheckedTrajectory};

@@ -4,8 +4,8 @@
 use jtc_core::{JOINTS, JointTelemetry, Telemetry};
 use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};
 
+use crate::labels;
 use crate::trajectory::Trajectory;
-use crate::words;
 
 /// Values of a joint in a [`Sample`]; NaN for a value that the source does not know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,7 +150,7 @@ impl From<&Telemetry> for Sample {
 /// Returns `true` if the values of joint `j` (from 0) in a status are measured. For a joint that is silent or not ready,
 /// the controller reports zeros.
 pub fn is_measured(status: &Status, j: usize) -> bool {
-    let unknown = words::is_silent(status, j) || words::is_awaited(status, j);
+    let unknown = labels::is_silent(status, j) || labels::is_awaited(status, j);
     !unknown || status.joints.get(j).is_some_and(|s| s.position != 0.0 || s.velocity != 0.0)
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use jtc_host::check::{Checker, Verdict};
 use jtc_host::plan::kinematics::{Orientation, Target};
 use jtc_host::plan::{
-    COLD, MARGIN_PCT, Planned, Planner as HostPlanner, Way, WayOptions, Waypoint, margin_in_range,
+    COLD, MARGIN_PCT, Planned, Planner as HostPlanner, WayOptions, Waypoint, WaypointPath, margin_in_range,
 };
 use jtc_host::recording::RecordingInfo;
 use jtc_host::waypoints::WaypointFile;
@@ -123,7 +123,7 @@ impl Planner {
         let blend = self.blend(blend)?;
         self.plan(py, |planner| {
             let options = WayOptions { line: self.line, blend, blend_m: self.blend_m };
-            let way = Way::of(&file, &self.arm, options).map_err(Failure::from)?;
+            let way = WaypointPath::of(&file, &self.arm, options).map_err(Failure::from)?;
             way.planned(&HostPlanner { blend, ..planner.clone() })
                 .map_err(|error| Failure::of(&error).message(file.located(&error)))
         })

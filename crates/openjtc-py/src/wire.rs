@@ -3,7 +3,7 @@
 use jtc_bus::{Answer, GripperReport, JOINTS, JointReport, NODES, NodeState, Request, Scale};
 use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX, settings};
 use jtc_host::frame;
-use jtc_host::words;
+use jtc_host::labels;
 use jtc_wire::{Command, EncodeError, ExecCommand, FrameType, Status, StatusReceiver};
 use numpy::PyArray1;
 use pyo3::IntoPyObjectExt as _;
@@ -146,7 +146,7 @@ fn status_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyD
     dict.set_item("point", status.point)?;
     dict.set_item("errors", status.errors)?;
     dict.set_item("occurred", status.occurred)?;
-    dict.set_item("causes", words::causes(status))?;
+    dict.set_item("causes", labels::causes(status))?;
     let of = |value: fn(&jtc_wire::JointStatus) -> f64| {
         PyArray1::from_slice(py, &status.joints.each_ref().map(value))
     };

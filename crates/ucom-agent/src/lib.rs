@@ -2,10 +2,10 @@
 #![forbid(unsafe_code)]
 
 pub mod api;
-mod happening;
+mod event;
 mod jobs;
 mod owner;
-mod picture;
+mod snapshot;
 
-pub use happening::{Happening, Policy};
+pub use event::{ChainEvent, Policy};
 pub use owner::{Config, Owner};

@@ -3,7 +3,7 @@
 
 use crate::common;
 
-use cli_kit::trial::{ended, signal};
+use cli_kit::testing::{ended, signal};
 use common::{Sim, ended_by};
 use serde_json::json;
 

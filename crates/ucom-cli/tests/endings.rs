@@ -7,7 +7,7 @@ use std::io::Write;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use cli_kit::trial::{ended, signal};
+use cli_kit::testing::{ended, signal};
 use common::{Sim, ended_by};
 use serde_json::json;
 use test_kit::patience::until;

@@ -5,7 +5,7 @@ use crate::common;
 
 use std::time::Duration;
 
-use cli_kit::trial::{ended, signal};
+use cli_kit::testing::{ended, signal};
 use common::{Sim, ended_by};
 
 /// A closed terminal ends running control loops and programming, like Ctrl-C.

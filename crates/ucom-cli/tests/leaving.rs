@@ -8,7 +8,7 @@ use std::process::Child;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use cli_kit::trial::signal;
+use cli_kit::testing::signal;
 use common::Sim;
 use serde_json::Value;
 use test_kit::patience::Patience;

@@ -6,7 +6,7 @@ use crate::common;
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
-use cli_kit::trial::Terminal;
+use cli_kit::testing::Terminal;
 use common::Sim;
 
 fn monitor(sim: &Sim) -> std::process::Command {

@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use cli_kit::trial::program;
+use cli_kit::testing::program;
 use common::{ucom, ucom_with};
 
 #[test]

@@ -150,7 +150,7 @@ fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
 #[test]
 fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     let (sim, _) = started();
-    let first = |output: cli_kit::trial::CommandOutput| output.ends(0).json()["par"][0].clone();
+    let first = |output: cli_kit::testing::CommandOutput| output.ends(0).json()["par"][0].clone();
     let wrote = first(sim.ucom(&["--json", "par", "1", "kp=120"]));
     assert_eq!((&wrote["assumed"], &wrote["last_written"]["value"]), (&json!(120), &json!(120)));
     let later = first(sim.ucom(&["--json", "par", "1"]));

@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Read as _};
 use std::path::Path;
 use std::process::{Child, Stdio};
 
-use cli_kit::trial::{Terminal, program, signal};
+use cli_kit::testing::{Terminal, program, signal};
 use common::Sim;
 use serde_json::Value;
 use test_kit::http::Http;

@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use cli_kit::trial::ended;
+use cli_kit::testing::ended;
 use common::Sim;
 
 /// A recorder of a silent bus reports this once, only to users. The recorder does not report this if frames arrive.

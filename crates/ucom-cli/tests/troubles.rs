@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use cli_kit::trial::signal;
+use cli_kit::testing::signal;
 use common::Sim;
 use test_kit::page::{Page, Printed, blurred};
 

@@ -3,7 +3,7 @@
 
 use crate::common;
 
-use cli_kit::trial::ended;
+use cli_kit::testing::ended;
 use common::{Sim, ended_by, image, outcomes};
 use serde_json::Value;
 

@@ -4,7 +4,7 @@
 
 use crate::common;
 
-use cli_kit::trial::{CommandOutput, run};
+use cli_kit::testing::{CommandOutput, run};
 use common::{Sim, ucom};
 
 /// Runs `ucom` with one more variable.

@@ -124,14 +124,17 @@ pub(super) async fn put_arm(
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
     // The body of the request is read only if the client holds the lease.
-    agent.commander(&asker)?;
+    agent.http_session(&asker)?;
     let (arm, store) = read(&agent, request, |ArmRequest { text, store }| Ok((taken(&text)?, store))).await?;
-    let (commander, turn) = agent.mover(&asker, after)?;
+    let (http_session, turn) = agent.mover(&asker, after)?;
     let what = format!("arm {}{}", plain(&arm.name), if store { ", stored" } else { "" });
     let hash = arm.hash().ok().flatten().map(in_words);
     let give = move |task: &Task<'_>, session: &mut Session<ClientPort>| give(task, session, &arm, store);
-    let job = agent.jobs.begin(&commander, turn, what.clone(), give)?;
-    agent.note("job", json!({ "client": commander.client.0, "job": job.number, "what": what, "hash": hash }));
+    let job = agent.jobs.begin(&http_session, turn, what.clone(), give)?;
+    agent.note(
+        "job",
+        json!({ "client": http_session.client.0, "job": job.number, "what": what, "hash": hash }),
+    );
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }
 

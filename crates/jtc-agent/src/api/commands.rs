@@ -17,7 +17,7 @@ use utoipa::ToSchema;
 use super::Agent;
 use super::error::Denials;
 use super::objects::PayloadObject;
-use crate::jobs::{Commander, Turn, stopped};
+use crate::jobs::{HttpSession, Turn, stopped};
 use crate::owner::ClientPort;
 
 /// Interval at which the agent renews the lease of a client that waits for an answer.
@@ -54,9 +54,9 @@ impl Agent {
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
     {
-        let commander = self.commander(asker)?;
-        let turn = commander.turn()?;
-        self.act(&commander, turn, what, act).await
+        let http_session = self.http_session(asker)?;
+        let turn = http_session.turn()?;
+        self.act(&http_session, turn, what, act).await
     }
 
     /// Runs a command that may move the arm on the session of the lease holder.
@@ -71,14 +71,14 @@ impl Agent {
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
     {
-        let (commander, turn) = self.mover(asker, after)?;
-        self.act(&commander, turn, what, act).await
+        let (http_session, turn) = self.mover(asker, after)?;
+        self.act(&http_session, turn, what, act).await
     }
 
     /// Runs the command and logs its result, even if the client disconnects.
     pub(super) async fn act<T, E>(
         &self,
-        commander: &Commander,
+        http_session: &HttpSession,
         turn: Turn,
         what: impl Into<Cow<'static, str>>,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, E> + Send + 'static,
@@ -87,7 +87,7 @@ impl Agent {
         T: Send + 'static,
         E: Into<Error> + Send + 'static,
     {
-        let (agent, client, what) = (self.clone(), commander.client, what.into());
+        let (agent, client, what) = (self.clone(), http_session.client, what.into());
         let logged = move |session: &mut Session<ClientPort>| {
             let done = act(session).map_err(|error| match error.into() {
                 Error::Cancelled => stopped(&agent.line, client),
@@ -97,7 +97,7 @@ impl Agent {
             agent.note("command", json!({ "client": client.0, "command": what, "why_not": why }));
             done
         };
-        let acting = commander.act(turn, logged);
+        let acting = http_session.act(turn, logged);
         tokio::pin!(acting);
         loop {
             tokio::select! {
@@ -121,17 +121,17 @@ pub(super) async fn resume(
     asker: Asker,
     after: AskedAfter,
 ) -> Result<StatusCode, Problem> {
-    let commander = agent.commander(&asker)?;
-    if commander.is_moving() {
+    let http_session = agent.http_session(&asker)?;
+    if http_session.is_moving() {
         // A motion that another client stopped before it began must not be resumed.
         agent.line.with(|line, now| {
-            line.could_ask(commander.client, now)?;
+            line.could_ask(http_session.client, now)?;
             match line.status() {
                 Some((_, status)) if status.trajectory != TrajectoryState::Pause => Err(not_paused(status)),
-                _ => Ok(line.ask_to_move(commander.client, after.0, now)?),
+                _ => Ok(line.ask_to_move(http_session.client, after.0, now)?),
             }
         })?;
-        if let Some(done) = commander.wish(Flow::Resume).await {
+        if let Some(done) = http_session.wish(Flow::Resume).await {
             return done.map(|()| StatusCode::NO_CONTENT);
         }
     }
@@ -164,8 +164,8 @@ pub(super) async fn speed(
             Problem::new("speed", message, "100 is the speed of the trajectory").kind(ErrorKind::Usage)
         );
     }
-    let commander = agent.commander(&asker)?;
-    if let Some(done) = commander.wish(Flow::Speed(percent)).await {
+    let http_session = agent.http_session(&asker)?;
+    if let Some(done) = http_session.wish(Flow::Speed(percent)).await {
         return done.map(|()| StatusCode::NO_CONTENT);
     }
     let set = move |session: &mut Session<ClientPort>| session.set_speed(f64::from(percent) / 100.0);
@@ -188,8 +188,8 @@ pub(super) async fn teach(
     Body(Switch { on }): Body<Switch>,
 ) -> Result<StatusCode, Problem> {
     if on {
-        let commander = agent.commander(&asker)?;
-        let (line, client) = (agent.line.clone(), commander.client);
+        let http_session = agent.http_session(&asker)?;
+        let (line, client) = (agent.line.clone(), http_session.client);
         let halted = move || line.with(|line, _| line.is_halted(client));
         agent.motion(&asker, after, "teach", move |session| session.teach_until(halted)).await?;
     } else {

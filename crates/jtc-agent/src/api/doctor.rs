@@ -6,7 +6,7 @@ use axum::Json;
 use axum::extract::State;
 use host_kit::FrontEnd;
 use jtc_host::doctor::{Finding, Observation, Severity, findings};
-use jtc_host::{Session, words};
+use jtc_host::{Session, labels};
 use jtc_wire::{JOINTS, Joint, STATUS_LEN, Status, error};
 use utoipa::ToSchema;
 
@@ -77,7 +77,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     };
     // A held stop and an encoder jump exist only under torque.
     let reactions = match &status {
-        Some(status) if words::has_torque(status) => agent.ask(|session| Ok(session.reactions())).await?,
+        Some(status) if labels::has_torque(status) => agent.ask(|session| Ok(session.reactions())).await?,
         _ => None,
     };
     let time_s = (ended - began).as_secs_f64();
@@ -102,7 +102,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
 /// for an absent joint whose drive answers (J-53).
 async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
-        return Ok(words::absent(status));
+        return Ok(labels::absent(status));
     }
     let positions = agent.ask(|session| Ok(Session::absent(session).unwrap_or([None; JOINTS]))).await?;
     Ok(Joint::ALL.into_iter().filter(|joint| positions[joint.index()].is_some()).collect())

@@ -13,13 +13,13 @@ use axum::response::Response;
 use tokio::time::Instant;
 
 use super::{Agent, Caller, StatusObject};
-use crate::jobs::Happening;
+use crate::jobs::ArmEvent;
 
 /// Longest interval between status messages of a stream.
 const QUIET: Duration = Duration::from_millis(500);
 
 /// Event with its number and time.
-pub(super) type EventObject = Entry<Happening>;
+pub(super) type EventObject = Entry<ArmEvent>;
 type EventsObject = events::EventsObject<EventObject>;
 
 /// Returns the events after a number.

@@ -102,18 +102,18 @@ pub(super) async fn jog(
     JogAsked { after, as_of_ms }: JogAsked,
     Body(JogRequest { rates_rad_s }): Body<JogRequest>,
 ) -> Result<StatusCode, Problem> {
-    let commander = agent.commander(&asker)?;
-    let turn = commander.turn()?;
+    let http_session = agent.http_session(&asker)?;
+    let turn = http_session.turn()?;
     let moves = rates_rad_s.iter().any(|rate| *rate != 0.0);
     // The arrival time is taken now, because the body may have arrived later than the head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
         // After a Stop the user must release the key. So late requests of the key also extend the hold-off.
-        agent.line.with(|line, now| line.could_jog(commander.client, now))?;
+        agent.line.with(|line, now| line.could_jog(http_session.client, now))?;
         return Err(late);
     }
-    agent.line.with(|line, now| line.ask_to_jog(commander.client, after.0, now))?;
-    agent.act(&commander, turn, "jog", move |session| session.jog(&rates_rad_s)).await?;
+    agent.line.with(|line, now| line.ask_to_jog(http_session.client, after.0, now))?;
+    agent.act(&http_session, turn, "jog", move |session| session.jog(&rates_rad_s)).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

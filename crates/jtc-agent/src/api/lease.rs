@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 
 use super::error::Denials;
 use super::{Agent, Caller};
-use crate::jobs::{Commander, Turn, Unable};
+use crate::jobs::{HttpSession, Turn, Unable};
 use crate::line::{Denied, Introduction, Policy};
 
 /// Request for the lease.
@@ -58,32 +58,32 @@ impl Halts for Agent {
 
 impl Agent {
     /// Returns the client of a lease key and renews its lease. Returns an error if the client does not hold the lease.
-    pub(super) fn commander(&self, asker: &Asker) -> Result<Arc<Commander>, Problem> {
-        let (commander, lasts) = self.client(asker)?;
-        let held = self.line.with(|line, now| line.take_lease(commander.client, Some(lasts), now));
+    pub(super) fn http_session(&self, asker: &Asker) -> Result<Arc<HttpSession>, Problem> {
+        let (http_session, lasts) = self.client(asker)?;
+        let held = self.line.with(|line, now| line.take_lease(http_session.client, Some(lasts), now));
         held.map_err(Problem::from)?;
-        Ok(commander)
+        Ok(http_session)
     }
 
-    /// Like [`commander`](Self::commander), for requests that may move the arm. Refuses requests that were made before
+    /// Like [`http_session`](Self::commander), for requests that may move the arm. Refuses requests that were made before
     /// the last Stop or Pause, and all requests within three seconds after a Stop or Pause of another client. The turn
     /// is taken first, so that this permission does not apply to requests that still wait for their turn.
     pub(super) fn mover(
         &self,
         asker: &Asker,
         AskedAfter(after): AskedAfter,
-    ) -> Result<(Arc<Commander>, Turn), Problem> {
-        let commander = self.commander(asker)?;
-        let turn = commander.turn()?;
-        self.line.with(|line, now| line.ask_to_move(commander.client, after, now))?;
-        Ok((commander, turn))
+    ) -> Result<(Arc<HttpSession>, Turn), Problem> {
+        let http_session = self.http_session(asker)?;
+        let turn = http_session.turn()?;
+        self.line.with(|line, now| line.ask_to_move(http_session.client, after, now))?;
+        Ok((http_session, turn))
     }
 
     /// Returns the client of a lease key, and the time without a request after which its lease lapses.
-    pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<Commander>, Duration), Problem> {
+    pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<HttpSession>, Duration), Problem> {
         asker.caller.operator()?;
         let key = asker.key().ok_or(lease::Denied::NoKey)?;
-        Ok(self.jobs.commander(key).ok_or(lease::Denied::Unknown)?)
+        Ok(self.jobs.http_session(key).ok_or(lease::Denied::Unknown)?)
     }
 }
 
@@ -111,8 +111,8 @@ pub(super) async fn take(
     let name = caller.named(&name);
     let key = random().map_err(|e| Problem::of(&e))?;
     let introduction = Introduction { name: name.clone(), role: caller.role, policy };
-    let commander = agent.jobs.admit(&key, introduction, lasts).ok_or(lease::Denied::Full)?;
-    let client = commander.client;
+    let http_session = agent.jobs.admit(&key, introduction, lasts).ok_or(lease::Denied::Full)?;
+    let client = http_session.client;
     let taken = agent.line.with(|line, now| match line.take_lease(client, Some(lasts), now) {
         Err(Denied::Held { .. }) if ask => line.want_lease(client, now).map(|()| false),
         taken => taken.map(|()| true),
@@ -141,9 +141,9 @@ pub(super) async fn take(
     )
 )]
 pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Json<LeaseState>, Problem> {
-    let (commander, lasts) = agent.client(&asker)?;
+    let (http_session, lasts) = agent.client(&asker)?;
     let state = agent.line.with(|line, now| {
-        let held = line.take_lease(commander.client, Some(lasts), now).is_ok();
+        let held = line.take_lease(http_session.client, Some(lasts), now).is_ok();
         let wanted = line.lease().filter(|_| held).and_then(|lease| lease.wanted_by);
         LeaseState {
             held,
@@ -164,17 +164,17 @@ pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Js
     responses((status = 204, description = "It is let go"), Refusals, Denials)
 )]
 pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
-    let (commander, _) = agent.client(&asker)?;
-    let turn = match commander.turn() {
+    let (http_session, _) = agent.client(&asker)?;
+    let turn = match http_session.turn() {
         Ok(turn) => Some(turn),
         // The thread of the client has ended, so no job of it runs.
         Err(Unable::Gone) => None,
         Err(busy) => return Err(busy.into()),
     };
     // If the client only waits for the lease, this has no effect.
-    let _ = agent.line.with(|line, now| line.release_lease(commander.client, now));
+    let _ = agent.line.with(|line, now| line.release_lease(http_session.client, now));
     agent.line.wake();
-    agent.note("left", json!({ "client": commander.client.0, "name": commander.name }));
+    agent.note("left", json!({ "client": http_session.client.0, "name": http_session.name }));
     if let Some(key) = asker.key() {
         agent.jobs.dismiss(key);
     }

@@ -18,7 +18,7 @@ use utoipa::{IntoParams, ToSchema};
 use super::body::blocking;
 use super::error::Denials;
 use super::{Agent, Caller};
-use crate::jobs::Commander;
+use crate::jobs::HttpSession;
 use crate::line::{Introduction, Policy};
 use crate::owner::ClientPort;
 
@@ -194,7 +194,7 @@ async fn from_log<T: Send + 'static>(
     // Uses a separate client, so that other questions do not wait for the log.
     let name = format!("{}: log", caller.peer);
     let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
-    let reader = Commander::new(&agent.line, introduction);
+    let reader = HttpSession::new(&agent.line, introduction);
     let fetched = reader.call_in_turn(move |session| {
         let log = session.fetch_log(|_, _| {});
         log.map(|log| (log, room)).map_err(|error| Problem::of(&error))

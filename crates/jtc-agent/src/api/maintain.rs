@@ -7,7 +7,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use jtc_host::error::Facts;
-use jtc_host::{Error, ErrorKind, LinkError, Session, words};
+use jtc_host::{Error, ErrorKind, LinkError, Session, labels};
 use jtc_wire::{ALL_NODES, Joint};
 use utoipa::ToSchema;
 
@@ -51,7 +51,7 @@ pub struct ResetRequest {
 
 /// Returns bits 0 to 5 for joints 1 to 6 and bit 6 for the gripper.
 fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
-    let mut mask = if gripper { 1 << words::GRIPPER } else { 0 };
+    let mut mask = if gripper { 1 << labels::GRIPPER } else { 0 };
     for number in joints {
         let Some(joint) = Joint::from_number((*number).into()) else {
             let facts = Facts::beyond((*number).into(), 6.0);
@@ -87,7 +87,7 @@ pub(super) async fn clear(
         agent.command(&asker, "clear", Session::clear_all).await?;
         return Ok(StatusCode::NO_CONTENT);
     }
-    let what = format!("clear {}", words::node_names(named).join(", "));
+    let what = format!("clear {}", labels::node_names(named).join(", "));
     let clear =
         move |session: &mut Session<ClientPort>| -> Result<(), LinkError> { session.clear(true, named) };
     agent.command(&asker, what, clear).await?;
@@ -116,7 +116,7 @@ pub(super) async fn reset(
         let next = "name joints, the gripper, or all";
         return Err(Problem::new("request", "which nodes? Nothing was sent", next).kind(ErrorKind::Usage));
     }
-    let what = format!("reset {}", words::node_names(named).join(", "));
+    let what = format!("reset {}", labels::node_names(named).join(", "));
     let reset = move |session: &mut Session<ClientPort>| -> Result<(), Error> {
         session.reset_held(named, arm_may_fall)
     };

@@ -3,7 +3,7 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
 use jtc_host::sample::is_measured;
-use jtc_host::{Arm, words};
+use jtc_host::{Arm, labels};
 use jtc_wire::{ControllerState, Info, Joint, Status, TrajectoryState};
 use prometheus::{CounterVec, GaugeVec, Opts, Registry, TextEncoder};
 
@@ -87,7 +87,7 @@ impl Page {
             "The 1 ms point of the trajectory that the controller is at",
             status.point.into(),
         )?;
-        let (now, occurred) = (words::errors(status.errors), words::errors(status.occurred));
+        let (now, occurred) = (labels::errors(status.errors), labels::errors(status.occurred));
         self.gauge("jtc_controller_errors", "Errors of the controller now", now.len() as f64)?;
         self.gauge(
             "jtc_controller_occurred_errors",
@@ -124,7 +124,7 @@ impl Page {
             each(&|j| joints[j].temperature.into()),
         )?;
         let errors = Joint::ALL.map(|joint| {
-            let errors = words::joint_errors(joints[joint.index()].internal).len();
+            let errors = labels::joint_errors(joints[joint.index()].internal).len();
             (vec![joint.number().to_string()], errors as f64)
         });
         self.gauges("jtc_joint_errors", "Errors that the controller has found at the joint", label, errors)?;

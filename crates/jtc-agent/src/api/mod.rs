@@ -54,7 +54,7 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::jobs::{Happening, Jobs};
+use crate::jobs::{ArmEvent, Jobs};
 use crate::owner::Line;
 
 pub use held_stop::{HeldStopObject, ReactionsObject};
@@ -252,7 +252,7 @@ pub fn description() -> String {
                        operator's from elsewhere. A Stop or a Pause is taken from everyone who was let in.",
         license(name = "MIT OR Apache-2.0")
     ),
-    components(schemas(Problem, EventObject, Happening)),
+    components(schemas(Problem, EventObject, ArmEvent)),
     modifiers(&Bearer),
     security((), ("token" = []))
 )]

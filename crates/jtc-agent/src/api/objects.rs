@@ -2,9 +2,9 @@
 use host_kit::{FrontEnd, Next};
 use jtc_host::explain::{self, Family};
 use jtc_host::held_stop::{self, HeldStop};
+use jtc_host::labels;
 use jtc_host::sample::is_measured;
 use jtc_host::session::Payload;
-use jtc_host::words;
 use jtc_wire::{Joint, Status, StopCause};
 use utoipa::ToSchema;
 
@@ -192,7 +192,7 @@ impl ControllerObject {
                 velocity_rad_s: measured.then_some(values.velocity),
                 torque_nm: measured.then_some(values.torque),
                 temperature_c: measured.then_some(values.temperature),
-                errors: texts(words::joint_errors(values.internal)),
+                errors: texts(labels::joint_errors(values.internal)),
                 error_codes: codes(Family::Joint, values.internal),
             }
         });
@@ -200,12 +200,12 @@ impl ControllerObject {
             state: status.state.name().to_owned(),
             trajectory: status.trajectory.name().to_owned(),
             point: status.point,
-            errors: texts(words::errors(status.errors)),
+            errors: texts(labels::errors(status.errors)),
             error_codes: codes(Family::Jtc, status.errors),
-            causes: words::causes(status),
+            causes: labels::causes(status),
             held_stop: found.stop.as_ref().map(|(cause, ago_ms)| HeldStop::new(cause, *ago_ms).into()),
             encoder_jumped: held_stop::joints(found.jumped).into_iter().map(Joint::number).collect(),
-            errors_occurred: texts(words::errors(status.occurred)),
+            errors_occurred: texts(labels::errors(status.occurred)),
             commanded_rad,
             joints: joints.collect(),
             next: found.next_step(status).plain(FrontEnd::Agent),

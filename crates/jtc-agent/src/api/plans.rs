@@ -8,7 +8,7 @@ use axum::{Extension, Json};
 use jtc_core::Config;
 use jtc_host::check::{JointFigures, TorqueMargin};
 use jtc_host::error::Facts;
-use jtc_host::plan::{Bound, COLD, MARGIN_PCT, PlanError, Planned, Planner, Way, WayOptions};
+use jtc_host::plan::{Bound, COLD, MARGIN_PCT, PlanError, Planned, Planner, WayOptions, WaypointPath};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
 use jtc_host::{Arm, ErrorKind, Session};
 use jtc_wire::Joint;
@@ -316,7 +316,7 @@ fn planned(
     device: &Config,
 ) -> Result<Planned, Problem> {
     let options = WayOptions { line: request.line, blend: request.blend_rad, blend_m: request.blend_m };
-    let way = Way::of(file, arm, options).map_err(|error| {
+    let way = WaypointPath::of(file, arm, options).map_err(|error| {
         let object = Problem::of(&error);
         match &error {
             // A blend in the API is in rad or m, even if the positions are in degrees.

@@ -3,7 +3,7 @@ use agent_kit::api::{Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
 use jtc_host::held_stop::Reacting;
-use jtc_host::{Error, Session, words};
+use jtc_host::{Error, Session, labels};
 use utoipa::ToSchema;
 
 use super::Agent;
@@ -70,7 +70,7 @@ pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>,
         board: info.board.as_str().to_owned(),
         arm: info.arm.as_str().to_owned(),
         hash: format!("{:016x}", info.hash),
-        missing: words::missing_parameters(info.missing).into_iter().map(str::to_owned).collect(),
+        missing: labels::missing_parameters(info.missing).into_iter().map(str::to_owned).collect(),
         defaults_stored: info.defaults_stored,
         boots: info.boots,
         boot_cause: info.boot_cause.name().to_owned(),

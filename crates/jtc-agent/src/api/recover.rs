@@ -75,9 +75,9 @@ pub(super) async fn begin(
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
     // The body of the request is read only if the client holds the lease.
-    agent.commander(&asker)?;
+    agent.http_session(&asker)?;
     let parameters = read(&agent, request, RecoverRequest::parameters).await?;
-    let (commander, turn) = agent.mover(&asker, after)?;
+    let (http_session, turn) = agent.mover(&asker, after)?;
     let (what, hash) = match &parameters {
         RecoverParameters::Arm { arm, .. } => {
             (format!("recover with the arm {}", agent_kit::gate::plain(&arm.name)), arm.hash().ok().flatten())
@@ -86,8 +86,11 @@ pub(super) async fn begin(
     };
     let recover =
         move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, &parameters);
-    let job = agent.jobs.begin(&commander, turn, what.clone(), recover)?;
+    let job = agent.jobs.begin(&http_session, turn, what.clone(), recover)?;
     let hash = hash.map(in_words);
-    agent.note("job", json!({ "client": commander.client.0, "job": job.number, "what": what, "hash": hash }));
+    agent.note(
+        "job",
+        json!({ "client": http_session.client.0, "job": job.number, "what": what, "hash": hash }),
+    );
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }

@@ -281,7 +281,7 @@ pub(super) async fn begin_move(
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {
             // The permission is checked first, so that a client without it does not get another error.
-            agent.commander(&asker)?;
+            agent.http_session(&asker)?;
             let arm = Arm { poses: agent.poses(), ..(*agent.identity().await.arm).clone() };
             let to = arm.pose(&name).map_err(|error| pose_error(&error))?;
             (name, Target::Joints(to))
@@ -325,10 +325,10 @@ fn begin(
     policy: Option<Policy>,
     order: Order,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    let (commander, turn) = agent.mover(asker, after)?;
-    let (client, own) = (commander.client, commander.policy);
+    let (http_session, turn) = agent.mover(asker, after)?;
+    let (client, own) = (http_session.client, http_session.policy);
     agent.line.with(|line, _| line.set_policy(client, policy.unwrap_or(own)));
-    let job = agent.jobs.begin(&commander, turn, what.clone(), move |task, session| {
+    let job = agent.jobs.begin(&http_session, turn, what.clone(), move |task, session| {
         let (done, error) = run(task, session, &order);
         task.line.with(|line, now| {
             // If the result is uncertain and the motion may continue, the policy from the start of the motion stays in
@@ -341,7 +341,7 @@ fn begin(
     })?;
     agent.note(
         "job",
-        json!({ "client": commander.client.0, "job": job.number, "what": what, "policy": policy }),
+        json!({ "client": http_session.client.0, "job": job.number, "what": what, "policy": policy }),
     );
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }

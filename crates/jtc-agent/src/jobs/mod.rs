@@ -1,9 +1,9 @@
 //! Work of an agent for clients without a connection to the line: keeps connections for them, runs their jobs, and writes a journal that a
 //! client can read when it returns.
-mod commander;
-mod give;
-mod happening;
+mod event;
+mod http_session;
 mod poses;
+mod push_arm;
 mod recover;
 mod report;
 mod run;
@@ -19,10 +19,10 @@ use std::time::{Duration, Instant};
 use agent_kit::api::Problem;
 use jtc_host::{Arm, Session};
 
-pub use commander::{Commander, Turn, Unable, Wish};
-pub use give::{Given, give};
-pub use happening::{Happening, Journal};
+pub use event::{ArmEvent, Journal};
+pub use http_session::{HttpSession, Turn, Unable, Wish};
 pub use poses::{POSES_MAX, PoseStore, PoseStoreError};
+pub use push_arm::{Given, give};
 pub use recover::recover;
 pub use report::MotionReport;
 pub use run::{Course, Done, Order, run};
@@ -77,7 +77,7 @@ pub struct Job {
 
 #[derive(Default)]
 struct Kept {
-    commanders: BTreeMap<String, (Arc<Commander>, Duration)>,
+    http_sessions: BTreeMap<String, (Arc<HttpSession>, Duration)>,
     jobs: VecDeque<Job>,
     last: u64,
     ended: Ended,
@@ -103,7 +103,7 @@ pub struct Jobs {
     pub store: Store,
     arm: Arm,
     /// Session that asks questions for all clients.
-    asker: Arc<Commander>,
+    asker: Arc<HttpSession>,
     /// Held stops and their causes.
     pub stops: Stops,
     kept: Mutex<Kept>,
@@ -114,7 +114,7 @@ impl Jobs {
     pub fn new(line: Line, store: Store, arm: Arm) -> Arc<Self> {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
-        let asker = Commander::new(&line, introduction);
+        let asker = HttpSession::new(&line, introduction);
         let jobs = Arc::new(Self {
             line,
             journal: Journal::default(),
@@ -130,7 +130,7 @@ impl Jobs {
     }
 
     /// Returns the session that asks questions for all clients.
-    pub fn asker(&self) -> &Arc<Commander> {
+    pub fn asker(&self) -> &Arc<HttpSession> {
         &self.asker
     }
 
@@ -141,34 +141,34 @@ impl Jobs {
 
     /// Registers a client that sends its requests with `key`. Its lease lapses if it sends none for `lasts`. Returns
     /// `None` if too many clients are registered.
-    pub fn admit(&self, key: &str, introduction: Introduction, lasts: Duration) -> Option<Arc<Commander>> {
-        let commander = Commander::new(&self.line, introduction);
+    pub fn admit(&self, key: &str, introduction: Introduction, lasts: Duration) -> Option<Arc<HttpSession>> {
+        let http_session = HttpSession::new(&self.line, introduction);
         let mut kept = self.lock();
-        if kept.commanders.len() >= COMMANDERS_MAX {
+        if kept.http_sessions.len() >= COMMANDERS_MAX {
             // Removes a client without lease and job. Otherwise a program that restarts repeatedly would use up all
             // places.
             let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
             let idle = kept
-                .commanders
+                .http_sessions
                 .iter()
                 .filter(|(_, (other, _))| Some(other.client) != holder && other.idle() > Duration::ZERO);
             let longest = idle.max_by_key(|(_, (other, _))| other.idle()).map(|(key, _)| key.clone())?;
-            kept.commanders.remove(&longest);
+            kept.http_sessions.remove(&longest);
         }
-        kept.commanders.insert(key.to_owned(), (commander.clone(), lasts));
-        Some(commander)
+        kept.http_sessions.insert(key.to_owned(), (http_session.clone(), lasts));
+        Some(http_session)
     }
 
     /// Returns the client with this key, and the time without a request after which its lease lapses.
-    pub fn commander(&self, key: &str) -> Option<(Arc<Commander>, Duration)> {
-        let found = self.lock().commanders.get(key).cloned()?;
+    pub fn http_session(&self, key: &str) -> Option<(Arc<HttpSession>, Duration)> {
+        let found = self.lock().http_sessions.get(key).cloned()?;
         found.0.see();
         Some(found)
     }
 
     /// Removes the client with this key.
     pub fn dismiss(&self, key: &str) {
-        self.lock().commanders.remove(key);
+        self.lock().http_sessions.remove(key);
     }
 
     /// Begins a job for a client, in its turn.
@@ -178,12 +178,12 @@ impl Jobs {
     /// [`Unable`]: the job was not begun.
     pub fn begin(
         self: &Arc<Self>,
-        commander: &Arc<Commander>,
+        http_session: &Arc<HttpSession>,
         turn: Turn,
         what: String,
         act: impl FnOnce(&Task<'_>, &mut Session<ClientPort>) -> (Done, Option<Problem>) + Send + 'static,
     ) -> Result<Job, Unable> {
-        let client = commander.name.clone();
+        let client = http_session.name.clone();
         let job = {
             let mut kept = self.lock();
             kept.last += 1;
@@ -191,20 +191,20 @@ impl Jobs {
         };
         // Stored before the job can end.
         self.remember(job.clone());
-        let (own, begun, whose) = (self.clone(), job.clone(), Arc::downgrade(commander));
+        let (own, begun, whose) = (self.clone(), job.clone(), Arc::downgrade(http_session));
         let unfinished = Unfinished { jobs: self.clone(), number: job.number };
         let work = move |session: &mut Session<ClientPort>, wishes: &Receiver<Wish>| {
-            let Some(commander) = whose.upgrade() else { return (Done::default(), None) };
+            let Some(http_session) = whose.upgrade() else { return (Done::default(), None) };
             let Job { number, what, client, .. } = begun;
             let Self { line, journal, arm, .. } = &*own;
-            journal.write(Happening::Begun { job: number, what: what.clone(), client });
+            journal.write(ArmEvent::Begun { job: number, what: what.clone(), client });
             act(
-                &Task { wishes, job: number, what: &what, journal, line, commander: &commander, arm },
+                &Task { wishes, job: number, what: &what, journal, line, http_session: &http_session, arm },
                 session,
             )
         };
         let accepted =
-            commander.begin(turn, job.number, work, move |(done, error)| unfinished.end(done, error));
+            http_session.begin(turn, job.number, work, move |(done, error)| unfinished.end(done, error));
         accepted.map(|()| job)
     }
 
@@ -255,7 +255,7 @@ impl Jobs {
         }
         report::make_room(&mut kept.jobs);
         drop(kept);
-        self.journal.write(Happening::Ended { job: number, outcome, error });
+        self.journal.write(ArmEvent::Ended { job: number, outcome, error });
     }
 
     fn lock(&self) -> MutexGuard<'_, Kept> {
@@ -315,7 +315,9 @@ fn watch(jobs: &Weak<Jobs>) {
         see(&jobs, &mut seen);
         if looked.elapsed() >= Duration::from_secs(1) {
             looked = Instant::now();
-            jobs.lock().commanders.retain(|_, (commander, lasts)| commander.idle() < *lasts + FORGOTTEN);
+            jobs.lock()
+                .http_sessions
+                .retain(|_, (http_session, lasts)| http_session.idle() < *lasts + FORGOTTEN);
         }
         let line = jobs.line.clone();
         drop(jobs);
@@ -335,28 +337,28 @@ fn see(jobs: &Jobs, seen: &mut Seen) {
         jobs.stops.see(status, &jobs.asker);
     }
     let state = status.as_ref().map(|status| {
-        let errors = jtc_host::words::causes(status);
+        let errors = jtc_host::labels::causes(status);
         (status.state.name().to_owned(), status.trajectory.name().to_owned(), errors)
     });
     if holder != seen.holder {
         seen.holder.clone_from(&holder);
-        jobs.journal.write(Happening::Lease { holder });
+        jobs.journal.write(ArmEvent::Lease { holder });
     }
     if halt != seen.halt && seen.halted.is_none_or(|at| at.elapsed() >= HALTS_APART) {
         (seen.halt, seen.halted) = (halt, Some(Instant::now()));
         let (by, command) = by;
-        jobs.journal.write(Happening::Halt { command, by });
+        jobs.journal.write(ArmEvent::Halt { command, by });
     }
     if state != seen.state {
         seen.state.clone_from(&state);
         if let Some((state, trajectory, errors)) = state {
-            jobs.journal.write(Happening::State { state, trajectory, errors });
+            jobs.journal.write(ArmEvent::State { state, trajectory, errors });
         }
     }
     if lost != seen.lost {
         seen.lost.clone_from(&lost);
         if let Some(why) = lost {
-            jobs.journal.write(Happening::Lost { why });
+            jobs.journal.write(ArmEvent::Lost { why });
         }
     }
 }

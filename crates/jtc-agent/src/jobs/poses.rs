@@ -131,7 +131,7 @@ impl PoseStore {
             let kept = Kept { format: FORMAT, poses_rad: poses.clone() };
             let io = |source| PoseStoreError::Io { path: path.clone(), source };
             let text = serde_json::to_vec_pretty(&kept).map_err(|e| io(e.into()))?;
-            host_kit::write_whole(path, &text).map_err(io)?;
+            host_kit::write_atomically(path, &text).map_err(io)?;
         }
         *self.lock() = poses;
         Ok(done)

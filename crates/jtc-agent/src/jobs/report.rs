@@ -57,7 +57,7 @@ impl MotionReport {
         };
         let info = RecordingInfo {
             source: made.port.clone(),
-            commanded_by: task.commander.name.clone(),
+            commanded_by: task.http_session.name.clone(),
             trajectory: task.what.to_owned(),
             start_unix_ns: made.began.as_nanos() as u64,
             ending: Ending { outcome: outcome.into(), reason, ..Ending::default() },

@@ -17,7 +17,7 @@ use tokio::sync::oneshot;
 pub use jtc_host::run::Course;
 
 use super::report::{self, Made, MotionReport};
-use super::{Given, Happening, Task, Wish};
+use super::{ArmEvent, Given, Task, Wish};
 use crate::owner::ClientPort;
 
 /// Interval at which the progress of a motion is reported.
@@ -181,7 +181,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         {
             self.task.note(format!("approach {words}"));
         }
-        journal.write(Happening::Checked {
+        journal.write(ArmEvent::Checked {
             job,
             phase: phase.name().to_owned(),
             duration_s: checked.trajectory().duration_s(),
@@ -198,14 +198,14 @@ impl Observer<ClientPort> for RunJob<'_> {
         if segments_done * 10 >= (self.upload_shown + 1) * segments.max(1) {
             self.upload_shown = segments_done * 10 / segments.max(1);
             let phase = phase.name().to_owned();
-            journal.write(Happening::Uploading { job, phase, segments_done, segments });
+            journal.write(ArmEvent::Uploading { job, phase, segments_done, segments });
         }
     }
 
     fn uploaded(&mut self, phase: Phase, upload: &UploadReport) {
         let Task { job, journal, .. } = *self.task;
         let (time_s, bytes, retries) = (upload.time_s, upload.bytes, upload.retries);
-        journal.write(Happening::Uploaded { job, phase: phase.name().to_owned(), time_s, bytes, retries });
+        journal.write(ArmEvent::Uploaded { job, phase: phase.name().to_owned(), time_s, bytes, retries });
     }
 
     fn begins(
@@ -214,12 +214,12 @@ impl Observer<ClientPort> for RunJob<'_> {
         phase: Phase,
         checked: &CheckedTrajectory,
     ) -> Result<SampleReceiver, Problem> {
-        let Task { job, journal, commander, .. } = *self.task;
+        let Task { job, journal, http_session, .. } = *self.task;
         let (phase, duration_s) = (phase.name().to_owned(), checked.trajectory().duration_s());
-        journal.write(Happening::Executing { job, phase, duration_s });
+        journal.write(ArmEvent::Executing { job, phase, duration_s });
         self.digest.replace(Digest::new());
         (self.reported, self.began) = (Instant::now(), host_kit::unix_time());
-        commander.motion_begins();
+        http_session.motion_begins();
         let digest = Rc::clone(&self.digest);
         Ok(Box::new(move |sample| digest.borrow_mut().push(sample)))
     }
@@ -229,7 +229,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         if self.reported.elapsed() >= MOVING && status.is_executing() {
             self.reported = Instant::now();
             let phase = phase.name().to_owned();
-            journal.write(Happening::Moving { job, phase, point: status.point });
+            journal.write(ArmEvent::Moving { job, phase, point: status.point });
         }
         let Ok(Wish { flow, done }) = wishes.try_recv() else { return Flow::Continue };
         self.wish = Some(done);
@@ -247,7 +247,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         let (task, done) = (self.task, &mut *self.done);
         // A request that arrives with the last status has no effect. Its client is told that the motion has ended.
         self.wish = None;
-        task.commander.motion_ended(task.wishes);
+        task.http_session.motion_ended(task.wishes);
         let digest = self.digest.take();
         done.summary = Some(digest.summary(&RecordingInfo::of(&self.site.arm)));
         let now = session.statistics();
@@ -265,7 +265,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         self.link = now;
         if leg.phase == Phase::Motion && leg.is_finished() {
             done.runs += 1;
-            task.journal.write(Happening::Finished { job: task.job, runs: done.runs });
+            task.journal.write(ArmEvent::Finished { job: task.job, runs: done.runs });
         }
         Ok(())
     }

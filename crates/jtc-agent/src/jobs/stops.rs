@@ -3,10 +3,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use jtc_host::{Port as _, words};
+use jtc_host::{Port as _, labels};
 use jtc_wire::{Reactions, Status, StopCause};
 
-use super::Commander;
+use super::HttpSession;
 
 /// Time after which an unanswered question is repeated.
 const AGAIN: Duration = Duration::from_secs(2);
@@ -42,11 +42,11 @@ impl Stops {
 
     /// Returns the joints with an encoder jump, one bit each.
     pub fn jumped(&self, status: &Status) -> u8 {
-        if words::has_torque(status) { self.lock().jumped } else { 0 }
+        if labels::has_torque(status) { self.lock().jumped } else { 0 }
     }
 
     /// Takes a status. If it shows a new held stop, asks the controller for the cause.
-    pub(super) fn see(&self, status: &Status, asker: &Commander) {
+    pub(super) fn see(&self, status: &Status, asker: &HttpSession) {
         let Some(stop) = self.begins(status) else { return };
         // Another question is in progress. The cause is requested at the next check.
         let Ok(turn) = asker.turn() else { return };
@@ -62,7 +62,7 @@ impl Stops {
     /// Returns the number of the held stop whose cause must be requested. `None`: no request is needed.
     fn begins(&self, status: &Status) -> Option<u64> {
         let mut state = self.lock();
-        if !words::has_torque(status) {
+        if !labels::has_torque(status) {
             state.jumped = 0;
         }
         let ended = state.held && !status.is_held_stop();

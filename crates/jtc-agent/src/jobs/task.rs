@@ -4,7 +4,7 @@ use std::sync::mpsc::Receiver;
 use agent_kit::api::Problem;
 use jtc_host::Arm;
 
-use super::{Commander, Happening, Journal, Wish};
+use super::{ArmEvent, HttpSession, Journal, Wish};
 use crate::line::ClientId;
 use crate::owner::Line;
 
@@ -24,7 +24,7 @@ pub struct Task<'a> {
     /// Line, from which the job learns of a Stop of another client.
     pub line: &'a Line,
     /// Session of the job's client.
-    pub commander: &'a Commander,
+    pub http_session: &'a HttpSession,
     /// Arm that is used if the controller cannot return its own arm.
     pub arm: &'a Arm,
 }
@@ -32,22 +32,22 @@ pub struct Task<'a> {
 impl Task<'_> {
     /// Writes a note to the journal.
     pub fn note(&self, text: String) {
-        self.journal.write(Happening::Note { job: self.job, text });
+        self.journal.write(ArmEvent::Note { job: self.job, text });
     }
 
     /// Returns `true` if the arm was stopped or paused after this motion was requested or resumed.
     pub fn is_halted(&self) -> bool {
-        self.line.with(|line, _| line.is_halted(self.commander.client))
+        self.line.with(|line, _| line.is_halted(self.http_session.client))
     }
 
     /// Returns the name of the client that stopped or paused the arm.
     pub fn halted_by(&self) -> String {
-        self.line.with(|line, _| line.halted_by(self.commander.client).to_owned())
+        self.line.with(|line, _| line.halted_by(self.http_session.client).to_owned())
     }
 
     /// Returns the error for a job that was stopped before it moved the arm.
     pub fn stopped(&self) -> Problem {
-        stopped(self.line, self.commander.client)
+        stopped(self.line, self.http_session.client)
     }
 }
 

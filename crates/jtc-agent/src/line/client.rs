@@ -7,7 +7,7 @@ use jtc_host::port::Halts;
 use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 
 use super::Denied;
-use super::class::HostFrame;
+use super::frame_class::HostFrame;
 
 /// Largest number of waiting bytes of a client's frames: the frames in flight of an upload, and some commands.
 const WAITING_MAX: usize = 8 * FRAME_MAX;

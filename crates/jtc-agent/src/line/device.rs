@@ -3,9 +3,9 @@ use std::time::Duration;
 
 use jtc_wire::{DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
 
-use super::class::{Class, HostFrame, returned_by};
 use super::client::Client;
-use super::outbox::{Outgoing, Passed};
+use super::frame_class::{FrameClass, HostFrame, returned_by};
+use super::tx_queue::{Outgoing, Passed};
 use super::{
     ClientId, Delivery, Denied, HALTS, LineEvent, OWNER, RECORD_TIME, RETURN_TIME, Return, Sent, SharedLine,
 };
@@ -14,14 +14,14 @@ impl SharedLine {
     /// Returns the time at which [`to_device`](Self::to_device) must be called again if no other event occurs before.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         let waits = self.clients.values().any(|client| !client.waiting.is_empty());
-        let line = match self.outbox.due(now) {
+        let line = match self.tx_queue.due(now) {
             None if waits => Some(self.returns.as_ref().map_or(now, |returns| returns.until)),
             due => due,
         };
         let lease = self.lease.as_ref().and_then(|lease| lease.until);
         // A command that waits for the line is due when the line is free.
-        let own = [self.halts.due(now), self.moving.due()].into_iter().flatten().min();
-        let own = own.filter(|_| self.outbox.due(now).is_none());
+        let own = [self.halts.due(now), self.motion_tracker.due()].into_iter().flatten().min();
+        let own = own.filter(|_| self.tx_queue.due(now).is_none());
         [line, lease, own].into_iter().flatten().min()
     }
 
@@ -35,13 +35,13 @@ impl SharedLine {
         }
         let mut all = Vec::new();
         loop {
-            self.outbox.set_urgent(self.halts.frame().map(|frame| Outgoing { client: HALTS, frame }));
-            if self.outbox.is_free()
+            self.tx_queue.set_urgent(self.halts.frame().map(|frame| Outgoing { client: HALTS, frame }));
+            if self.tx_queue.is_free()
                 && let Some(outgoing) = self.next_turn(now)
             {
-                self.outbox.begin(outgoing);
+                self.tx_queue.begin(outgoing);
             }
-            let (bytes, passed) = self.outbox.next(now);
+            let (bytes, passed) = self.tx_queue.next(now);
             let more = !bytes.is_empty();
             all.extend(bytes);
             for passed in passed {
@@ -62,12 +62,12 @@ impl SharedLine {
 
     /// Notes that the operating system has accepted the bytes at time `now`.
     pub fn handed_over(&mut self, now: Duration) {
-        self.outbox.handed_over(now);
+        self.tx_queue.handed_over(now);
     }
 
     /// Returns the next frame. The clients take turns.
     fn next_turn(&mut self, now: Duration) -> Option<Outgoing> {
-        if let Some(frame) = self.moving.frame(now) {
+        if let Some(frame) = self.motion_tracker.frame(now) {
             return Some(Outgoing { client: OWNER, frame });
         }
         self.refuse_without_lease(now);
@@ -77,7 +77,7 @@ impl SharedLine {
         for id in first.into_iter().chain(then) {
             let Some(client) = self.clients.get_mut(&id) else { continue };
             let Some(frame) = client.waiting.front() else { continue };
-            if frame.class == Class::Ask
+            if frame.class == FrameClass::Ask
                 && let Err(denied) = self.may_ask(id, now)
             {
                 if let Some(frame) = self.clients.get_mut(&id).and_then(Client::take_waiting) {
@@ -95,7 +95,7 @@ impl SharedLine {
             }
             let frame = client.take_waiting()?;
             if let Some(kind) = returns {
-                let until = self.outbox.free_at().max(now) + RECORD_TIME;
+                let until = self.tx_queue.free_at().max(now) + RECORD_TIME;
                 self.returns = Some(Return { client: id, kind, until });
             }
             self.last_turn = id;
@@ -126,19 +126,19 @@ impl SharedLine {
 
     pub(super) fn note_written(&mut self, outgoing: Outgoing, abandoned: bool) {
         let Outgoing { client, frame: HostFrame { frame_type, class, bytes } } = outgoing;
-        let at = self.outbox.free_at();
+        let at = self.tx_queue.free_at();
         match class {
-            Class::Halt(_) => self.halts.written(at, self.outbox.baud()),
-            Class::Motion if !abandoned => {
+            FrameClass::Halt(_) => self.halts.written(at, self.tx_queue.baud()),
+            FrameClass::Motion if !abandoned => {
                 self.halts.motion_written();
-                self.moving.begun(frame_type, at);
+                self.motion_tracker.begun(frame_type, at);
             }
             _ if frame_type == FrameType::SetSettings && !abandoned => self.supervision.note_written(&bytes),
-            _ if frame_type == FrameType::Trajectory && !abandoned => self.moving.uploaded(at),
-            _ if frame_type == FrameType::TeachingModeDisable && !abandoned => self.moving.taught(),
+            _ if frame_type == FrameType::Trajectory && !abandoned => self.motion_tracker.uploaded(at),
+            _ if frame_type == FrameType::TeachingModeDisable && !abandoned => self.motion_tracker.taught(),
             _ => {}
         }
-        if class != Class::Ask && !abandoned {
+        if class != FrameClass::Ask && !abandoned {
             let client = if client == HALTS { OWNER } else { client };
             self.events.push_back(LineEvent::Sent { client, frame_type, class, bytes });
         }
@@ -182,10 +182,10 @@ impl SharedLine {
                 && response.frame_type == FrameType::TeachingModeEnable as u8
             {
                 // The controller has refused Teaching.
-                self.moving.taught();
+                self.motion_tracker.taught();
             }
             if *client == OWNER && taken && response.frame_type == FrameType::TeachingModeDisable as u8 {
-                self.moving.answered();
+                self.motion_tracker.answered();
             }
             if FrameType::from_byte(response.frame_type).is_some_and(|t| returned_by(t).is_none()) {
                 self.events.push_back(LineEvent::Answered { client: *client, response: *response });

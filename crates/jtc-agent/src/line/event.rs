@@ -1,7 +1,7 @@
 //! Events on the line.
 use jtc_wire::{FrameType, Response};
 
-use super::{Class, ClientId, Denied, Lease, Policy, PutOut, Will};
+use super::{ClientId, Denied, FrameClass, Lease, Policy, PutOut, Will};
 
 /// Numbers of events on a line since its owner was started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,7 +46,7 @@ pub enum LineEvent {
         /// Type of the frame.
         frame_type: FrameType,
         /// Class of the frame.
-        class: Class,
+        class: FrameClass,
         /// Complete frame.
         bytes: Vec<u8>,
     },

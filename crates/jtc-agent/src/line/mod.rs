@@ -10,15 +10,15 @@
 //!
 //! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last one
 //! moves nothing, even if its frames arrive later.
-mod class;
 mod client;
 mod device;
 mod event;
-mod halts;
+mod frame_class;
 mod lease;
-mod moving;
-mod outbox;
+mod motion_tracker;
+mod stop_queue;
 mod supervision;
+mod tx_queue;
 mod will;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -27,20 +27,20 @@ use std::time::Duration;
 use jtc_wire::{ExecCommand, FrameType, Status, StatusCounters, StatusReceiver};
 
 pub use agent_kit::access::Role;
-pub use class::Class;
-pub(crate) use class::may_change_the_arm;
 pub use client::{ClientId, Delivery, Introduction, Policy, PutOut};
 pub use event::{Counts, LineEvent};
+pub use frame_class::FrameClass;
+pub(crate) use frame_class::may_change_the_arm;
 pub use lease::{Denied, Lease};
 use lease::{NOT_ASKED, POLICY};
 pub use will::{Applied, Moves, Will};
 
-use class::HostFrame;
 use client::Client;
-use halts::Halts;
-use moving::Moving;
-use outbox::Outbox;
+use frame_class::HostFrame;
+use motion_tracker::MotionTracker;
+use stop_queue::StopQueue;
 use supervision::Supervision;
+use tx_queue::TxQueue;
 
 /// Longest wait for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(2);
@@ -72,18 +72,18 @@ struct Return {
 pub struct SharedLine {
     clients: BTreeMap<ClientId, Client>,
     next_id: u64,
-    outbox: Outbox,
+    tx_queue: TxQueue,
     sent: VecDeque<Sent>,
     returns: Option<Return>,
     /// Client whose frame was sent last. Clients take turns.
     last_turn: ClientId,
     lease: Option<Lease>,
-    halts: Halts,
+    halts: StopQueue,
     /// Last Stop or Pause: its number, the name of its client, and the command.
     halted: (u64, String, ExecCommand),
     /// End of the hold-off. Until then only the client of the last Stop or Pause may begin a motion.
     calm_until: Duration,
-    moving: Moving,
+    motion_tracker: MotionTracker,
     /// Name and policy of the last lease holder. While no client holds the lease, this policy applies to the motion.
     left: (String, Policy),
     /// Will that was reported last.
@@ -106,15 +106,15 @@ impl SharedLine {
         Self {
             clients: BTreeMap::new(),
             next_id: OWNER.0 + 1,
-            outbox: Outbox::new(baud),
+            tx_queue: TxQueue::new(baud),
             sent: VecDeque::new(),
             returns: None,
             last_turn: OWNER,
             lease: None,
-            halts: Halts::default(),
+            halts: StopQueue::default(),
             halted: (0, String::new(), ExecCommand::Stop),
             calm_until: Duration::ZERO,
-            moving: Moving::default(),
+            motion_tracker: MotionTracker::default(),
             left: ("nobody".to_owned(), Policy::Continue),
             will: None,
             receiver: StatusReceiver::new(),
@@ -139,9 +139,9 @@ impl SharedLine {
     /// Removes a client. Drops those of its frames that are not written yet, and applies its policy to its motion.
     pub fn leave(&mut self, client: ClientId, now: Duration) {
         let Some(gone) = self.clients.remove(&client) else { return };
-        if let Some((outgoing, _)) = self.outbox.writing()
+        if let Some((outgoing, _)) = self.tx_queue.writing()
             && outgoing.client == client
-            && let Some((outgoing, true)) = self.outbox.give_up(now)
+            && let Some((outgoing, true)) = self.tx_queue.give_up(now)
         {
             self.note_written(outgoing, true);
         }
@@ -198,14 +198,14 @@ impl SharedLine {
         self.halts.ask(asker, command);
         // After a Stop the arm must hold its position. In Teaching it would be compliant. Teaching may also begin as soon as the
         // arm is at rest, so it is ended in both cases.
-        if self.moving.may_teach(self.status.as_ref()) {
-            self.moving.end_teaching(now);
+        if self.motion_tracker.may_teach(self.status.as_ref()) {
+            self.motion_tracker.end_teaching(now);
         }
         let denied = Denied::Stopped { by: name };
-        if let Some((outgoing, written)) = self.outbox.writing()
+        if let Some((outgoing, written)) = self.tx_queue.writing()
             && written == 0
             && outgoing.frame.class.needs_lease()
-            && let Some((outgoing, _)) = self.outbox.give_up(now)
+            && let Some((outgoing, _)) = self.tx_queue.give_up(now)
         {
             self.refuse(outgoing.client, &outgoing.frame, denied.clone());
         }
@@ -230,7 +230,7 @@ impl SharedLine {
             client.heard_at = now;
             let allowed = client.allow(now);
             // A Stop is executed even if the client is disconnected because of its other frames.
-            if allowed.is_ok() || matches!(frame.class, Class::Halt(_)) {
+            if allowed.is_ok() || matches!(frame.class, FrameClass::Halt(_)) {
                 self.take_frame(id, frame, now);
             }
             if let Err(reason) = allowed {
@@ -240,7 +240,7 @@ impl SharedLine {
     }
 
     fn take_frame(&mut self, id: ClientId, frame: HostFrame, now: Duration) {
-        if let Class::Halt(command) = frame.class {
+        if let FrameClass::Halt(command) = frame.class {
             let (name, before) = (self.name(id), self.halted.0);
             self.halt(id, &name, command, now);
             // A client's own Stop does not invalidate its next request.
@@ -256,7 +256,7 @@ impl SharedLine {
         {
             return self.refuse(id, &frame, denied);
         }
-        if frame.class == Class::Ask
+        if frame.class == FrameClass::Ask
             && let Err(denied) = self.may_ask(id, now)
         {
             return self.refuse(id, &frame, denied);
@@ -273,7 +273,7 @@ impl SharedLine {
     /// Checks that this client may send this frame.
     fn may_send(&mut self, id: ClientId, frame: &HostFrame, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
-        let motion = frame.class == Class::Motion;
+        let motion = frame.class == FrameClass::Motion;
         // If a client stopped the motion, its upload ends at once.
         if (motion || frame.frame_type == FrameType::Trajectory) && self.is_halted(id) {
             return Err(self.stopped(id));
@@ -388,31 +388,31 @@ impl SharedLine {
     /// Stops the arm because the agent ends. Prevents the motions that clients still prepare.
     pub fn end(&mut self, now: Duration) {
         self.halt(OWNER, "the end of the agent", ExecCommand::Stop, now);
-        self.moving.end_teaching(now);
+        self.motion_tracker.end_teaching(now);
     }
 
     /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to be at rest, because the
     /// last status is older than the last command. In this case the controller may refuse the command, and other
     /// clients are not affected. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
-        let moved = self.moving.may_move(self.status.as_ref(), now);
+        let moved = self.motion_tracker.may_move(self.status.as_ref(), now);
         if moved {
             self.halt(OWNER, name, command, now);
         } else {
             self.halts.ask(OWNER, command);
         }
-        self.moving.end_teaching(now);
+        self.motion_tracker.end_teaching(now);
         moved
     }
 
     /// Returns false only if the arm is certainly at rest and no motion is about to begin.
     pub fn may_move(&self, now: Duration) -> bool {
-        self.moving.may_move(self.status.as_ref(), now)
+        self.motion_tracker.may_move(self.status.as_ref(), now)
     }
 
     /// Returns true if no frame waits for the line and no Stop waits for its record.
     pub fn is_idle(&self) -> bool {
-        self.halts.are_done() && self.moving.due().is_none() && self.outbox.is_free()
+        self.halts.are_done() && self.motion_tracker.due().is_none() && self.tx_queue.is_free()
     }
 
     fn set_lease(&mut self, lease: Option<Lease>) {

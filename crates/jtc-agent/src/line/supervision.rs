@@ -62,7 +62,7 @@ impl SharedLine {
     pub(super) fn may_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(timeout) = self.supervision.timeout else { return Ok(()) };
         self.end_lapsed(now);
-        if !self.moving.is_supervised(self.status.as_ref(), now) {
+        if !self.motion_tracker.is_supervised(self.status.as_ref(), now) {
             return Ok(());
         }
         let Some(lease) = &self.lease else {

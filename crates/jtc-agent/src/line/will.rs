@@ -68,7 +68,7 @@ impl SharedLine {
             // rest.
             self.will = Some(self.will_of(Moves::Motion));
         }
-        let moves = self.moving.may_move(self.status.as_ref(), now);
+        let moves = self.motion_tracker.may_move(self.status.as_ref(), now);
         let stands = self.status.as_ref().is_some_and(|(_, status)| {
             status.trajectory == TrajectoryState::Pause && status.state == ControllerState::HoldPos
         });
@@ -89,7 +89,7 @@ impl SharedLine {
     /// Reports the will when it has changed.
     pub(super) fn look_what_moves(&mut self, now: Duration) {
         let before = self.will.as_ref().map(|will| will.what);
-        let will = self.moving.what(self.status.as_ref(), now, before).map(|what| self.will_of(what));
+        let will = self.motion_tracker.what(self.status.as_ref(), now, before).map(|what| self.will_of(what));
         if will != self.will {
             self.will.clone_from(&will);
             self.events.push_back(LineEvent::Will(will));

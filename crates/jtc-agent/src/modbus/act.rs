@@ -11,7 +11,7 @@ use super::handshake::Order;
 use super::map::View;
 use super::plc::Plc;
 use crate::jobs::{
-    Commander, Course, Job, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
+    Course, HttpSession, Job, Order as RunOrder, STOPPED, Task, Turn, Unable, recover, run, stopped,
 };
 use crate::line::Denied;
 use crate::owner::ClientPort;
@@ -71,31 +71,33 @@ impl Plc {
         if let Some(lost) = self.line.lost() {
             return Err(Refusal { why: lost, ..Refusal::new(Outcome::NoController) });
         }
-        let commander = self.commander();
+        let http_session = self.http_session();
         if order.command == Command::Release {
-            return self.release(&commander);
+            return self.release(&http_session);
         }
         if order.watchdog_ms == 0 {
             return Err(Refusal::new(Outcome::Value));
         }
         match order.command {
-            Command::Start => self.start(&commander, order, halt),
-            Command::Resume => self.resume(&commander, halt).await,
-            Command::Recover | Command::RecoverWithDefaults => self.recover(&commander, order.command, halt),
-            Command::SetSpeed => self.change_speed(&commander, order.speed).await,
+            Command::Start => self.start(&http_session, order, halt),
+            Command::Resume => self.resume(&http_session, halt).await,
+            Command::Recover | Command::RecoverWithDefaults => {
+                self.recover(&http_session, order.command, halt)
+            }
+            Command::SetSpeed => self.change_speed(&http_session, order.speed).await,
             Command::TeachOn => {
                 self.free_to_move()?;
-                let turn = commander.turn()?;
-                self.take_lease(&commander)?;
-                self.ask_to_move(&commander, halt)?;
-                let (line, client) = (self.line.clone(), commander.client);
+                let turn = http_session.turn()?;
+                self.take_lease(&http_session)?;
+                self.ask_to_move(&http_session, halt)?;
+                let (line, client) = (self.line.clone(), http_session.client);
                 let halted = move || line.with(|line, _| line.is_halted(client));
-                self.call_in(&commander, turn, move |session| session.teach_until(halted)).await
+                self.call_in(&http_session, turn, move |session| session.teach_until(halted)).await
             }
-            Command::TeachOff => self.call(&commander, |session| session.teach(false)).await,
-            Command::GripperOn => self.call(&commander, |session| session.gripper(true)).await,
-            Command::GripperOff => self.call(&commander, |session| session.gripper(false)).await,
-            Command::Clear => self.call(&commander, Session::clear_all).await,
+            Command::TeachOff => self.call(&http_session, |session| session.teach(false)).await,
+            Command::GripperOn => self.call(&http_session, |session| session.gripper(true)).await,
+            Command::GripperOff => self.call(&http_session, |session| session.gripper(false)).await,
+            Command::Clear => self.call(&http_session, Session::clear_all).await,
             // These commands were already executed when they arrived.
             Command::None | Command::Pause | Command::Stop | Command::Release => Ok(()),
         }
@@ -107,18 +109,18 @@ impl Plc {
     }
 
     /// Takes or renews the lease, which lasts for the time of the watchdog.
-    fn take_lease(&self, commander: &Commander) -> Result<(), Refusal> {
+    fn take_lease(&self, http_session: &HttpSession) -> Result<(), Refusal> {
         let (policy, lasts) = self.watchdog();
         let taken = self.line.with(|line, now| {
-            line.set_policy(commander.client, policy);
-            line.take_lease(commander.client, Some(lasts), now)
+            line.set_policy(http_session.client, policy);
+            line.take_lease(http_session.client, Some(lasts), now)
         });
         Ok(taken?)
     }
 
     /// Returns an error if the arm was stopped after the command, or by another client shortly before it.
-    fn ask_to_move(&self, commander: &Commander, halt: u64) -> Result<(), Refusal> {
-        Ok(self.line.with(|line, now| line.ask_to_move(commander.client, halt, now))?)
+    fn ask_to_move(&self, http_session: &HttpSession, halt: u64) -> Result<(), Refusal> {
+        Ok(self.line.with(|line, now| line.ask_to_move(http_session.client, halt, now))?)
     }
 
     /// Returns the last status of the controller.
@@ -128,13 +130,18 @@ impl Plc {
         View { status, ..View::default() }
     }
 
-    fn start(self: &Arc<Self>, commander: &Arc<Commander>, order: &Order, halt: u64) -> Result<(), Refusal> {
+    fn start(
+        self: &Arc<Self>,
+        http_session: &Arc<HttpSession>,
+        order: &Order,
+        halt: u64,
+    ) -> Result<(), Refusal> {
         let number = order.trajectory;
         let stored = self.jobs.store.get(number).ok_or_else(|| Refusal::new(Outcome::NoTrajectory))?;
         self.free_to_move()?;
         // The turn is requested first. So while a job runs, the answer is "busy" and not a consequence of that job.
-        let turn = commander.turn()?;
-        self.take_lease(commander)?;
+        let turn = http_session.turn()?;
+        self.take_lease(http_session)?;
         let reported = self.reported();
         if !reported.is_fresh() {
             return Err(Refusal::new(Outcome::NoController));
@@ -142,7 +149,7 @@ impl Plc {
         if !reported.is_ready() {
             return Err(Refusal { error: error_number("not-ready"), ..Refusal::new(Outcome::NotReady) });
         }
-        self.ask_to_move(commander, halt)?;
+        self.ask_to_move(http_session, halt)?;
         let order = RunOrder {
             course: Course::Along(Arc::new(stored.trajectory.clone())),
             approach: order.approach,
@@ -152,14 +159,15 @@ impl Plc {
             accept_device_limits: false,
         };
         let what = format!("run of trajectory {number}, {}", stored.name);
-        let job = self.jobs.begin(commander, turn, what, move |task, session| run(task, session, &order))?;
-        self.begun(commander, &job);
+        let job =
+            self.jobs.begin(http_session, turn, what, move |task, session| run(task, session, &order))?;
+        self.begun(http_session, &job);
         Ok(())
     }
 
     fn recover(
         self: &Arc<Self>,
-        commander: &Arc<Commander>,
+        http_session: &Arc<HttpSession>,
         command: Command,
         halt: u64,
     ) -> Result<(), Refusal> {
@@ -169,63 +177,63 @@ impl Plc {
             RecoverParameters::None
         };
         self.free_to_move()?;
-        let turn = commander.turn()?;
-        self.take_lease(commander)?;
-        self.ask_to_move(commander, halt)?;
+        let turn = http_session.turn()?;
+        self.take_lease(http_session)?;
+        self.ask_to_move(http_session, halt)?;
         let recover =
             move |task: &Task<'_>, session: &mut Session<ClientPort>| recover(task, session, &parameters);
-        let job = self.jobs.begin(commander, turn, "recover".into(), recover)?;
-        self.begun(commander, &job);
+        let job = self.jobs.begin(http_session, turn, "recover".into(), recover)?;
+        self.begun(http_session, &job);
         Ok(())
     }
 
-    fn begun(&self, commander: &Commander, job: &Job) {
+    fn begun(&self, http_session: &HttpSession, job: &Job) {
         self.set_job(job.number);
         let (policy, _) = self.watchdog();
         self.note(
             "job",
-            json!({ "client": commander.client.0, "job": job.number, "what": job.what, "policy": policy }),
+            json!({ "client": http_session.client.0, "job": job.number, "what": job.what, "policy": policy }),
         );
     }
 
-    async fn resume(&self, commander: &Commander, halt: u64) -> Result<(), Refusal> {
+    async fn resume(&self, http_session: &HttpSession, halt: u64) -> Result<(), Refusal> {
         self.free_to_move()?;
-        self.take_lease(commander)?;
+        self.take_lease(http_session)?;
         if !self.reported().is_paused() {
             return Err(Refusal { error: error_number("not-paused"), ..Refusal::new(Outcome::NotReady) });
         }
-        if commander.is_moving() {
-            self.ask_to_move(commander, halt)?;
-            if let Some(done) = commander.wish(Flow::Resume).await {
+        if http_session.is_moving() {
+            self.ask_to_move(http_session, halt)?;
+            if let Some(done) = http_session.wish(Flow::Resume).await {
                 return Ok(done?);
             }
         }
-        let turn = commander.turn()?;
-        self.ask_to_move(commander, halt)?;
-        self.call_in(commander, turn, Session::resume).await
+        let turn = http_session.turn()?;
+        self.ask_to_move(http_session, halt)?;
+        self.call_in(http_session, turn, Session::resume).await
     }
 
-    async fn change_speed(&self, commander: &Commander, percent: u16) -> Result<(), Refusal> {
+    async fn change_speed(&self, http_session: &HttpSession, percent: u16) -> Result<(), Refusal> {
         let part = u8::try_from(percent).ok().filter(|percent| (5..=100).contains(percent));
         let part = part.ok_or_else(|| Refusal::new(Outcome::Value))?;
-        self.take_lease(commander)?;
-        match commander.wish(Flow::Speed(part)).await {
+        self.take_lease(http_session)?;
+        match http_session.wish(Flow::Speed(part)).await {
             Some(done) => done?,
             None => {
                 let set = move |session: &mut Session<ClientPort>| session.set_speed(f64::from(part) / 100.0);
-                self.call_in(commander, commander.turn()?, set).await?;
+                self.call_in(http_session, http_session.turn()?, set).await?;
             }
         }
         self.set_speed(Some(percent));
         Ok(())
     }
 
-    fn release(&self, commander: &Commander) -> Result<(), Refusal> {
-        if let Some(job) = commander.job() {
+    fn release(&self, http_session: &HttpSession) -> Result<(), Refusal> {
+        if let Some(job) = http_session.job() {
             return Err(Unable::Busy(Some(job)).into());
         }
         // If the client does not hold the lease, this has no effect.
-        let _ = self.line.with(|line, now| line.release_lease(commander.client, now));
+        let _ = self.line.with(|line, now| line.release_lease(http_session.client, now));
         self.line.wake();
         self.resign();
         Ok(())
@@ -234,22 +242,22 @@ impl Plc {
     /// Runs a short function with the lease.
     async fn call<E: Into<Error> + Send + 'static>(
         &self,
-        commander: &Commander,
+        http_session: &HttpSession,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<(), E> + Send + 'static,
     ) -> Result<(), Refusal> {
-        let turn = commander.turn()?;
-        self.take_lease(commander)?;
-        self.call_in(commander, turn, act).await
+        let turn = http_session.turn()?;
+        self.take_lease(http_session)?;
+        self.call_in(http_session, turn, act).await
     }
 
     async fn call_in<E: Into<Error> + Send + 'static>(
         &self,
-        commander: &Commander,
+        http_session: &HttpSession,
         turn: Turn,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<(), E> + Send + 'static,
     ) -> Result<(), Refusal> {
-        commander.act(turn, act).await?.map_err(|error| match error.into() {
-            Error::Cancelled => stopped(&self.line, commander.client).into(),
+        http_session.act(turn, act).await?.map_err(|error| match error.into() {
+            Error::Cancelled => stopped(&self.line, http_session.client).into(),
             error => Problem::of(&error).into(),
         })
     }

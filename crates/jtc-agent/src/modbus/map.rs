@@ -2,8 +2,8 @@
 use std::time::Duration;
 
 use jtc_host::held_stop;
+use jtc_host::labels;
 use jtc_host::sample::is_measured;
-use jtc_host::words;
 use jtc_wire::{ControllerState, JOINTS, Status, StopCause, TrajectoryState};
 
 use super::codes::{Outcome, error_number};
@@ -112,7 +112,7 @@ impl View {
     /// Returns `true` if a motion can begin: the arm is in position hold, without errors and without a motion.
     pub fn is_ready(&self) -> bool {
         self.reports(|s| {
-            s.state == ControllerState::HoldPos && s.errors == 0 && words::is_held(s) && !s.is_executing()
+            s.state == ControllerState::HoldPos && s.errors == 0 && labels::is_held(s) && !s.is_executing()
         })
     }
 

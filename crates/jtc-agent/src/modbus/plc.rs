@@ -11,7 +11,7 @@ use super::codes::{Command, Outcome};
 use super::handshake::{Handshake, Order};
 use super::map::{self, COILS, DISCRETE_INPUTS, Holder, View, holding};
 use super::pdu::{self, Device, Exception, Table};
-use crate::jobs::{Commander, Happening, Jobs};
+use crate::jobs::{ArmEvent, HttpSession, Jobs};
 use crate::line::{Introduction, Policy, Role};
 use crate::log::CommandLog;
 use crate::owner::Line;
@@ -45,7 +45,7 @@ struct State {
     operator: Option<Operator>,
     /// Coils of each connection that has written a coil.
     coils: BTreeMap<u64, [bool; COILS.len()]>,
-    commander: Arc<Commander>,
+    http_session: Arc<HttpSession>,
     /// Last job. The next two fields are the number of the last event that was read, and the number of runs.
     job: Option<u64>,
     looked: u64,
@@ -77,7 +77,7 @@ impl Plc {
             operator: None,
             coils: BTreeMap::new(),
             // The client joins now, so that Stops of other clients apply to it even before its first request.
-            commander: commander(&line),
+            http_session: http_session(&line),
             job: None,
             looked: 0,
             runs: 0,
@@ -132,13 +132,13 @@ impl Plc {
     }
 
     /// Returns the client of the line that sends the commands.
-    pub(super) fn commander(&self) -> Arc<Commander> {
+    pub(super) fn http_session(&self) -> Arc<HttpSession> {
         let mut state = self.lock();
-        if self.line.with(|line, _| line.introduction(state.commander.client).is_none()) {
+        if self.line.with(|line, _| line.introduction(state.http_session.client).is_none()) {
             // The client was disconnected from the line.
-            state.commander = commander(&self.line);
+            state.http_session = http_session(&self.line);
         }
-        state.commander.clone()
+        state.http_session.clone()
     }
 
     /// Returns `true` if a coil of any connection is 1, which holds the arm.
@@ -174,7 +174,7 @@ impl Plc {
     }
 
     fn has_lease(&self, state: &State) -> bool {
-        self.line.with(|line, _| line.lease().is_some_and(|lease| lease.holder == state.commander.client))
+        self.line.with(|line, _| line.lease().is_some_and(|lease| lease.holder == state.http_session.client))
     }
 
     /// Renews the lease after a request of the connection that commands.
@@ -187,7 +187,7 @@ impl Plc {
         };
         operator.seen = Instant::now();
         let (policy, lasts) = watchdog(&state.handshake);
-        let client = state.commander.client;
+        let client = state.http_session.client;
         self.line.with(|line, now| {
             let lives = |until: Option<Duration>| until.is_none_or(|until| now < until);
             if line.lease().is_some_and(|lease| lease.holder == client && lives(lease.until)) {
@@ -206,7 +206,7 @@ impl Plc {
             Some(number) => number == connection.number,
             None => operator.address == connection.peer.ip(),
         });
-        let client = state.commander.client;
+        let client = state.http_session.client;
         let (now, status, holder, wanted) = self.line.with(|line, now| {
             let status = line.status().map(|(at, status)| (now.saturating_sub(*at), *status));
             let holder = line.lease().map_or(Holder::Nobody, |lease| {
@@ -248,7 +248,7 @@ impl Plc {
             let excerpt = self.jobs.journal.after(state.looked, Some(job), usize::from(u16::MAX));
             state.looked = excerpt.last;
             for event in excerpt.events {
-                if let Happening::Finished { runs, .. } = event.event {
+                if let ArmEvent::Finished { runs, .. } = event.event {
                     state.runs = runs;
                 }
             }
@@ -269,7 +269,7 @@ impl Plc {
         // A connection may command again at once after its own Stop or Pause.
         let state = self.lock();
         let is_own = |operator: &Operator| operator.connection == Some(connection.number);
-        let own = state.operator.as_ref().is_some_and(is_own).then_some(state.commander.client);
+        let own = state.operator.as_ref().is_some_and(is_own).then_some(state.http_session.client);
         drop(state);
         self.line.with(|line, now| line.halt_for(own, &name, command, now));
         Ok(())
@@ -296,7 +296,7 @@ impl Plc {
         tokio::spawn(async move {
             let refusal = plc.act(&order, halt).await.err();
             let facts = json!({
-                "client": plc.commander().client.0, "command": order.command.text(), "sequence": order.sequence,
+                "client": plc.http_session().client.0, "command": order.command.text(), "sequence": order.sequence,
                 "from": connection.peer.to_string(),
                 "why_not": refusal.as_ref().map(|refusal| refusal.why.clone()),
             });
@@ -337,9 +337,9 @@ impl State {
     }
 }
 
-fn commander(line: &Line) -> Arc<Commander> {
+fn http_session(line: &Line) -> Arc<HttpSession> {
     let introduction = Introduction { name: NAME.into(), role: Role::Operator, policy: Policy::Pause };
-    Commander::new(line, introduction)
+    HttpSession::new(line, introduction)
 }
 
 fn watchdog(handshake: &Handshake) -> (Policy, Duration) {

@@ -14,7 +14,7 @@ use jtc_host::Sample;
 use jtc_host::recording::{Ending, FLUSH, Recorder, RecordingInfo};
 use serde_json::{Value, json};
 
-use super::shelf::{Begun, Shelf};
+use super::retention::{Begun, Retention};
 
 /// Largest number of samples that wait for the disk: minutes of statuses.
 const WAITING_MAX: usize = 1 << 13;
@@ -60,10 +60,10 @@ impl Disk {
     }
 
     /// Starts the thread that writes into `shelf`.
-    pub fn begin(shelf: Shelf, notify: Notify) -> io::Result<(Self, JoinHandle<()>)> {
+    pub fn begin(retention: Retention, notify: Notify) -> io::Result<(Self, JoinHandle<()>)> {
         let (disk, messages) = Self::new();
         let taken = disk.waiting.clone();
-        let writer = Writer::new(shelf, notify, AGAIN);
+        let writer = Writer::new(retention, notify, AGAIN);
         let thread = std::thread::Builder::new()
             .name("recordings".into())
             .spawn(move || writer.run(&messages, &taken))?;
@@ -115,7 +115,7 @@ struct Open {
 
 /// State of the writer's thread.
 struct Writer {
-    shelf: Shelf,
+    retention: Retention,
     notify: Notify,
     open: Option<Open>,
     /// Current recording, which is kept even while its file cannot be written.
@@ -128,8 +128,8 @@ struct Writer {
 }
 
 impl Writer {
-    fn new(shelf: Shelf, notify: Notify, again: Duration) -> Self {
-        Self { shelf, notify, open: None, wanted: None, failed: None, again, lost: 0 }
+    fn new(retention: Retention, notify: Notify, again: Duration) -> Self {
+        Self { retention, notify, open: None, wanted: None, failed: None, again, lost: 0 }
     }
 
     fn run(mut self, messages: &Receiver<Message>, waiting: &AtomicUsize) {
@@ -191,7 +191,7 @@ impl Writer {
 
     /// Removes old recordings that exceed the limit.
     fn make_room(&mut self, bytes: u64) {
-        for path in self.shelf.make_room(bytes) {
+        for path in self.retention.make_room(bytes) {
             self.notice("recording-removed", json!({ "file": path }), None);
         }
     }
@@ -199,7 +199,7 @@ impl Writer {
     /// Creates the file of the current recording.
     fn begin(&mut self) {
         let Some(info) = &self.wanted else { return };
-        let made = self.shelf.begin(host_kit::unix_time()).map_err(|e| e.to_string());
+        let made = self.retention.begin(host_kit::unix_time()).map_err(|e| e.to_string());
         let begun = made.and_then(|(file, begun)| {
             // The file header is written now, so that a disk error is found before the first sample.
             let recorder = Recorder::on(file, &begun.path, info)
@@ -207,7 +207,7 @@ impl Writer {
             match recorder {
                 Ok(recorder) => Ok(Open { recorder, begun }),
                 Err(error) => {
-                    self.shelf.break_off(begun, 0);
+                    self.retention.break_off(begun, 0);
                     Err(error.to_string())
                 }
             }
@@ -243,7 +243,7 @@ impl Writer {
         let (path, samples) = (begun.path.clone(), recorder.samples());
         // The drop tries to complete the file. A failure has no consequence.
         drop(recorder);
-        self.shelf.break_off(begun, samples);
+        self.retention.break_off(begun, samples);
         Some(path)
     }
 
@@ -255,7 +255,7 @@ impl Writer {
         }
         let bytes = open.begun.path.metadata().map_or(0, |found| found.len());
         self.make_room(bytes);
-        if bytes > self.shelf.longest() {
+        if bytes > self.retention.longest() {
             let ending = Ending {
                 outcome: "continued".into(),
                 reason: "the next recording goes on with this motion".into(),
@@ -279,9 +279,9 @@ impl Writer {
         let samples = recorder.samples();
         let done = recorder.finish_as(&ending).map_err(|e| e.to_string());
         let kept = match &done {
-            Ok(_) => self.shelf.end(begun).map_err(|e| e.to_string()),
+            Ok(_) => self.retention.end(begun).map_err(|e| e.to_string()),
             Err(error) => {
-                self.shelf.break_off(begun, samples);
+                self.retention.break_off(begun, samples);
                 Err(error.clone())
             }
         };

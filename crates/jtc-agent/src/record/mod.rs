@@ -5,7 +5,7 @@
 //! full, samples are dropped, and the recording contains the number of dropped samples.
 mod disk;
 mod motion;
-mod shelf;
+mod retention;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -28,7 +28,7 @@ use crate::owner::{ClientPort, Line};
 use crate::upload::Upload;
 use disk::Disk;
 use motion::{Follower, Motion, Step};
-use shelf::Shelf;
+use retention::Retention;
 
 pub use disk::{Notice, Notify};
 
@@ -86,7 +86,7 @@ impl Witness {
 
 /// Directory for recordings, ready to begin.
 pub struct Prepared {
-    shelf: Shelf,
+    retention: Retention,
     witness: Option<Witness>,
     seen: Receiver<Seen>,
     missed: Arc<AtomicBool>,
@@ -102,7 +102,7 @@ impl Prepared {
         let (sender, seen) = sync_channel(SEEN_MAX);
         let missed = Arc::new(AtomicBool::new(false));
         let witness = Some(Witness { seen: sender, missed: missed.clone() });
-        Ok(Self { shelf: Shelf::open(dir, limit)?, witness, seen, missed })
+        Ok(Self { retention: Retention::open(dir, limit)?, witness, seen, missed })
     }
 
     /// Returns the witness for the observer of the line's owner. Later calls return `None`.
@@ -116,8 +116,8 @@ impl Prepared {
     ///
     /// The system cannot start threads.
     pub fn begin(self, line: Line, source: &str, notify: Notify) -> io::Result<Recorder> {
-        let Self { shelf, seen, missed, .. } = self;
-        let (disk, writer) = Disk::begin(shelf, notify)?;
+        let Self { retention, seen, missed, .. } = self;
+        let (disk, writer) = Disk::begin(retention, notify)?;
         let ended = Arc::new(AtomicBool::new(false));
         let (source, own_ended) = (source.to_owned(), ended.clone());
         let follow = move || {
@@ -360,7 +360,7 @@ impl Following {
         let start = host_kit::unix_time().saturating_sub(session.now().saturating_sub(from));
         let mut info = RecordingInfo {
             source: self.source.clone(),
-            commanded_by: session.port().line().commander().unwrap_or_default(),
+            commanded_by: session.port().line().http_session().unwrap_or_default(),
             trajectory: motion.name().to_owned(),
             start_unix_ns: start.as_nanos() as u64,
             commanded: trajectory.clone(),

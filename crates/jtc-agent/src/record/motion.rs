@@ -2,8 +2,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use jtc_host::labels;
 use jtc_host::recording::Ending;
-use jtc_host::words;
 use jtc_wire::{ControllerState, Status, TrajectoryState};
 
 /// Time before a motion that is recorded with it.
@@ -169,7 +169,7 @@ impl Follower {
 impl Open {
     fn take(&mut self, now: Duration, motion: Option<Motion>, status: &Status) -> Vec<Step> {
         self.last = *status;
-        let moves = words::moving_joint(status).is_some();
+        let moves = labels::moving_joint(status).is_some();
         let paused = self.motion == Motion::Execution && status.trajectory == TrajectoryState::Pause;
         let may_stand = paused || status.state == ControllerState::Teaching;
         let stands = (may_stand && !moves).then(|| *self.stands.get_or_insert(now));
@@ -195,7 +195,7 @@ impl Open {
 fn ending(motion: Motion, status: &Status) -> Ending {
     let fault = status.state == ControllerState::Error || status.errors != 0;
     let (outcome, reason) = match (motion, status.trajectory.known()) {
-        _ if fault => ("fault", words::errors_line(status)),
+        _ if fault => ("fault", labels::errors_line(status)),
         (Motion::Jog | Motion::Teaching, _) => ("finished", String::new()),
         (_, Some(TrajectoryState::Finish)) => ("finished", String::new()),
         (_, Some(TrajectoryState::Null)) => ("fault", "the controller has no trajectory any more".to_owned()),

@@ -2,7 +2,7 @@
 
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
-use jtc_host::recording::{BrokenOff, NothingLeft, Recording, Resumption};
+use jtc_host::recording::{NothingLeft, Recording, ResumePoint, Resumption};
 use jtc_host::session::UploadOptions;
 use jtc_host::trajectory::{Loaded, Trajectory};
 use jtc_wire::Status;
@@ -43,7 +43,7 @@ pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
 /// Remainder of a run, and the runs after it.
 struct Left {
     /// Interrupted trajectory and its resume point; `None` if only whole runs are left.
-    current: Option<(Trajectory, BrokenOff)>,
+    current: Option<(Trajectory, ResumePoint)>,
     /// Trajectory of the following runs.
     then: Trajectory,
     /// Number of these runs.
@@ -123,7 +123,7 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
 fn place(
     job: &Job,
     whole: &Trajectory,
-    broken: BrokenOff,
+    broken: ResumePoint,
     status: &Status,
     out: &Output,
 ) -> Result<u32, NothingLeft> {

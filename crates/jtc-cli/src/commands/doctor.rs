@@ -27,11 +27,11 @@ pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);
     seen.absent = match &seen.status {
         Some(_) if external => absent(session.absent().unwrap_or_default()),
-        Some(status) => jtc_host::words::absent(status),
+        Some(status) => jtc_host::labels::absent(status),
         None => Vec::new(),
     };
     // A held stop and an encoder jump occur only under torque.
-    if seen.status.as_ref().is_some_and(jtc_host::words::has_torque) {
+    if seen.status.as_ref().is_some_and(jtc_host::labels::has_torque) {
         seen.reactions = session.reactions();
     }
     drop(session);

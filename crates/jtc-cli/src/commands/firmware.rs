@@ -7,8 +7,8 @@ use cli_kit::{Failure, Output};
 use jtc_client::agents::owner_of;
 use jtc_host::Port;
 use jtc_host::firmware::{
-    Catalogue, Drive, DriveAfter, FirmwareError, Fit, Image, Limits, Lines, Permissions, Places, Proof,
-    compare, info_with_program, may_flash, prove, put, wait_for_drive,
+    Catalogue, Drive, DriveAfter, FirmwareError, Fit, Image, Limits, Lines, Permissions, Places,
+    Verification, compare, info_with_program, may_flash, verify_program, wait_for_drive, write_image,
 };
 use jtc_host::port::{PortError, PortInfo, SerialPort, list as ports, only_one};
 use jtc_wire::Program;
@@ -206,7 +206,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
 
     let bar = out.bytes_bar(image.bytes().len() as u64, "copying");
     let mut lines = Some(lines);
-    let written = put(&drive, &image, &mut |bytes| {
+    let written = write_image(&drive, &image, &mut |bytes| {
         // The ports are closed as soon as copying has begun, because the ST-LINK may remove its serial port from USB
         // together with its drive. If the port were still open then, it would come back under another name.
         drop(lines.take());
@@ -229,14 +229,14 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         let own = places.ports_of(&drive).into_iter().next();
         open(own.as_ref().unwrap_or(&port), record.baud)
     };
-    let proof = prove(&places, &image, &drive, &written, &mut again, limits)?;
+    let verification = verify_program(&places, &image, &drive, &written, &mut again, limits)?;
     let line = (port.clone(), same_device);
-    let mut value = result(&image, &drive, Some(&line), true, Some(proof.program));
-    value["drive_after"] = json!(proof.drive);
+    let mut value = result(&image, &drive, Some(&line), true, Some(verification.program));
+    value["drive_after"] = json!(verification.drive);
     value["doubt"] = json!(written.doubt);
-    value["took_s"] = json!(proof.took.as_secs_f64());
-    value["stored_arm"] = json!(stored_arm(now.stored_arm(), proof.stored_arm()));
-    out.result(&value, || proved(&proof, &line, now.stored_arm()));
+    value["took_s"] = json!(verification.took.as_secs_f64());
+    value["stored_arm"] = json!(stored_arm(now.stored_arm(), verification.stored_arm()));
+    out.result(&value, || proved(&verification, &line, now.stored_arm()));
     Ok(())
 }
 
@@ -279,13 +279,13 @@ fn stored_arm(before: Option<bool>, after: bool) -> &'static str {
     }
 }
 
-fn proved(proof: &Proof, (port, same_device): &Line, stored_before: Option<bool>) -> String {
+fn proved(verification: &Verification, (port, same_device): &Line, stored_before: Option<bool>) -> String {
     let device = match same_device {
         Some(true) => "is of the same USB device as the drive",
         Some(false) => "is of another USB device than the drive: is it the board that was flashed?",
         None => "may be of another board than the drive: the system does not say",
     };
-    let arm = match stored_arm(stored_before, proof.stored_arm()) {
+    let arm = match stored_arm(stored_before, verification.stored_arm()) {
         "lost" => "\nthe stored arm is lost; next: jtc arm push FILE --store",
         "kept" => "\nthe stored arm is still there",
         _ => "",
@@ -294,10 +294,10 @@ fn proved(proof: &Proof, (port, same_device): &Line, stored_before: Option<bool>
         "the board runs {} on {}; what it reads in its flash is the image: {} ({:.0} s)\n\
          {port}, over which it was asked, {device}{arm}\n\
          next: cycle the power once where this firmware is new on the board, then jtc doctor",
-        proof.info.firmware_and_revision(),
-        proof.info.board,
-        proof.program,
-        proof.took.as_secs_f64(),
+        verification.info.firmware_and_revision(),
+        verification.info.board,
+        verification.program,
+        verification.took.as_secs_f64(),
     )
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cli_kit::{Failure, Output};
 use jtc_host::held_stop::{Reacting, age};
-use jtc_host::words;
+use jtc_host::labels;
 use jtc_wire::{ControllerState, Info, Joint, LogState, Status, StoreState};
 use serde_json::{Value, json};
 
@@ -52,8 +52,8 @@ fn as_json(info: &Info) -> Value {
         "board": info.board.as_str(),
         "arm": info.arm.as_str(),
         "hash": hash(info.hash),
-        "missing": words::missing_parameters(info.missing),
-        "nodes_missing": words::node_names(info.nodes_missing),
+        "missing": labels::missing_parameters(info.missing),
+        "nodes_missing": labels::node_names(info.nodes_missing),
         "boots": info.boots,
         "boot_cause": info.boot_cause.name(),
         "uptime_s": info.uptime_ms as f64 / 1000.0,
@@ -68,7 +68,7 @@ fn as_json(info: &Info) -> Value {
 
 fn as_text(info: &Info) -> String {
     let list = |names: Vec<String>| if names.is_empty() { "nothing".into() } else { names.join(", ") };
-    let missing = words::missing_parameters(info.missing).into_iter().map(str::to_owned).collect();
+    let missing = labels::missing_parameters(info.missing).into_iter().map(str::to_owned).collect();
     let memory = match info.store {
         StoreState::Stored => format!("{}, number {}", info.store, info.sequence),
         state => state.to_string(),
@@ -85,7 +85,7 @@ fn as_text(info: &Info) -> String {
         info.arm,
         hash(info.hash),
         list(missing),
-        list(words::node_names(info.nodes_missing)),
+        list(labels::node_names(info.nodes_missing)),
         info.firmware_and_revision(),
         info.board,
         info.version,
@@ -113,7 +113,7 @@ fn reacting_words(reacting: &Reacting) -> String {
     let mut lines = Vec::new();
     let joints = |joints: &[u8]| {
         let joints: Vec<Joint> = joints.iter().filter_map(|n| Joint::from_number((*n).into())).collect();
-        words::joints(&joints)
+        labels::joints(&joints)
     };
     if let Some(stop) = &reacting.last_held_stop {
         lines.push(format!("held stop: {}", stop.line()));
@@ -141,8 +141,8 @@ fn without_extensions_json(s: &Status) -> Value {
         "board": null,
         "arm": null,
         "hash": null,
-        "missing": words::missing_parameters(s.jtc_init),
-        "nodes_missing": words::node_names(s.node_init),
+        "missing": labels::missing_parameters(s.jtc_init),
+        "nodes_missing": labels::node_names(s.node_init),
         "boots": null,
         "boot_cause": null,
         "uptime_s": null,
@@ -151,7 +151,7 @@ fn without_extensions_json(s: &Status) -> Value {
 }
 
 fn without_extensions(s: &Status) -> String {
-    let missing = words::missing_parameters(s.jtc_init);
+    let missing = labels::missing_parameters(s.jtc_init);
     let missing = if missing.is_empty() { "nothing".into() } else { missing.join(", ") };
     format!(
         "a controller without extensions: it does not report its firmware, its arm or its limits\n\

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use cli_kit::{ErrorKind, Failure, Key, Keys, Output, Stop};
 use jtc_host::arm::Arm;
+use jtc_host::labels;
 use jtc_host::port::halt::still_moving_help;
-use jtc_host::words;
 use jtc_host::{Error, LinkError, Session};
 use jtc_wire::{ControllerState, DataStatus, JOINTS, Joint, Status, TrajectoryState};
 use serde_json::json;
@@ -33,9 +33,9 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;
     let mut begin = session.fresh_status()?;
-    if begin.state == ControllerState::HoldPos && !words::is_held(&begin) {
+    if begin.state == ControllerState::HoldPos && !labels::is_held(&begin) {
         out.note("waiting until all drives are enabled");
-        let held = |s: &Status| s.state == ControllerState::Error || words::is_held(s) || stop.asked();
+        let held = |s: &Status| s.state == ControllerState::Error || labels::is_held(s) || stop.asked();
         session.wait_for("HoldPos with all drives enabled", BRING_UP, held)?;
         if !stop.asked() {
             begin = session.wait_ready(BRING_UP)?;
@@ -47,7 +47,7 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     }
     session.settle_for_jog().map_err(refused)?;
     if let Some(joint) = args.joint.and_then(|joint| Joint::from_number(joint.into()))
-        && words::is_absent(&begin, joint.index())
+        && labels::is_absent(&begin, joint.index())
     {
         let message = format!("{joint} is set absent, and there is nothing to move");
         return Err(Failure::new(ErrorKind::Refused, "absent-joints", message)
@@ -210,13 +210,13 @@ fn refused(error: Error) -> Failure {
 fn without_error(status: Option<Status>) -> Result<(), Failure> {
     match status {
         Some(status) if status.state == ControllerState::Error => {
-            let reason = words::errors_line(&status);
+            let reason = labels::errors_line(&status);
             Err(Failure::new(
                 ErrorKind::Fault,
                 "jog-fault",
                 format!("the controller has released the arm: {reason}"),
             )
-            .next(words::next_step(&status)))
+            .next(labels::next_step(&status)))
         }
         _ => Ok(()),
     }

@@ -7,7 +7,7 @@ use cli_kit::{ErrorKind, Failure, Output, Stop};
 use host_kit::{Action, FrontEnd};
 use jtc_host::arm::Arm;
 use jtc_host::session::{RecoverParameters, RecoverStep};
-use jtc_host::{CheckError, Error, ParametersError, words};
+use jtc_host::{CheckError, Error, ParametersError, labels};
 use jtc_wire::ALL_NODES;
 use serde_json::json;
 
@@ -37,8 +37,8 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
         if s.errors == 0 {
             format!("cleared; state {}", s.state.name())
         } else {
-            let next = words::next_step(&s).plain(FrontEnd::Command);
-            format!("still there: {}\nnext: {next}", words::errors_line(&s))
+            let next = labels::next_step(&s).plain(FrontEnd::Command);
+            format!("still there: {}\nnext: {next}", labels::errors_line(&s))
         }
     });
     if s.errors == 0 { Ok(()) } else { Err(Failure::shown(ErrorKind::Device)) }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use cli_kit::{Failure, Key, Output, Screen, Stop, figure};
 use jtc_host::port::Port;
 use jtc_host::sample::is_measured;
-use jtc_host::{Session, words};
+use jtc_host::{Session, labels};
 
 use super::status;
 use crate::args::MonitorArgs;
@@ -49,7 +49,8 @@ fn lines(
                 format!("{text:>8}")
             };
             let q: Vec<String> = s.joints.iter().enumerate().map(position).collect();
-            let errors = if s.errors == 0 { String::new() } else { format!("   {}", words::errors_line(&s)) };
+            let errors =
+                if s.errors == 0 { String::new() } else { format!("   {}", labels::errors_line(&s)) };
             format!(
                 "{time_s:8.3} s   {:8} {:7} {:6}{errors}   {}",
                 s.state.name(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cli_kit::{Failure, Output, table};
 use jtc_host::arm::{Arm, FrictionChoice, NOT_CARRIED, ParameterFile, ParameterSet};
-use jtc_host::{Session, words};
+use jtc_host::{Session, labels};
 use jtc_wire::Joint;
 use serde_json::json;
 
@@ -63,7 +63,7 @@ fn push(
     done?;
     let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
-    let missing = words::missing_parameters(status.jtc_init);
+    let missing = labels::missing_parameters(status.jtc_init);
     // These parameters were not sent, but are not missing either. The controller had them before, from an unknown
     // source.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
@@ -90,7 +90,7 @@ fn push(
             }
         }
         text += &if missing.is_empty() {
-            format!("all parameters given; {}", words::waiting_for(&status))
+            format!("all parameters given; {}", labels::waiting_for(&status))
         } else {
             format!("still missing: {}", missing.join(", "))
         };
@@ -126,9 +126,9 @@ fn use_defaults(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     session.use_defaults()?;
     let status = session.fresh_status()?;
-    let missing = words::missing_parameters(status.jtc_init);
+    let missing = labels::missing_parameters(status.jtc_init);
     out.result(&json!({ "state": status.state.name(), "missing_parameters": missing }), || {
-        format!("the controller uses its defaults; {}", words::waiting_for(&status))
+        format!("the controller uses its defaults; {}", labels::waiting_for(&status))
     });
     Ok(())
 }
@@ -159,7 +159,7 @@ fn show(files: &[PathBuf], link: Option<&LinkArgs>, out: &Output) -> Result<(), 
         "pid": pid,
         "link_mass_kg": masses,
         "controller": status.as_ref().map(|s| json!({
-            "state": s.state.name(), "missing_parameters": words::missing_parameters(s.jtc_init),
+            "state": s.state.name(), "missing_parameters": labels::missing_parameters(s.jtc_init),
             "friction": if s.friction_type == 0 { "polynomial" } else { "table" },
         })),
     });
@@ -167,7 +167,7 @@ fn show(files: &[PathBuf], link: Option<&LinkArgs>, out: &Output) -> Result<(), 
         let mut text = arm.as_ref().map_or(String::new(), |a| format!("arm {}\n", a.name));
         text += &as_text(&set);
         if let Some(s) = &status {
-            text += &format!("controller: {}\n", words::waiting_for(s));
+            text += &format!("controller: {}\n", labels::waiting_for(s));
         }
         text
     });

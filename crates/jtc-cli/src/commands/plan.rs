@@ -6,7 +6,7 @@ use cli_kit::{Failure, Output, OutputFile, figure, table};
 use jtc_core::Config;
 use jtc_host::arm::Arm;
 use jtc_host::check::TorqueMargin;
-use jtc_host::plan::{Aside, Bound, PlanError, Planned, Planner, Way, WayOptions};
+use jtc_host::plan::{Aside, Bound, PlanError, Planned, Planner, WayOptions, WaypointPath};
 use jtc_host::report::{Digest, Facts, ReportInput, html};
 use jtc_host::waypoints::{WaypointError, WaypointFile};
 use jtc_wire::Joint;
@@ -32,7 +32,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     // The motion is planned before any file is opened, so that an impossible line leaves no file.
     let blend = if args.deg { args.blend.to_radians() } else { args.blend };
     let options = WayOptions { line: args.line, blend, blend_m: args.blend_m };
-    let way = Way::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
+    let way = WaypointPath::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
     let mut inputs: Vec<&Path> = vec![&args.file];
     inputs.extend(args.arm.as_deref());
     let trajectory = OutputFile::open(&args.out, args.overwrite.overwrite, &inputs)?;

@@ -1,8 +1,8 @@
 //! `jtc reset`: restarts nodes of the joint bus. The user counts the joints from 1.
 
 use cli_kit::{Failure, Output};
+use jtc_host::labels;
 use jtc_host::session::reset_takes_torque;
-use jtc_host::words;
 use jtc_wire::Joint;
 use serde_json::json;
 
@@ -16,7 +16,7 @@ const GRIPPER: u8 = 1 << 6;
 /// Resets the given nodes. If the arm is held, this needs the user's agreement. While the arm moves, no joint is reset.
 pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let nodes = nodes(args)?;
-    let reset = words::node_names(nodes);
+    let reset = labels::node_names(nodes);
     let names = reset.join(", ");
     let mut session = args.link.session()?;
     let state = session.fresh_status()?.state;

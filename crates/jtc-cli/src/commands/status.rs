@@ -3,8 +3,8 @@
 use cli_kit::{Failure, Output, figure, table};
 use host_kit::FrontEnd;
 use jtc_host::held_stop::{self, HeldStop};
+use jtc_host::labels::{self, GRIPPER};
 use jtc_host::sample::is_measured;
-use jtc_host::words::{self, GRIPPER};
 use jtc_wire::{Joint, NodeState, Reactions, Status};
 use serde_json::{Value, json};
 
@@ -41,12 +41,12 @@ pub fn as_json(s: &Status) -> Value {
                 "velocity_rad_s": measured.then_some(j.velocity + 0.0),
                 "torque_nm": measured.then_some(j.torque + 0.0),
                 "temperature_c": measured.then_some(j.temperature),
-                "internal_errors": words::joint_errors(j.internal),
-                "internal_errors_occurred": words::joint_errors(j.internal_occurred),
-                "node_errors": words::node_errors(j.errors),
-                "warnings": words::node_warnings(j.warnings),
-                "motor_faults": words::motor_faults(j.mc_current),
-                "motor_faults_occurred": words::motor_faults(j.mc_occurred),
+                "internal_errors": labels::joint_errors(j.internal),
+                "internal_errors_occurred": labels::joint_errors(j.internal_occurred),
+                "node_errors": labels::node_errors(j.errors),
+                "warnings": labels::node_warnings(j.warnings),
+                "motor_faults": labels::motor_faults(j.mc_current),
+                "motor_faults_occurred": labels::motor_faults(j.mc_occurred),
             })
         })
         .collect();
@@ -57,8 +57,8 @@ pub fn as_json(s: &Status) -> Value {
             "pump": gripper_answers(s).then_some(g.pump != 0),
             "pressure1": gripper_answers(s).then_some(g.pressure1 != 0),
             "pressure2": gripper_answers(s).then_some(g.pressure2 != 0),
-            "node_errors": words::node_errors(g.errors),
-            "warnings": words::node_warnings(g.warnings),
+            "node_errors": labels::node_errors(g.errors),
+            "warnings": labels::node_warnings(g.warnings),
         })
     });
     json!({
@@ -68,18 +68,18 @@ pub fn as_json(s: &Status) -> Value {
         "tes": s.trajectory.byte(),
         "point": s.point,
         "time_s": f64::from(s.point) * 1e-3,
-        "errors": words::errors(s.errors),
+        "errors": labels::errors(s.errors),
         "error_word": s.errors,
-        "errors_occurred": words::errors(s.occurred),
+        "errors_occurred": labels::errors(s.occurred),
         "occurred_word": s.occurred,
-        "missing_parameters": words::missing_parameters(s.jtc_init),
-        "missing_nodes": words::node_names(s.node_init),
+        "missing_parameters": labels::missing_parameters(s.jtc_init),
+        "missing_nodes": labels::node_names(s.node_init),
         "friction": if s.friction_type == 0 { "polynomial" } else { "table" },
-        "can_flags": words::can_flags(s.can_current),
-        "can_flags_occurred": words::can_flags(s.can_occurred),
+        "can_flags": labels::can_flags(s.can_current),
+        "can_flags_occurred": labels::can_flags(s.can_occurred),
         "joints": joints,
         "gripper": gripper,
-        "next": words::next_step(s).plain(FrontEnd::Command),
+        "next": labels::next_step(s).plain(FrontEnd::Command),
     })
 }
 
@@ -87,8 +87,8 @@ pub fn as_json(s: &Status) -> Value {
 pub fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
     // A joint that is not ready may still answer. An enabled joint that is not measured does not answer.
-    let silent = !is_measured(s, j) && (words::is_silent(s, j) || state == NodeState::ENABLED);
-    if words::is_absent(s, j) {
+    let silent = !is_measured(s, j) && (labels::is_silent(s, j) || state == NodeState::ENABLED);
+    if labels::is_absent(s, j) {
         "absent"
     } else if silent {
         "does not answer"
@@ -99,7 +99,7 @@ pub fn joint_state(s: &Status, j: usize) -> &'static str {
 
 /// Returns `true` if the gripper has sent the pump and vacuum values of the status.
 pub fn gripper_answers(s: &Status) -> bool {
-    !words::is_silent(s, GRIPPER)
+    !labels::is_silent(s, GRIPPER)
 }
 
 /// Returns the state of the gripper. This is the last state that the gripper has sent, unless the gripper is silent.
@@ -157,10 +157,10 @@ fn text(s: &Status, reactions: Option<&Reactions>) -> String {
     if let Some((cause, ago_ms)) = stop {
         text += &format!("held stop: {}\n", HeldStop::new(cause, *ago_ms).line());
     } else if s.errors != 0 {
-        text += &format!("errors: {}\n", words::errors_line(s));
+        text += &format!("errors: {}\n", labels::errors_line(s));
     }
     if s.is_coming_up() {
-        text += &format!("{}\n", words::waiting_for(s));
+        text += &format!("{}\n", labels::waiting_for(s));
     }
     let next = held_stop::next_step(s, stop.map(|(cause, _)| cause));
     text += &format!("next: {}\n", next.plain(FrontEnd::Command));

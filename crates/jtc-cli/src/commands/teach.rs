@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use cli_kit::{ErrorKind, Failure, Output, OutputFile, Stop};
 use jtc_host::trajectory::Loaded;
-use jtc_host::{LinkError, words};
+use jtc_host::{LinkError, labels};
 use jtc_wire::{ControllerState, Status};
 use serde_json::json;
 
@@ -167,8 +167,8 @@ fn without_error(s: Status) -> Result<Status, Failure> {
     if !s.is_faulty() {
         return Ok(s);
     }
-    let failure = Failure::new(ErrorKind::Fault, "run-fault", words::errors_line(&s));
-    Err(failure.next(words::next_step(&s)))
+    let failure = Failure::new(ErrorKind::Fault, "run-fault", labels::errors_line(&s));
+    Err(failure.next(labels::next_step(&s)))
 }
 
 fn finish(taught: TaughtFile, thin: Option<f64>, out: &Output) -> Result<(), Failure> {

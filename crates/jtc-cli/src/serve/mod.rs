@@ -90,7 +90,7 @@ impl Server {
             && *kept != number
         {
             *kept = number;
-            match host_kit::write_whole(file, image) {
+            match host_kit::write_atomically(file, image) {
                 Ok(()) => eprintln!("jtc: arm number {number} is kept in {}", file.display()),
                 Err(e) => {
                     eprintln!("jtc: {}: {e}; the stored arm lasts as long as this simulator", file.display())

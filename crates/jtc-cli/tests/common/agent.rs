@@ -3,7 +3,7 @@ use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use cli_kit::trial::{CommandOutput, run};
+use cli_kit::testing::{CommandOutput, run};
 use serde_json::Value;
 
 use super::{command, slow_motion};

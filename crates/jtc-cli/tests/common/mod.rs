@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use cli_kit::trial::{CommandOutput, program, run};
+use cli_kit::testing::{CommandOutput, program, run};
 use serde_json::Value;
 
 /// Returns a `jtc` command without environment variables.

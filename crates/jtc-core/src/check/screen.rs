@@ -7,7 +7,7 @@ use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
 use crate::JOINTS;
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 
 /// Margin for rounding in single precision, in steps of the position and as a share of the speed limit.
 const SLACK: f64 = 0.1;
@@ -109,7 +109,7 @@ pub(crate) struct SpeedRange {
     high: (f32, u32),
 }
 
-remembered!(SpeedRange { low, high });
+bit_codec!(SpeedRange { low, high });
 
 impl SpeedRange {
     /// Adds the velocities (in steps) around a point.

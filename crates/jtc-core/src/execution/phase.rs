@@ -1,7 +1,7 @@
 //! The phases of an execution.
+use crate::bit_codec::{BitCodec, BitSink, BitSource};
 use crate::motion::ControlMode;
 use crate::path::PathClock;
-use crate::remembered::{BitSink, BitSource, Remembered};
 use crate::{JOINTS, TrajectoryState};
 
 /// Phase of the controller in Operate.
@@ -18,7 +18,7 @@ pub(crate) enum Phase {
     Running { leave: Option<TrajectoryState> },
 }
 
-impl Remembered for Phase {
+impl BitCodec for Phase {
     fn write<S: BitSink>(&self, to: &mut S) {
         let kind = match self {
             Self::Waiting { .. } => 0,
@@ -42,15 +42,15 @@ impl Remembered for Phase {
 
     fn read<S: BitSource>(from: &mut S) -> Self {
         match from.take(2) {
-            0 => Self::Waiting { elapsed_ms: Remembered::read(from) },
+            0 => Self::Waiting { elapsed_ms: BitCodec::read(from) },
             1 => {
-                let start = Remembered::read(from);
-                let length_ms = Remembered::read(from);
-                let clock = Remembered::read(from);
-                Self::Approaching { from: start, length_ms, clock, leave: Remembered::read(from) }
+                let start = BitCodec::read(from);
+                let length_ms = BitCodec::read(from);
+                let clock = BitCodec::read(from);
+                Self::Approaching { from: start, length_ms, clock, leave: BitCodec::read(from) }
             }
             2 => Self::AtStart,
-            _ => Self::Running { leave: Remembered::read(from) },
+            _ => Self::Running { leave: BitCodec::read(from) },
         }
     }
 }

@@ -6,7 +6,7 @@ use super::image::ImageSource;
 use crate::Config;
 use crate::controller::Controller;
 use crate::host::slices::{SliceOutcome, SliceProgress};
-use crate::received::ReceivedParameters;
+use crate::host_parameters::HostParameters;
 use crate::settings;
 
 /// Bytes of an arm image that are hashed or written in one tick.
@@ -123,7 +123,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 }
 
 /// Takes gains, model and friction of an arm. Returns `false` if they are not valid with these settings.
-fn takes(parameters: &mut ReceivedParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
+fn takes(parameters: &mut HostParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
     let friction = match arm.friction {
         FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),
         FrictionImage::Table(floats) => {

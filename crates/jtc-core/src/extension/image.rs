@@ -3,13 +3,13 @@ use jtc_wire::field::image as field;
 use jtc_wire::{ArmImage, Hash, IMAGE_MAX, NAME_LEN, Name, VALUE_LEN};
 
 use crate::config::Config;
-use crate::received::ReceivedParameters;
+use crate::host_parameters::HostParameters;
 use crate::settings;
 
 /// Parts of an image.
 pub(crate) struct ImageSource<'a> {
     pub config: &'a Config,
-    pub parameters: &'a ReceivedParameters,
+    pub parameters: &'a HostParameters,
     pub name: &'a Name,
 }
 

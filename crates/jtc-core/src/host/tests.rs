@@ -57,8 +57,8 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
 /// If the frame of a Stop was lost, a later Stop is not reported as accepted because of it.
 #[test]
 fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
-    let before = Overtaking { stops: 2, pauses: 1, cancelled: true, stopped: true };
-    for (overtaken, left) in [(true, before), (false, Overtaking::default())] {
+    let before = Priority { stops: 2, pauses: 1, cancelled: true, stopped: true };
+    for (overtaken, left) in [(true, before), (false, Priority::default())] {
         let mut controller = holding();
         controller.overtaking = [before; HOST_LINES];
         let event = LinkEvent::Bad(Response::bad(0, FrameStatus::IncorrectHeader, 0));

@@ -2,10 +2,10 @@
 use jtc_wire::{Command, DataStatus, ExecCommand, RawPoint, Segment};
 
 use super::slices::{SliceOutcome, SliceProgress};
+use crate::bit_codec::bit_codec;
 use crate::check::{TrajectoryCheck, Violation};
 use crate::controller::Controller;
 use crate::io::HostEvent;
-use crate::remembered::remembered;
 use crate::{ControllerState, TrajectoryState};
 
 /// Maximum number of ticks for checking a segment (J-36), and for copying it. Together with the record this is less than 40 ms.
@@ -23,7 +23,7 @@ pub(crate) struct LineUpload {
     plain: Option<bool>,
 }
 
-remembered!(LineUpload { plain });
+bit_codec!(LineUpload { plain });
 
 impl LineUpload {
     /// Returns `true` if the record of `command` may contain only data statuses up to 6. For commands of an upload, its segment 0 decides.

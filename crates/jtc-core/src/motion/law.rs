@@ -4,13 +4,13 @@ use jtc_dynamics::Dynamics;
 use super::set_values::{Latched, SetValues};
 use super::torque::JointTorque;
 use super::transfer::Transfer;
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::limits::{JointConfig, within};
 use crate::load::Load;
 use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
 use crate::pid::{Pid, PidTorque};
-use crate::remembered::remembered;
 use crate::teach::{LedJoint, Taught};
 use crate::yielding::{Joint, Yield, Yielded};
 use crate::{JOINTS, friction, gains, joint_error};
@@ -100,7 +100,7 @@ pub(crate) struct ControlLaw {
     pub(super) unwinds_ms: u16,
 }
 
-remembered!(ControlLaw { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms });
+bit_codec!(ControlLaw { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms });
 
 impl ControlLaw {
     /// Clears all torques.

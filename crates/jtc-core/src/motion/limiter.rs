@@ -1,8 +1,8 @@
 //! The limits of the control law, each tick, for each joint (J-43).
 use super::law::{ControlLaw, ControlMode, LawInputs};
 use super::set_values::SetValues;
+use crate::bit_codec::bit_codec;
 use crate::limits::{self, Recent, Saturation, Turns};
-use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
 /// Speed in rad/s above which a saturated torque along the motion is not considered part of a catch.
@@ -30,7 +30,7 @@ pub(crate) struct Limiter {
     tick: u32,
 }
 
-remembered!(Limiter { saturation, pushed, turns, tick });
+bit_codec!(Limiter { saturation, pushed, turns, tick });
 
 /// Findings of a tick for one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

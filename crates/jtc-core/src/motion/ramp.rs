@@ -2,12 +2,12 @@
 use jtc_dynamics::Dynamics;
 
 use super::law::ControlLaw;
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::deceleration::{STEEPEST_LED, moves};
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
 use crate::path::{Bounds, PathClock, SlopeBounds};
-use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Shares of the acceleration and torque limits that a pause, a stop or a resume may use. The remainder is for changes within a tick and
@@ -27,7 +27,7 @@ pub(crate) struct PathRamp {
     inertia: [[f64; JOINTS]; JOINTS],
 }
 
-remembered!(PathRamp { inertia });
+bit_codec!(PathRamp { inertia });
 
 impl PathRamp {
     /// Begins a ramp of path time. Its bounds depend on the inertia of the arm.

@@ -1,4 +1,5 @@
 //! Set values (J-40 to J-44) of the held arm, of joints that come to rest, of the approach, and of the path.
+use crate::bit_codec::bit_codec;
 use crate::catch::Catch;
 use crate::commanded::Commanded;
 use crate::config::Config;
@@ -8,7 +9,6 @@ use crate::jog::Jog;
 use crate::limits::JointConfig;
 use crate::nodes::Nodes;
 use crate::path::PathClock;
-use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
 /// Commanded motion of the arm, including joints that have not come to rest yet. HoldPos steps it by [`hold`](Self::hold), Operate by
@@ -35,7 +35,7 @@ pub(crate) struct SetValues {
     jog: Option<Jog>,
 }
 
-remembered!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog });
+bit_codec!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog });
 
 impl SetValues {
     /// Releases all joints: no joint is held, and the set position equals the measured one.

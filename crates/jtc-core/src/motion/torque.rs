@@ -1,6 +1,6 @@
 //! The parts of the torque of one joint.
+use crate::bit_codec::bit_codec;
 use crate::pid::PidTorque;
-use crate::remembered::remembered;
 
 /// Parts of one joint's torque, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,7 +16,7 @@ pub(crate) struct JointTorque {
     pub blend: f64,
 }
 
-remembered!(JointTorque { model, pid, friction, load, brake, blend });
+bit_codec!(JointTorque { model, pid, friction, load, brake, blend });
 
 impl JointTorque {
     /// Returns the sum of all parts except the model.

@@ -1,10 +1,10 @@
 //! Bumpless transfer: torque steps at a change of state, of the model or at enabling are blended out (J-25, J-44).
 use super::torque::JointTorque;
 use crate::JOINTS;
+use crate::bit_codec::{BitCodec, BitSink, BitSource, bit_codec};
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::nodes::Nodes;
-use crate::remembered::{BitSink, BitSource, Remembered, remembered};
 
 /// Time in which the torque of a joint that begins to yield falls, ms.
 const FALL_MS: u16 = 10;
@@ -48,9 +48,9 @@ pub(super) struct Transfer {
     next: Option<Continued>,
 }
 
-remembered!(Transfer { step, step_ms, falls, left_ms, yields, just_enabled, next });
+bit_codec!(Transfer { step, step_ms, falls, left_ms, yields, just_enabled, next });
 
-impl Remembered for Continued {
+impl BitCodec for Continued {
     fn write<S: BitSink>(&self, to: &mut S) {
         (*self == Self::Everything).write(to);
     }

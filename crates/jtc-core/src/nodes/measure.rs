@@ -16,9 +16,9 @@ use core::f64::consts::{PI, TAU};
 
 use jtc_wire::StopKind;
 
+use crate::bit_codec::bit_codec;
 use crate::commanded::Commanded;
 use crate::config::Config;
-use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 use history::{Answered, History};
 pub(super) use jump::Ways;
@@ -165,9 +165,9 @@ struct Fading {
     slope: f64,
 }
 
-remembered!(Reading { position, velocity });
-remembered!(Fading { left, slope });
-remembered!(Measurement {
+bit_codec!(Reading { position, velocity });
+bit_codec!(Fading { left, slope });
+bit_codec!(Measurement {
     used,
     known,
     clock_ms,

@@ -16,7 +16,7 @@ mod supervision;
 #[cfg(test)]
 mod tests;
 
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 use measure::{Late, Outcome, Reading, Tick};
 pub(crate) use node::{Goal, Node};
 use speed_check::SpeedCheck;
@@ -62,7 +62,7 @@ pub(crate) struct Nodes {
     misfits: u8,
 }
 
-remembered!(Nodes {
+bit_codec!(Nodes {
     nodes,
     position,
     velocity,

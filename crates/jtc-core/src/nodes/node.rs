@@ -2,8 +2,8 @@
 use jtc_bus::{JointReport, NodeState, Target, warning};
 
 use super::measure::Measurement;
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
-use crate::remembered::remembered;
 
 /// Ticks after a reset in which late answers of the node are ignored.
 const DEAF_AFTER_RESET: u8 = 20;
@@ -59,7 +59,7 @@ pub(crate) struct Node {
     pub(super) misbehaved: bool,
 }
 
-remembered!(Node {
+bit_codec!(Node {
     report,
     seen,
     configured,

@@ -5,9 +5,9 @@
 use super::measure::Ways;
 use super::node::Node;
 use crate::JOINTS;
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::limits::JointConfig;
-use crate::remembered::remembered;
 
 /// Ticks between two checks of the same joint. Each tick checks a single joint.
 const PERIOD: u8 = 10;
@@ -38,8 +38,8 @@ pub(super) struct SpeedCheck {
     torque: [f32; JOINTS],
 }
 
-remembered!(Differs { looks, measured, reported });
-remembered!(SpeedCheck { turn, differs, torque });
+bit_codec!(Differs { looks, measured, reported });
+bit_codec!(SpeedCheck { turn, differs, torque });
 
 impl SpeedCheck {
     /// Runs one tick. Returns the joint, as a mask, whose speed has another scale. If only one encoder of a joint moves, its node is marked

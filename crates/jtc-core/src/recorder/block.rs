@@ -7,7 +7,7 @@ use jtc_wire::LogState;
 
 use super::{BLOCK_WORDS, Block};
 
-/// "JTCF" and the version of the layout. Raise the version with each change of the written data, including a list of `remembered!`.
+/// "JTCF" and the version of the layout. Raise the version with each change of the written data, including a list of `bit_codec!`.
 pub(super) const MAGIC: u32 = 0x4A46_000A;
 /// Words before the bits.
 pub(super) const HEAD: usize = 5;

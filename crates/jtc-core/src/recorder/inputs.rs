@@ -7,9 +7,9 @@ use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, Segment, UrgentComman
 
 use super::Block;
 use super::memory::Writer;
+use crate::bit_codec::BitSink;
 use crate::io::{HostEvent, Inputs};
 use crate::nodes::FRAMES_MAX;
-use crate::remembered::BitSink;
 use crate::{JOINTS, NODES};
 
 /// Longest frame of a host whose bytes are recorded.

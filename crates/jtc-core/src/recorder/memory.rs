@@ -5,7 +5,7 @@ use jtc_wire::LogState;
 
 use super::block::{CLOSED, HEAD, MAGIC, NONE, Whole, commit, doubled, flags, head, in_place, mix};
 use super::{BLOCK_WORDS, Block};
-use crate::remembered::BitSink;
+use crate::bit_codec::BitSink;
 
 /// Position of a block in the memory.
 #[derive(Clone, Copy, Debug, Default)]

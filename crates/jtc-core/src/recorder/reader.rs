@@ -1,7 +1,7 @@
 //! Reads back the bits of consecutive blocks.
 use super::Block;
 use super::block::Whole;
-use crate::remembered::BitSource;
+use crate::bit_codec::BitSource;
 
 /// Reader of the bits of consecutive blocks.
 #[derive(Clone, Copy, Debug)]

@@ -7,9 +7,9 @@ use jtc_wire::{
 use super::inputs::{HOST_BYTES, POSITION, RATES, Reference, Words, head, moved};
 use super::reader::Reader;
 use crate::JOINTS;
+use crate::bit_codec::BitSource;
 use crate::io::{BusState, HostEvent, Inputs};
 use crate::nodes::FRAMES_MAX;
-use crate::remembered::BitSource;
 use crate::response_queue::HOST_LINES;
 
 /// Recorded event of a host.

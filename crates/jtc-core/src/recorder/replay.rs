@@ -8,10 +8,10 @@ use super::reader::Reader;
 use super::recorded::{RecordedEvent, RecordedInputs};
 use super::snapshot::{Origin, Snapshot};
 use super::{Block, chain, check};
+use crate::bit_codec::{BitCodec, BitSink, BitSource};
 use crate::controller::Controller;
 use crate::io::{HostEvent, Inputs, Outputs};
 use crate::nodes::FRAMES_MAX;
-use crate::remembered::{BitSink, BitSource, Remembered};
 use crate::telemetry::Telemetry;
 
 /// A record of a log.

@@ -6,22 +6,22 @@
 use jtc_dynamics::Payload;
 use jtc_wire::RawPoint;
 
+use crate::bit_codec::{BitCodec, BitSink, bit_codec};
 use crate::config::Config;
 use crate::controller::Controller;
 use crate::errors::Errors;
 use crate::execution::phase::Phase;
 use crate::held_stop::LastStop;
-use crate::host::overtaking::Overtaking;
+use crate::host::priority::Priority;
 use crate::host::upload::LineUpload;
-use crate::late::LateTicks;
+use crate::host_parameters::HostParametersState;
 use crate::motion::Motion;
 use crate::nodes::Nodes;
 use crate::path::PathClock;
-use crate::received::ReceivedState;
-use crate::remembered::{BitSink, Remembered, remembered};
 use crate::response_queue::HOST_LINES;
 use crate::store::StoreState;
 use crate::telemetry::Observed;
+use crate::tick_overruns::TickOverruns;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// Identity of the device, the arm and the trajectory of a snapshot.
@@ -41,7 +41,7 @@ pub struct Origin {
     pub points: u32,
 }
 
-remembered!(Origin { boots, firmware, arm, built_in, points_hash, points });
+bit_codec!(Origin { boots, firmware, arm, built_in, points_hash, points });
 
 /// Settings that are not part of the arm.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +52,8 @@ struct LiveSettings {
     absent_position: [f64; JOINTS],
 }
 
-remembered!(LiveSettings { speed, payload, absent, absent_position });
-remembered!(Payload { mass, com, inertia });
+bit_codec!(LiveSettings { speed, payload, absent, absent_position });
+bit_codec!(Payload { mass, com, inertia });
 
 impl LiveSettings {
     fn of(config: &Config) -> Self {
@@ -74,7 +74,7 @@ pub(crate) struct Dynamic {
     state: ControllerState,
     errors: Errors,
     nodes: Nodes,
-    parameters: ReceivedState,
+    parameters: HostParametersState,
     live: LiveSettings,
     teaching: bool,
     teaching_waits_ms: u32,
@@ -87,15 +87,15 @@ pub(crate) struct Dynamic {
     safety_stop_ms: Option<u16>,
     motion: Motion,
     last_stop: LastStop,
-    overtaking: [Overtaking; HOST_LINES],
+    overtaking: [Priority; HOST_LINES],
     uploads: [LineUpload; HOST_LINES],
-    late_ticks: LateTicks,
+    tick_overruns: TickOverruns,
     observed: Observed,
     hosts_silent_ms: u32,
     jogs_refused_ms: u16,
 }
 
-remembered!(Dynamic {
+bit_codec!(Dynamic {
     state,
     errors,
     nodes,
@@ -114,7 +114,7 @@ remembered!(Dynamic {
     last_stop,
     overtaking,
     uploads,
-    late_ticks,
+    tick_overruns,
     observed,
     hosts_silent_ms,
     jogs_refused_ms,
@@ -128,7 +128,7 @@ pub struct Snapshot {
     pub(crate) dynamic: Dynamic,
 }
 
-remembered!(Snapshot { origin, dynamic });
+bit_codec!(Snapshot { origin, dynamic });
 
 impl Snapshot {
     /// Returns the ticks since the start of the device.
@@ -193,7 +193,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             uploads,
             records: _,
             since_status_ms: _,
-            late_ticks,
+            tick_overruns,
             status_frame: _,
             observed,
             extensions,
@@ -216,7 +216,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         last_stop.write(to);
         overtaking.write(to);
         uploads.write(to);
-        late_ticks.write(to);
+        tick_overruns.write(to);
         observed.write(to);
         extensions.hosts_silent_ms.write(to);
         extensions.jogs_refused_ms.write(to);
@@ -243,7 +243,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             last_stop,
             overtaking,
             uploads,
-            late_ticks,
+            tick_overruns,
             observed,
             hosts_silent_ms,
             jogs_refused_ms,
@@ -258,7 +258,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (self.braking_ms, self.safety_stop_ms) = (braking_ms, safety_stop_ms);
         (self.motion, self.last_stop) = (motion, last_stop);
         (self.overtaking, self.uploads) = (overtaking, uploads);
-        (self.late_ticks, self.observed) = (late_ticks, observed);
+        (self.tick_overruns, self.observed) = (tick_overruns, observed);
         self.extensions.hosts_silent_ms = hosts_silent_ms;
         self.extensions.jogs_refused_ms = jogs_refused_ms;
     }
@@ -285,7 +285,7 @@ mod tests {
     use std::boxed::Box;
 
     use super::*;
-    use crate::remembered::tests::Bits;
+    use crate::bit_codec::tests::Bits;
     use crate::settings::{self, TABLE};
 
     /// Each setting that is not covered by the hash of the arm is in the snapshot.

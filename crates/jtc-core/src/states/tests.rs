@@ -7,7 +7,7 @@ use std::vec::Vec;
 use jtc_wire::{ExecCommand, FrameRef, FrameType, LinkEvent, RawPoint, Segment};
 
 use super::*;
-use crate::drawn::is_in_the_protocol;
+use crate::docs_check::is_in_the_protocol;
 use crate::{Config, Controller, HostEvent, Inputs, TrajectoryState};
 
 const STATES: [ControllerState; 6] = [

@@ -4,10 +4,10 @@
 //! falls with the speed of the joint, so that a joint is driven only slowly. When the joint slows down, all of the torque acts again. A
 //! load is removed permanently only if a motion without a hand cannot be explained otherwise.
 use crate::DT;
+use crate::bit_codec::bit_codec;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
 use crate::load::Load;
-use crate::remembered::remembered;
 use crate::soft_end::SOFT_END;
 
 /// Speeds along the load (rad/s) at which the acting share begins to fall and at which it is zero. `DRIVES` is for a joint that is hardly
@@ -40,7 +40,7 @@ pub(super) struct Carried {
     inside: f32,
 }
 
-remembered!(Carried { rest, most, left_out, inside });
+bit_codec!(Carried { rest, most, left_out, inside });
 
 impl Carried {
     /// Begins Teaching of a joint that has found this `load`, N·m.

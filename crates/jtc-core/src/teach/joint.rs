@@ -1,9 +1,9 @@
 //! Damping, dry friction, friction compensation and soft ends of one joint in Teaching.
 use crate::DT;
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
-use crate::remembered::remembered;
 use crate::soft_end;
 use crate::yielding::SPRING_RATE;
 
@@ -83,7 +83,7 @@ pub(crate) struct TaughtJoint {
     lost: u8,
 }
 
-remembered!(TaughtJoint { anchor, grip, begun, coulomb, rubs, inertia, against, behind, missing, lost });
+bit_codec!(TaughtJoint { anchor, grip, begun, coulomb, rubs, inertia, against, behind, missing, lost });
 
 /// Inputs of a joint in a tick of Teaching.
 pub(crate) struct LedJoint<'a> {

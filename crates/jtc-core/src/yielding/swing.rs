@@ -1,6 +1,6 @@
 //! Detects the swing of a joint that is lighter than its inertia in the arm file. Its brake is too strong for it, because measured speeds
 //! are old.
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 
 /// Longest duration of half a swing, ms, and its lowest peak speed, rad/s.
 const HALF_MS: u8 = 80;
@@ -27,7 +27,7 @@ pub(super) struct Swing {
     soft_ms: u16,
 }
 
-remembered!(Swing { peak, half_ms, before, soft, soft_ms });
+bit_codec!(Swing { peak, half_ms, before, soft, soft_ms });
 
 impl Swing {
     pub const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };

@@ -8,7 +8,7 @@ mod error;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use host_kit::{nearest, write_whole};
+use host_kit::{nearest, write_atomically};
 use jtc_core::JOINTS;
 use jtc_wire::Joint;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
@@ -173,7 +173,7 @@ fn edit(
             "its poses cannot be changed by this program: change them by hand",
         )));
     }
-    write_whole(path, written.as_bytes())
+    write_atomically(path, written.as_bytes())
         .map_err(|source| FileError::Io { path: path.to_owned(), source })?;
     Ok(())
 }

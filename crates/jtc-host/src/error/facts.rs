@@ -9,7 +9,7 @@ use jtc_wire::{Joint, Status, StopCause};
 use crate::check::{ProblemKind, Verdict};
 use crate::held_stop::HeldStop;
 use crate::plan::{MARGIN_PCT_MAX, PlanError};
-use crate::{explain, held_stop, words};
+use crate::{explain, held_stop, labels};
 
 /// Returns the cause from the explain page for these words.
 fn cause(words: &str) -> Option<&'static str> {
@@ -130,7 +130,7 @@ pub fn of_status(status: &Status) -> Facts {
     let reports = |joint: &Joint| status.joints[joint.index()].internal != 0;
     Facts {
         joint: Joint::ALL.into_iter().find(reports).map(Joint::number),
-        cause: words::causes(status).first().and_then(|words| cause(words)),
+        cause: labels::causes(status).first().and_then(|words| cause(words)),
         ..Facts::default()
     }
 }
@@ -195,7 +195,7 @@ mod tests {
         for bit in 0..16 {
             let mut status = Status { errors: 1 << bit, ..Status::default() };
             status.joints[2].internal = 1 << bit;
-            for words in words::causes(&status) {
+            for words in labels::causes(&status) {
                 assert!(cause(&words).is_some(), "{words}");
             }
         }

@@ -3,8 +3,8 @@
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Response, TrajectoryState};
 
+use crate::labels;
 use crate::port::PortError;
-use crate::words;
 
 /// Reason why a request got no answer, or not the expected answer.
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +26,7 @@ pub enum LinkError {
         bytes: u64,
     },
     /// A request was not confirmed, although statuses are received.
-    #[error("{}: not confirmed in {tries} tries", words::request(*request))]
+    #[error("{}: not confirmed in {tries} tries", labels::request(*request))]
     NotConfirmed {
         /// The request.
         request: FrameType,
@@ -36,13 +36,13 @@ pub enum LinkError {
         last: Option<Response>,
     },
     /// The device has no extensions.
-    #[error("{}: this device has no extensions", words::request(*request))]
+    #[error("{}: this device has no extensions", labels::request(*request))]
     NoExtension {
         /// The request.
         request: FrameType,
     },
     /// The request did not reach the controller, because the line is shared.
-    #[error("{}: not sent: {reason}", words::request(*request))]
+    #[error("{}: not sent: {reason}", labels::request(*request))]
     Denied {
         /// The request.
         request: FrameType,
@@ -50,7 +50,7 @@ pub enum LinkError {
         reason: String,
     },
     /// The controller refused a request.
-    #[error("{}: {} (state {}, trajectory {})", words::request(*request), words::data_status(*code), state, trajectory)]
+    #[error("{}: {} (state {}, trajectory {})", labels::request(*request), labels::data_status(*code), state, trajectory)]
     Refused {
         /// The request.
         request: FrameType,

@@ -5,7 +5,7 @@ use jtc_wire::{Code, ControllerState, Status, StopCause, StopKind, TrajectorySta
 
 use super::{LinkError, facts};
 use crate::plan::PlanError;
-use crate::{held_stop, words};
+use crate::{held_stop, labels};
 
 /// Reason why a motion did not begin, or did not end as requested.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +34,7 @@ pub enum MotionError {
         why: Box<PlanError>,
     },
     /// The motion did not end as requested.
-    #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, words::errors_line(status))]
+    #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, labels::errors_line(status))]
     RunFault {
         /// Index of the 1 ms point at which the motion ended.
         point: u32,
@@ -69,9 +69,9 @@ pub enum MotionError {
 /// since the start.
 fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
     if status.is_held_stop() || cause.is_some() {
-        words::why_held(status, cause)
+        labels::why_held(status, cause)
     } else {
-        words::occurred_since(before, status)
+        labels::occurred_since(before, status)
     }
 }
 

@@ -4,7 +4,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{DataStatus, FrameType};
 
 use crate::arm::{Beyond, ParameterError};
-use crate::words;
+use crate::labels;
 
 /// Reason why the controller did not receive its parameters.
 #[derive(Debug, thiserror::Error)]
@@ -14,7 +14,7 @@ pub enum ParametersError {
     #[error(transparent)]
     Value(#[from] ParameterError),
     /// The controller refused a parameter, which is beyond the bounds of known controllers.
-    #[error("{}: {}: {beyond}", words::request(*request), words::data_status(DataStatus::IncorrectValue))]
+    #[error("{}: {}: {beyond}", labels::request(*request), labels::data_status(DataStatus::IncorrectValue))]
     BeyondBounds {
         /// The request.
         request: FrameType,

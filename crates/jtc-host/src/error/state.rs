@@ -4,20 +4,20 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_wire::{Code, ControllerState, Joint, Status, StopCause};
 
 use super::facts;
-use crate::{held_stop, words};
+use crate::{held_stop, labels};
 
 /// Reason why the controller did not reach the expected state.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StateError {
     /// The controller reports errors.
-    #[error("the controller reports an error: {}", words::errors_line(status))]
+    #[error("the controller reports an error: {}", labels::errors_line(status))]
     Device {
         /// The status with the errors.
         status: Box<Status>,
     },
     /// The arm is in a held stop (J-69): the drives hold the arm, and no motion is possible until the cause is cleared.
-    #[error("the arm is in a held stop: {}", words::why_held(status, cause.as_ref()))]
+    #[error("the arm is in a held stop: {}", labels::why_held(status, cause.as_ref()))]
     HeldStop {
         /// The status with the causes.
         status: Box<Status>,
@@ -25,7 +25,7 @@ pub enum StateError {
         cause: Option<StopCause>,
     },
     /// The state was not reached in time.
-    #[error("{what} not reached within {waited_s:.1} s: {}", words::waiting_for(status))]
+    #[error("{what} not reached within {waited_s:.1} s: {}", labels::waiting_for(status))]
     Timeout {
         /// Expected state.
         what: &'static str,
@@ -35,7 +35,7 @@ pub enum StateError {
         status: Box<Status>,
     },
     /// The controller is not in HoldPos, and it is not starting up to that state.
-    #[error("{}", words::waiting_for(status))]
+    #[error("{}", labels::waiting_for(status))]
     NotReady {
         /// Status at that time.
         status: Box<Status>,
@@ -44,7 +44,7 @@ pub enum StateError {
     /// controller executes no trajectory until the drives have been configured again.
     #[error(
         "{}: the position is not to be trusted, because the encoder has jumped or its speed does not fit; no trajectory is executed until its drive was reset",
-        words::joints(joints)
+        labels::joints(joints)
     )]
     EncoderJumped {
         /// Joints with this fault.
@@ -81,7 +81,7 @@ pub enum StateError {
         state: Code<ControllerState>,
     },
     /// The user has marked joints as absent, so the controller executes no motion.
-    #[error("{}: set absent; no motion is executed, and nothing was sent", words::joints(joints))]
+    #[error("{}: set absent; no motion is executed, and nothing was sent", labels::joints(joints))]
     Absent {
         /// Absent joints.
         joints: Vec<Joint>,
@@ -103,10 +103,10 @@ impl Diagnose for StateError {
                 Diagnosis::new(ErrorKind::Fault, "encoder-jumped", held_stop::after_encoder_jump())
             }
             Self::Timeout { status, .. } => {
-                Diagnosis::new(ErrorKind::Device, "state-timeout", words::next_step(status))
+                Diagnosis::new(ErrorKind::Device, "state-timeout", labels::next_step(status))
             }
             Self::NotReady { status } => {
-                Diagnosis::new(ErrorKind::Device, "not-ready", words::next_step(status))
+                Diagnosis::new(ErrorKind::Device, "not-ready", labels::next_step(status))
             }
             Self::Moving { .. } => {
                 Diagnosis::new(ErrorKind::Refused, "moving", next!("wait until it stands, or {}", Pause))

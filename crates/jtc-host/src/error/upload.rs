@@ -4,14 +4,14 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use jtc_wire::{Code, ControllerState, DataStatus, TrajectoryState};
 
 use super::link::after_refusal;
-use crate::words;
+use crate::labels;
 
 /// Reason why the controller does not hold the whole trajectory.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UploadError {
     /// The controller refused a segment permanently.
-    #[error("segment {segment} of {segments}: {}", words::data_status(*code))]
+    #[error("segment {segment} of {segments}: {}", labels::data_status(*code))]
     SegmentRefused {
         /// Number of the segment, from 0.
         segment: usize,

@@ -10,7 +10,7 @@ mod stops;
 use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, StopKind, TrajectoryState};
 
 use crate::check::ProblemKind;
-use crate::words;
+use crate::labels;
 
 /// Declares the families of numbers: meaning, name, key before the colon (as in `can:0x100`), title.
 macro_rules! families {
@@ -187,9 +187,9 @@ fn own_words(page: &Page) -> Option<String> {
         Family::State => Code::<ControllerState>::new(code).known().map(|state| state.name().to_owned()),
         Family::Tes => Code::<TrajectoryState>::new(code).known().map(|state| state.name().to_owned()),
         Family::NodeState => Some(NodeState::new(code).name().to_owned()),
-        Family::Can => words::can_flags(page.number()).pop(),
-        Family::Data => DataStatus::from_byte(code).map(|code| words::data_status(code).to_owned()),
-        Family::Frame => FrameStatus::from_byte(code).map(|code| words::frame_status(code).to_owned()),
+        Family::Can => labels::can_flags(page.number()).pop(),
+        Family::Data => DataStatus::from_byte(code).map(|code| labels::data_status(code).to_owned()),
+        Family::Frame => FrameStatus::from_byte(code).map(|code| labels::frame_status(code).to_owned()),
         Family::Missing => at(&w::JTC_INIT),
         Family::Check => ProblemKind::ALL.get(page.code as usize).map(|kind| kind.words().to_owned()),
         Family::Stop => StopKind::from_byte(code).map(|kind| kind.name().to_owned()),
@@ -354,8 +354,8 @@ mod tests {
     #[test]
     fn the_bits_of_a_word_have_the_names_of_their_pages() {
         for (family, word, words) in [
-            (Family::Jtc, 0x92, words::errors(0x92)),
-            (Family::Joint, 0x31, words::joint_errors(0x31)),
+            (Family::Jtc, 0x92, labels::errors(0x92)),
+            (Family::Joint, 0x31, labels::joint_errors(0x31)),
             (Family::Jtc, 0, Vec::new()),
         ] {
             let found: Vec<&Page> = names(family, word).into_iter().filter_map(named).collect();

@@ -7,7 +7,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::before::{Asked, Before, look};
+use super::preflight::{Asked, Preflight, look};
 use super::{Drive, FirmwareError, Places};
 use crate::port::{Port, PortError};
 use crate::session::Session;
@@ -60,7 +60,7 @@ impl Lines {
     /// # Errors
     ///
     /// [`FirmwareError::NotAsked`] if a port is lost.
-    pub fn look(&mut self) -> Result<Before, FirmwareError> {
+    pub fn look(&mut self) -> Result<Preflight, FirmwareError> {
         let ask = |line: &mut Line| {
             let answers = look(&mut line.session).map_err(|error| match error {
                 FirmwareError::Port(source) => not_asked(&line.port, source),
@@ -68,7 +68,7 @@ impl Lines {
             })?;
             Ok(Asked { port: line.port.clone(), same_device: line.same_device, answers })
         };
-        Ok(Before { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
+        Ok(Preflight { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
     }
 
     /// Returns the serial line on which the new program is verified: the line of the board itself, or, if it has none, the

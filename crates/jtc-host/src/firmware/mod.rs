@@ -7,11 +7,10 @@
 //! prove success: if the bytes arrive in an unexpected order, parts of the flash stay empty without a report. So the
 //! controller itself must report the content of its flash over its serial line.
 //!
-//! A flash uses, in this order: [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`],
-//! [`prove`]. If the operator is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] are repeated
-//! directly before [`put`].
+//! A flash uses, in this order: [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`write_image`],
+//! [`verify_program`]. If the operator is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] are repeated
+//! directly before [`write_image`].
 
-mod before;
 mod catalogue;
 mod diagnosis;
 mod drive;
@@ -20,18 +19,21 @@ mod error;
 mod image;
 mod lines;
 mod mounts;
-mod proof;
-mod put;
+mod preflight;
+mod verify;
+mod write;
 
-pub use before::{Answers, Asked, Before, Permissions, look, may_flash};
 pub use catalogue::{Catalogue, CatalogueImage};
 pub use drive::{Drive, Fit, UsbDevice};
 pub use error::FirmwareError;
 pub use image::{FLASH, Image, Record};
 pub use lines::{Lines, OpenLine};
 pub use mounts::Places;
-pub use proof::{DriveAfter, Limits, OpenPort, Proof, compare, info_with_program, prove, wait_for_drive};
-pub use put::{Written, put};
+pub use preflight::{Answers, Asked, Permissions, Preflight, look, may_flash};
+pub use verify::{
+    DriveAfter, Limits, OpenPort, Verification, compare, info_with_program, verify_program, wait_for_drive,
+};
+pub use write::{Written, write_image};
 
 #[cfg(test)]
 mod fake;

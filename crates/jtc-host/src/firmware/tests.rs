@@ -36,13 +36,13 @@ fn places() -> Places {
 }
 
 /// Returns the report of the board on a line. `same_device` tells if the line belongs to the drive's USB device.
-fn asked(board: &Board, same_device: Option<bool>) -> Before {
+fn asked(board: &Board, same_device: Option<bool>) -> Preflight {
     let answers = look(&mut Session::new(board.port())).unwrap();
-    Before { lines: vec![Asked { port: "ttyX".into(), same_device, answers }] }
+    Preflight { lines: vec![Asked { port: "ttyX".into(), same_device, answers }] }
 }
 
 /// Writes the image of seed 2 to a board that runs the image of seed 1.
-fn flash(behaviour: Behaviour, limits: Limits) -> (Result<Proof, FirmwareError>, Board, StLink) {
+fn flash(behaviour: Behaviour, limits: Limits) -> (Result<Verification, FirmwareError>, Board, StLink) {
     let board = Board::running(H745, Some(program_of(&image_bytes(H745, 1))));
     let link = StLink::new("NOD_H745ZIQ", &board, behaviour);
     let (drive, new) = (link.drive(), image(H745, 2));
@@ -51,19 +51,19 @@ fn flash(behaviour: Behaviour, limits: Limits) -> (Result<Proof, FirmwareError>,
     may_flash(&new, &drive, &before, Permissions::default()).unwrap();
     assert!(compare(&new, before.info().unwrap()).is_err(), "it does not run yet");
     let mut copied = 0;
-    let written = put(&drive, &new, &mut |bytes| copied = bytes).unwrap();
+    let written = write_image(&drive, &new, &mut |bytes| copied = bytes).unwrap();
     assert_eq!((copied, &written.doubt, &written.failure_before), (new.bytes().len(), &None, &None));
-    let proof = prove(&places(), &new, &drive, &written, &mut board.opener(), limits);
-    (proof, board, link)
+    let verification = verify_program(&places(), &new, &drive, &written, &mut board.opener(), limits);
+    (verification, board, link)
 }
 
 #[test]
 fn j67_a_board_is_flashed_and_proves_it() {
-    let (proof, board, link) = flash(Behaviour::Takes, LIMITS);
-    let proof = proof.unwrap();
-    assert_eq!(proof.program, program_of(&image_bytes(H745, 2)));
-    assert_eq!((proof.info.firmware(), proof.stored_arm()), ("0.2.0", true));
-    assert_eq!(proof.drive, DriveAfter::CameBack);
+    let (verification, board, link) = flash(Behaviour::Takes, LIMITS);
+    let verification = verification.unwrap();
+    assert_eq!(verification.program, program_of(&image_bytes(H745, 2)));
+    assert_eq!((verification.info.firmware(), verification.stored_arm()), ("0.2.0", true));
+    assert_eq!(verification.drive, DriveAfter::CameBack);
     // Each request confirms the new image and rejects the old one.
     let info = Session::new(board.port()).info().unwrap().unwrap();
     assert!(compare(&image(H745, 2), &info).is_ok());
@@ -74,16 +74,16 @@ fn j67_a_board_is_flashed_and_proves_it() {
 
 #[test]
 fn j67_a_hole_that_the_drive_does_not_report_is_found() {
-    let (proof, ..) = flash(Behaviour::LeavesHole, LIMITS);
-    let error = proof.unwrap_err();
+    let (verification, ..) = flash(Behaviour::LeavesHole, LIMITS);
+    let error = verification.unwrap_err();
     assert!(matches!(&error, FirmwareError::OtherProgram { why, .. } if why.contains("CRC-32")), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
 }
 
 #[test]
 fn j67_the_program_of_before_may_start_anew_before_it_is_stopped() {
-    let (proof, ..) = flash(Behaviour::StartsBeforeAnew, LIMITS);
-    assert_eq!(proof.unwrap().program, program_of(&image_bytes(H745, 2)));
+    let (verification, ..) = flash(Behaviour::StartsBeforeAnew, LIMITS);
+    assert_eq!(verification.unwrap().program, program_of(&image_bytes(H745, 2)));
 }
 
 #[test]
@@ -110,13 +110,13 @@ fn a_controller_that_never_has_read_its_flash_is_not_waited_for() {
 
 #[test]
 fn what_fail_txt_says_is_reported() {
-    let (proof, _, link) = flash(Behaviour::Fails("The target flash is write protected\r\n"), LIMITS);
-    let error = proof.unwrap_err();
+    let (verification, _, link) = flash(Behaviour::Fails("The target flash is write protected\r\n"), LIMITS);
+    let error = verification.unwrap_err();
     assert!(error.to_string().ends_with("The target flash is write protected"), "{error}");
     assert_eq!(error.kind(), ErrorKind::Device);
     // The text of an earlier attempt is not considered a report of the next attempt.
     let (drive, new) = (link.drive(), image(H745, 2));
-    let written = put(&drive, &new, &mut |_| {}).unwrap();
+    let written = write_image(&drive, &new, &mut |_| {}).unwrap();
     assert_eq!(written.failure_before.as_deref(), Some("The target flash is write protected"));
     let seen = wait_for_drive(&places(), &drive, &written, SHORT).unwrap_err();
     assert!(matches!(seen, FirmwareError::NotTaken { seen: DriveAfter::Stayed, .. }), "{seen}");
@@ -124,8 +124,8 @@ fn what_fail_txt_says_is_reported() {
 
 #[test]
 fn a_drive_that_does_nothing_is_no_success() {
-    let (proof, ..) = flash(Behaviour::Ignores, SHORT);
-    let error = proof.unwrap_err();
+    let (verification, ..) = flash(Behaviour::Ignores, SHORT);
+    let error = verification.unwrap_err();
     assert!(error.to_string().contains("the program of before still runs"), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
 }
@@ -135,7 +135,7 @@ fn without_a_line_the_drive_is_all_there_is() {
     let board = Board::running(H745, None);
     let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Takes);
     let drive = link.drive();
-    let written = put(&drive, &image(H745, 2), &mut |_| {}).unwrap();
+    let written = write_image(&drive, &image(H745, 2), &mut |_| {}).unwrap();
     assert_eq!(wait_for_drive(&places(), &drive, &written, LIMITS).unwrap(), DriveAfter::CameBack);
 }
 
@@ -144,7 +144,7 @@ fn a_drive_that_does_not_come_back_is_no_success_where_the_system_is_in_doubt() 
     let board = Board::running(H745, None);
     let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Ignores);
     let drive = link.drive();
-    let written = put(&drive, &image(H745, 2), &mut |_| {}).unwrap();
+    let written = write_image(&drive, &image(H745, 2), &mut |_| {}).unwrap();
     let doubtful = Written { doubt: Some("Input/output error".into()), ..written.clone() };
     // A drive that never vanishes has not accepted the image. A drive that was removed may have.
     let stayed = wait_for_drive(&places(), &drive, &written, SHORT).unwrap_err();
@@ -162,7 +162,7 @@ fn nothing_is_written_where_the_drive_has_gone() {
     let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Ignores);
     let drive = link.drive();
     let refused = |drive: &Drive| {
-        let error = put(drive, &image(H745, 2), &mut |_| {}).unwrap_err();
+        let error = write_image(drive, &image(H745, 2), &mut |_| {}).unwrap_err();
         assert!(matches!(error, FirmwareError::Changed { .. }), "{error}");
         assert_eq!(error.kind(), ErrorKind::Refused);
         assert!(!link.path.join("openjtc.bin").exists());
@@ -188,7 +188,7 @@ fn a_drive_that_cannot_be_written_is_an_error_with_the_path() {
     let link = StLink::new("NOD_H745ZIQ", &board, Behaviour::Ignores);
     let drive = link.drive();
     fs::create_dir(link.path.join("openjtc.bin")).unwrap();
-    let error = put(&drive, &image(H745, 2), &mut |_| {}).unwrap_err();
+    let error = write_image(&drive, &image(H745, 2), &mut |_| {}).unwrap_err();
     assert!(matches!(error, FirmwareError::NotOpened { .. }), "{error}");
     assert!(error.to_string().contains("openjtc.bin"), "{error}");
     assert!(error.to_string().contains("nothing was written"), "{error}");
@@ -214,7 +214,7 @@ fn a_drive_that_is_full_says_what_that_means() {
     let drive = link.drive();
     std::os::unix::fs::symlink("/dev/full", link.path.join("openjtc.bin")).unwrap();
     fs::write(link.path.join("FAIL.TXT"), "no target").unwrap();
-    let error = put(&drive, &image(H745, 2), &mut |_| {}).unwrap_err();
+    let error = write_image(&drive, &image(H745, 2), &mut |_| {}).unwrap_err();
     assert!(matches!(&error, FirmwareError::DriveFull { .. }), "{error}");
     assert!(error.to_string().contains("1048644 bytes"), "{error}");
     assert!(error.to_string().contains("no target") && error.hint().contains("BOOT0"), "{error}");

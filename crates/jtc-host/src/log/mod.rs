@@ -2,17 +2,17 @@
 //!
 //! [`FlightLog`] contains the data from a device: the blocks of its log, the active arm, and the trajectory points that the
 //! log needs. [`FlightLog::replay`] returns every tick with all values that the controller computed, and marks the ticks
-//! that are known to match the original bit for bit. [`Story`] lists the events in order, with the first error at the top.
+//! that are known to match the original bit for bit. [`Timeline`] lists the events in order, with the first error at the top.
 
-mod account;
 mod container;
 mod replay;
-mod story;
+mod replay_report;
+mod timeline;
 
-pub use account::Account;
 pub use container::LogFileError;
 pub use replay::{Difference, Gap, Replayed, Tick, Worth};
-pub use story::{Event, Story};
+pub use replay_report::Account;
+pub use timeline::{Event, Timeline};
 
 use jtc_core::recorder::{BLOCK_WORDS, Block, Log, Record};
 use jtc_wire::{LogState, RawPoint};

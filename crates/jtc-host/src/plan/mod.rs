@@ -16,20 +16,20 @@
 //! # Ok::<(), jtc_host::plan::PlanError>(())
 //! ```
 
-mod again;
 mod approach;
 mod corners;
 mod default_speed;
 mod error;
 mod lines;
 mod margin;
-mod rest_of;
+mod remainder;
+mod replan;
 mod sampled;
 mod samples;
 mod speed;
 #[cfg(test)]
 mod tests;
-mod way;
+mod waypoint_path;
 
 use jtc_core::{Config, Friction, JOINTS, PathRange};
 use jtc_dynamics::ArmModel;
@@ -44,9 +44,9 @@ pub use default_speed::MoveSpeed;
 pub use error::PlanError;
 pub use lines::{Aside, furthest_aside};
 pub use margin::{MARGIN_PCT, MARGIN_PCT_MAX, margin_in_range, margin_of};
-pub use rest_of::rest_of;
+pub use remainder::remainder;
 pub use speed::at_speed;
-pub use way::{Way, WayOptions};
+pub use waypoint_path::{WayOptions, WaypointPath};
 
 use crate::check::{Checker, Problem, ProblemKind, TEMPERATURE, Verdict};
 use crate::trajectory::{Trajectory, UploadOptions};
@@ -212,7 +212,7 @@ impl<'a> Planner<'a> {
         let mut ramps = RAMPS_S.into_iter();
         let mut ramp_s = RAMP_S;
         loop {
-            let rest = rest_of(trajectory, from_ms, ramp_s)?;
+            let rest = remainder(trajectory, from_ms, ramp_s)?;
             let verdict = checker.check(&rest);
             match ramps.next() {
                 _ if verdict.is_ok() => return Ok(rest),

@@ -20,7 +20,7 @@ use super::line::HaltOutcome;
 #[cfg(unix)]
 use super::runtime;
 use super::standstill::{Standstill, has_torque, is_paused};
-use crate::words;
+use crate::labels;
 
 /// Maximum size of a request, bytes.
 pub(super) const REQUEST_MAX: usize = 1024;
@@ -134,7 +134,7 @@ impl End {
     /// Creates the final message from the last status.
     pub fn of(status: &Status, standstill: &Standstill) -> Self {
         let stands = standstill.is_reached();
-        let moving = match words::moving_joint(status) {
+        let moving = match labels::moving_joint(status) {
             _ if stands => None,
             Some((joint, speed)) if !has_torque(status) => {
                 Some(format!("{joint} moves without torque at {speed:.2} rad/s, which no Stop ends"))

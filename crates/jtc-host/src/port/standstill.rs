@@ -5,7 +5,7 @@ use std::time::Duration;
 use jtc_wire::{ControllerState, Status, TrajectoryState};
 
 use super::halt::Halt;
-use crate::words;
+use crate::labels;
 
 /// Time without motion after which the arm is considered at rest.
 const STILL: Duration = Duration::from_millis(200);
@@ -14,7 +14,7 @@ const STILL: Duration = Duration::from_millis(200);
 pub fn is_moving(status: &Status) -> bool {
     status.is_executing()
         || status.state == ControllerState::Teaching
-        || (has_torque(status) && words::moving_joint(status).is_some())
+        || (has_torque(status) && labels::moving_joint(status).is_some())
 }
 
 /// Returns `true` if a trajectory is paused and can be resumed.
@@ -47,7 +47,7 @@ impl Standstill {
     /// Evaluates a status that arrived at `now`.
     pub fn see(&mut self, now: Duration, status: &Status) {
         self.moved |= is_moving(status);
-        if status.is_executing() || words::moving_joint(status).is_some() || self.is_incomplete(status) {
+        if status.is_executing() || labels::moving_joint(status).is_some() || self.is_incomplete(status) {
             return self.begin_again();
         }
         let since = *self.since.get_or_insert(now);

@@ -12,8 +12,8 @@ use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
 use super::frames::Frames;
-use super::gather::{Gatherer, Late};
 use super::messages::{self, COMMANDS_TOPIC, CONTROL_TOPIC, STATE_TOPIC, STATES_TOPIC};
+use super::reassemble::{Late, Reassembler};
 use super::{Ending, Found, RecordingError, RecordingInfo, Writer, schema};
 use crate::sample::Sample;
 use crate::trajectory::{Loaded, Trajectory};
@@ -251,7 +251,7 @@ pub(super) fn scan(
     let mut ending: Option<Ending> = None;
     let (mut commanded, mut then, mut description) = (None, None, None);
     let mut channels: BTreeMap<u16, Carries> = BTreeMap::new();
-    let mut gatherer = Gatherer::new(room);
+    let mut gatherer = Reassembler::new(room);
     let start_ns = info.as_ref().map_or(0, |info| info.start_unix_ns);
     let seconds = |time_ns: u64| time_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let mut give = |time_ns: u64, sample: Sample| see(&Sample { time_s: seconds(time_ns), ..sample });

@@ -11,15 +11,12 @@
 //! If a file is truncated (the program was killed, or the disk was full), it is read up to the damage. [`Recording::cut`]
 //! then describes the missing part.
 
-mod broken_off;
 #[cfg(feature = "mcap")]
 mod cdr;
 mod csv;
 mod error;
 #[cfg(feature = "mcap")]
 mod frames;
-#[cfg(feature = "mcap")]
-mod gather;
 mod info;
 mod live;
 #[cfg(feature = "mcap")]
@@ -29,6 +26,9 @@ mod messages;
 #[cfg(feature = "mcap")]
 mod metadata;
 #[cfg(feature = "mcap")]
+mod reassemble;
+mod resume_point;
+#[cfg(feature = "mcap")]
 mod schema;
 #[cfg(test)]
 mod tests;
@@ -37,12 +37,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-pub use broken_off::{BrokenOff, NothingLeft, Resumption};
 pub use error::RecordingError;
 pub use info::{DeviceIdentity, Ending, JointInfo, RecordingInfo};
 pub use live::{FLUSH, LiveRecorder, SampleSink};
 #[cfg(feature = "mcap")]
 pub use messages::{MessageWriter, Topic};
+pub use resume_point::{NothingLeft, ResumePoint, Resumption};
 
 use crate::sample::Sample;
 

@@ -7,9 +7,9 @@ use jtc_wire::{ControllerState, Joint, NodeState, Status, can_flag};
 use serde::Serialize;
 
 use crate::error::{Error, MotionError};
+use crate::labels;
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
-use crate::words;
 
 /// Number of samples shown before and after the first bad sample.
 pub(super) const BEFORE: usize = 3;
@@ -376,9 +376,9 @@ impl Words {
         let silent = (self.can & can_flag::no_answer(joint.index()) != 0).then_some("does not answer");
         let all = silent
             .into_iter()
-            .chain(words::motor_faults(own.motor))
-            .chain(words::node_errors(own.node))
-            .chain(words::joint_errors(own.internal))
+            .chain(labels::motor_faults(own.motor))
+            .chain(labels::node_errors(own.node))
+            .chain(labels::joint_errors(own.internal))
             .chain(own.state.is_fault().then_some("drive in its fault state"));
         all.map(String::from).collect()
     }
@@ -401,7 +401,7 @@ fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
     if words.can & can_flag::no_answer(GRIPPER) != 0 {
         all.push("the gripper does not answer".into());
     }
-    let own = crate::words::errors(words.errors).into_iter().map(|word| format!("controller: {word}"));
+    let own = crate::labels::errors(words.errors).into_iter().map(|word| format!("controller: {word}"));
     all.extend(own);
     (all, first)
 }

@@ -9,8 +9,8 @@ use jtc_wire::{
 use super::{Session, not_allowed};
 use crate::check::CheckedTrajectory;
 use crate::error::{Error, LinkError, MotionError, StateError, accepted};
+use crate::labels;
 use crate::port::Port;
-use crate::words;
 
 /// Maximum time for which a controller delays teaching until the arm is held at rest, plus a reserve.
 const TEACHING: Duration = Duration::from_secs(11);
@@ -356,7 +356,7 @@ impl<P: Port> Session<P> {
     ///
     /// Returns the errors of [`Session::wait_ready`]; [`Error::Cancelled`].
     pub fn wait_ready_until(&mut self, timeout: Duration, ended: impl Fn() -> bool) -> Result<Status, Error> {
-        let ready = |s: &Status| s.state == ControllerState::HoldPos && words::is_held(s);
+        let ready = |s: &Status| s.state == ControllerState::HoldPos && labels::is_held(s);
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {
             s.state == ControllerState::Error || ready(s) || ended()
         })?;

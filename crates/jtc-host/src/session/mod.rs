@@ -5,23 +5,23 @@
 //! order of the frames. The session queues the records and passes each one to the request that waits for it.
 
 mod bench;
+mod capture_pose;
 mod clock;
 mod commands;
 mod extension;
 mod follow;
-mod give;
 mod jogging;
 mod limit;
 mod log;
 mod params;
 mod payload;
 mod presence;
+mod push_arm;
 mod ready;
 mod recover;
 mod reset;
 mod run;
 mod settings;
-mod standing;
 mod statistics;
 mod upload;
 
@@ -37,13 +37,13 @@ use jtc_wire::{
 pub use clock::StatusClock;
 pub use commands::Parameter;
 pub use follow::{Flow, Outcome};
-pub use give::ArmPart;
 pub use jogging::JOG_AGAIN;
 use limit::Limit;
 pub use log::LogStatus;
 pub use params::PushReport;
 use presence::Presence;
 pub use presence::host_timeout_ms;
+pub use push_arm::ArmPart;
 pub use ready::BRING_UP;
 pub use recover::{ParameterSource, RecoverParameters, RecoverStep};
 pub use reset::reset_takes_torque;

@@ -7,7 +7,7 @@ use jtc_wire::{ControllerState, Status};
 use super::Session;
 use crate::error::{Error, StateError};
 use crate::port::Port;
-use crate::{held_stop, words};
+use crate::{held_stop, labels};
 
 /// Maximum time until the drives are enabled. Their first enable takes 4 s.
 pub const BRING_UP: Duration = Duration::from_secs(15);
@@ -43,7 +43,7 @@ impl<P: Port> Session<P> {
         if status.state != ControllerState::HoldPos {
             return Err(StateError::NotReady { status: Box::new(status) }.into());
         }
-        let joints = words::absent(&status);
+        let joints = labels::absent(&status);
         if !joints.is_empty() {
             return Err(StateError::Absent { joints }.into());
         }
@@ -52,9 +52,9 @@ impl<P: Port> Session<P> {
         if !joints.is_empty() {
             return Err(StateError::EncoderJumped { joints }.into());
         }
-        if !words::is_held(&status) {
+        if !labels::is_held(&status) {
             waits("all drives are enabled");
-            status = self.wait_for("all drives enabled", BRING_UP, |s| words::is_held(s) || ended())?;
+            status = self.wait_for("all drives enabled", BRING_UP, |s| labels::is_held(s) || ended())?;
         }
         unless_ended(status)
     }

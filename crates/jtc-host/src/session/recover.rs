@@ -15,8 +15,8 @@ pub use step::RecoverStep;
 
 use super::Session;
 use crate::error::{Error, LinkError, StateError};
+use crate::labels;
 use crate::port::Port;
-use crate::words;
 
 /// Maximum time until a node is ready. The first enable of a drive takes 4 s, and longer after a reset.
 const NODE_TIME: Duration = Duration::from_secs(15);
@@ -75,7 +75,7 @@ impl<P: Port> Session<P> {
         parameters.check()?;
         let status = self.fresh_status()?;
         parameters.enough_for(&status)?;
-        report(&RecoverStep::Found(words::waiting_for(&status)));
+        report(&RecoverStep::Found(labels::waiting_for(&status)));
         if let Some(step) = parameters.kept(&status) {
             report(&step);
         }
@@ -210,7 +210,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn bring_up(&mut self, status: &Status) -> Result<(), Error> {
-        (self.report)(&RecoverStep::WaitNodes(words::node_names(status.node_init)));
+        (self.report)(&RecoverStep::WaitNodes(labels::node_names(status.node_init)));
         let up = |s: &Status| !s.is_coming_up() || (self.ended)();
         match self.session.wait_for("nodes ready", NODE_TIME, up) {
             Err(Error::State(StateError::Timeout { status, .. })) if !self.reset_slow => {
@@ -245,13 +245,13 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
             return self.wait_for_a_person(status);
         }
-        let silent = (0..NODES).filter(|n| words::is_silent(status, *n)).fold(0, |mask, n| mask | 1 << n)
+        let silent = (0..NODES).filter(|n| labels::is_silent(status, *n)).fold(0, |mask, n| mask | 1 << n)
             & !self.reset;
         if silent != 0 && self.clears > 0 {
             self.reset |= silent;
             self.reset_nodes(silent)?;
         }
-        (self.report)(&RecoverStep::Clear(words::node_names(nodes)));
+        (self.report)(&RecoverStep::Clear(labels::node_names(nodes)));
         self.clear(nodes)?;
         self.clears += 1;
         if self.clears > CLEARS_MAX {
@@ -280,7 +280,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn reset_nodes(&mut self, nodes: u8) -> Result<(), Error> {
-        (self.report)(&RecoverStep::Reset(words::node_names(nodes)));
+        (self.report)(&RecoverStep::Reset(labels::node_names(nodes)));
         self.session.reset(nodes)?;
         self.session.pause_for(BOOT, &self.ended)
     }

@@ -5,8 +5,8 @@ use jtc_wire::{Code, ControllerState};
 
 use super::Session;
 use crate::error::{Error, StateError};
+use crate::labels;
 use crate::port::Port;
-use crate::words;
 
 /// Returns `true` if the arm has torque in this state, and a reset of these nodes (bits 0..6) can remove it.
 ///
@@ -16,7 +16,7 @@ use crate::words;
 pub fn reset_takes_torque(nodes: u8, state: Code<ControllerState>) -> Result<bool, StateError> {
     let moves = state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
     if moves && nodes & !(1 << GRIPPER) != 0 {
-        return Err(StateError::WouldFall { nodes: words::node_names(nodes).join(", "), state });
+        return Err(StateError::WouldFall { nodes: labels::node_names(nodes).join(", "), state });
     }
     Ok(state.known().is_some_and(ControllerState::has_torque))
 }
@@ -30,7 +30,7 @@ impl<P: Port> Session<P> {
     pub fn reset_held(&mut self, nodes: u8, may_fall: bool) -> Result<(), Error> {
         let state = self.fresh_status()?.state;
         if reset_takes_torque(nodes, state)? && !may_fall {
-            return Err(StateError::MayFall { nodes: words::node_names(nodes).join(", "), state }.into());
+            return Err(StateError::MayFall { nodes: labels::node_names(nodes).join(", "), state }.into());
         }
         Ok(self.reset(nodes)?)
     }

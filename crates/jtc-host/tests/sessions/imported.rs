@@ -66,7 +66,7 @@ fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     while session.now() < end {
         let status = session.next_status().map_err(|e| e.to_string())?;
         if status.errors != 0 {
-            return Err(jtc_host::words::errors_line(&status));
+            return Err(jtc_host::labels::errors_line(&status));
         }
     }
     let joints = run.summary(arm).joints;

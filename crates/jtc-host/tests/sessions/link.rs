@@ -256,11 +256,11 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     assert_eq!(held.state, ControllerState::HoldPos);
     assert!(held.is_held_stop() && !held.is_faulty());
     assert!(
-        jtc_host::words::errors_line(&held).starts_with("held stop: joint 5"),
+        jtc_host::labels::errors_line(&held).starts_with("held stop: joint 5"),
         "{}",
-        jtc_host::words::errors_line(&held)
+        jtc_host::labels::errors_line(&held)
     );
-    assert!(jtc_host::words::next_step(&held).to_string().contains("jtc clear"));
+    assert!(jtc_host::labels::next_step(&held).to_string().contains("jtc clear"));
     // A frame that moves the arm is not sent, and the error contains the cause.
     assert_eq!(s.resume().unwrap_err().code(), "held-stop");
     let error = s.ready_to_move(|_| (), || false).unwrap_err();

@@ -1,15 +1,15 @@
 //! Connection to a controller: one thread runs the session, and the Python threads send jobs to it.
 
-mod acts;
-mod followed;
-pub mod machine;
+mod commands;
 pub mod motion;
+mod motion_handle;
 mod port;
-mod questions;
+mod queries;
 mod recording;
 mod shared;
 mod tape;
 mod worker;
+pub mod worker_state;
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, mpsc};
@@ -27,12 +27,12 @@ use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
 use crate::trajectory::Trajectory;
 use crate::{array, number};
-use followed::Motion;
-use machine::{Machine, Simulated, Target, Way};
 use motion::{Course, Order};
-pub use questions::samples as samples_of;
+use motion_handle::Motion;
+pub use queries::samples as samples_of;
 use shared::{Asked, Wish};
 use worker::{Waited, Worker, lock};
+use worker_state::{Simulated, Target, Way, WorkerState};
 
 /// Interval of the checks for the next status of a motion.
 const LOOK: Duration = Duration::from_millis(2);
@@ -79,7 +79,7 @@ impl Link {
     fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        job: impl FnOnce(&mut Machine, &Asked) -> Result<T, Failure> + Send + 'static,
+        job: impl FnOnce(&mut WorkerState, &Asked) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.worker.call(py, job)
     }
@@ -95,10 +95,10 @@ impl Link {
         &self,
         py: Python<'_>,
         flow: Flow,
-        else_do: impl FnOnce(&mut Machine) -> Result<(), Failure> + Send + 'static,
+        else_do: impl FnOnce(&mut WorkerState) -> Result<(), Failure> + Send + 'static,
     ) -> PyResult<()> {
         if !self.is_running() {
-            return self.call(py, move |machine, _| else_do(machine));
+            return self.call(py, move |state, _| else_do(state));
         }
         let (done, came) = mpsc::channel();
         self.worker.shared.wish(Wish { flow, done });
@@ -188,7 +188,7 @@ impl Link {
             return Ok(());
         }
         self.worker.shared.halt();
-        let rested = self.worker.call_always(py, Machine::rest);
+        let rested = self.worker.call_always(py, WorkerState::rest);
         self.worker.end(py).and(rested)
     }
 
@@ -226,20 +226,20 @@ impl Link {
     }
 
     fn pause(&self, py: Python<'_>) -> PyResult<()> {
-        self.wish(py, Flow::Pause, |machine| Ok(machine.session.pause()?))
+        self.wish(py, Flow::Pause, |state| Ok(state.session.pause()?))
     }
 
     fn resume(&self, py: Python<'_>) -> PyResult<()> {
-        self.wish(py, Flow::Resume, |machine| {
-            machine.same_arm()?;
-            Ok(machine.session.resume()?)
+        self.wish(py, Flow::Resume, |state| {
+            state.same_arm()?;
+            Ok(state.session.resume()?)
         })
     }
 
     /// Stops the arm on its path, even if another program moves it, and waits for standstill. Discards all earlier requests.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.worker.shared.stop();
-        self.worker.call_always(py, Machine::stop)
+        self.worker.call_always(py, WorkerState::stop)
     }
 
     fn speed(&self, py: Python<'_>) -> PyResult<f64> {
@@ -251,18 +251,18 @@ impl Link {
             }
             self.worker.pass(py, LOOK)?;
         }
-        self.call(py, |machine, _| {
-            let speed = machine.session.speed()?;
-            *lock(&machine.shared.speed) = Some(speed);
+        self.call(py, |state, _| {
+            let speed = state.session.speed()?;
+            *lock(&state.shared.speed) = Some(speed);
             Ok(speed)
         })
     }
 
     fn set_speed(&self, py: Python<'_>, speed: f64) -> PyResult<()> {
         number::within(speed, 0.05..=1.0, "speed", "")?;
-        self.wish(py, Flow::Speed((speed * 100.0).round() as u8), move |machine| {
-            machine.session.set_speed(speed)?;
-            *lock(&machine.shared.speed) = Some(speed);
+        self.wish(py, Flow::Speed((speed * 100.0).round() as u8), move |state| {
+            state.session.set_speed(speed)?;
+            *lock(&state.shared.speed) = Some(speed);
             Ok(())
         })
     }
@@ -271,20 +271,20 @@ impl Link {
     fn jog(&self, py: Python<'_>, velocity: &Bound<'_, PyAny>, seconds: f64) -> PyResult<[f64; JOINTS]> {
         let velocity = array::joints(velocity, "velocity")?;
         let time = number::seconds(seconds, JOG_MAX, "seconds")?;
-        self.call(py, move |machine, asked| machine.jog(&velocity, time, asked))
+        self.call(py, move |state, asked| state.jog(&velocity, time, asked))
     }
 
     fn teach(&self, py: Python<'_>, on: bool) -> PyResult<()> {
         if on {
-            return self.call(py, |machine, asked| machine.teach(asked));
+            return self.call(py, |state, asked| state.teach(asked));
         }
-        self.worker.call_always(py, Machine::hold)
+        self.worker.call_always(py, WorkerState::hold)
     }
 
     /// Records the positions of the hand-led arm for this time (s). `take_taught` returns them, even after an interrupted recording.
     fn record_teaching(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = number::seconds(seconds, TEACH_MAX, "seconds")?;
-        self.call(py, move |machine, asked| machine.record_teaching(time, asked))
+        self.call(py, move |state, asked| state.record_teaching(time, asked))
     }
 
     /// Returns times (s) and positions (rad) that were recorded since the last call.
@@ -304,23 +304,23 @@ impl Link {
                 && let Some(status) = *lock(&shared.status)
             {
                 self.worker.look_for_signals(py)?;
-                return questions::status(py, &status, None);
+                return queries::status(py, &status, None);
             }
             self.worker.pass(py, LOOK)?;
         }
-        let (status, stop) = self.worker.call_always(py, |machine| {
-            let status = machine.session.fresh_status()?;
-            let reactions = if status.is_held_stop() { machine.session.reactions() } else { None };
+        let (status, stop) = self.worker.call_always(py, |state| {
+            let status = state.session.fresh_status()?;
+            let reactions = if status.is_held_stop() { state.session.reactions() } else { None };
             Ok((status, reactions.and_then(|reactions| reactions.stop)))
         })?;
-        questions::status(py, &status, stop)
+        queries::status(py, &status, stop)
     }
 
     /// Waits until the arm is held with all drives enabled, at most `seconds` (s).
     fn wait_ready(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let longest = number::timeout(seconds, "timeout")?;
-        self.call(py, move |machine, asked| {
-            Ok(machine.session.wait_ready_until(longest, || asked.is_halted()).map(drop)?)
+        self.call(py, move |state, asked| {
+            Ok(state.session.wait_ready_until(longest, || asked.is_halted()).map(drop)?)
         })
     }
 

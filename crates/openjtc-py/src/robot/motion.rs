@@ -19,12 +19,12 @@ use jtc_wire::{Status, TrajectoryState};
 
 pub use jtc_host::run::Course;
 
-use super::machine::{Machine, observe};
 use super::port::AnyPort;
 use super::recording::Recording;
 use super::shared::{Asked, Progress, Shared};
 use super::tape::Tape;
 use super::worker::lock;
+use super::worker_state::{WorkerState, observe};
 use crate::error::Failure;
 
 /// Order for a run: the course and its options.
@@ -71,7 +71,7 @@ impl Order {
     }
 }
 
-impl Machine {
+impl WorkerState {
     /// Executes an order. An error before the arm moves is returned as an error. An error during or after the motion is part of the
     /// result.
     pub fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {

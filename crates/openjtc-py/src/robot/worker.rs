@@ -13,8 +13,8 @@ use host_kit::ErrorKind;
 use jtc_sim::World;
 use pyo3::prelude::*;
 
-use super::machine::{Machine, Target, Way};
 use super::shared::{Asked, Shared};
+use super::worker_state::{Target, Way, WorkerState};
 use crate::error::Failure;
 
 /// Interval at which a waiting thread checks for Ctrl-C.
@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Longest wait for standstill after a Stop; a second Ctrl-C ends the wait.
 const STANDSTILL: Duration = Duration::from_secs(15);
 
-type Job = Box<dyn FnOnce(&mut Machine) + Send>;
+type Job = Box<dyn FnOnce(&mut WorkerState) + Send>;
 
 /// Locks a mutex, even after a panic, because the protected data is consistent after each statement.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -65,11 +65,11 @@ impl Worker {
         let (opened, is_open) = channel::<Result<String, Failure>>();
         let own = Arc::clone(&shared);
         let asked = Asked::now(&shared);
-        let body = move || match Machine::open(target, own, &asked) {
+        let body = move || match WorkerState::open(target, own, &asked) {
             Err(failure) => drop(opened.send(Err(failure))),
-            Ok(mut machine) => {
-                let _ = opened.send(Ok(machine.port_name()));
-                serve(&mut machine, waiting);
+            Ok(mut state) => {
+                let _ = opened.send(Ok(state.port_name()));
+                serve(&mut state, waiting);
             }
         };
         let thread = std::thread::Builder::new().name("openjtc".into()).spawn(body)?;
@@ -90,31 +90,31 @@ impl Worker {
     pub fn ask<T: Send + 'static>(
         &self,
         at: u64,
-        job: impl FnOnce(&mut Machine, &Asked) -> Result<T, Failure> + Send + 'static,
+        job: impl FnOnce(&mut WorkerState, &Asked) -> Result<T, Failure> + Send + 'static,
     ) -> Result<Receiver<Result<T, Failure>>, Failure> {
         let asked = Asked::after(&self.shared, at);
-        self.hand_over(move |machine| {
+        self.hand_over(move |state| {
             asked.check()?;
-            machine.begin(&asked)?;
-            job(machine, &asked)
+            state.begin(&asked)?;
+            job(state, &asked)
         })
     }
 
     /// Like [`Self::ask`], for jobs that a Stop does not cancel: jobs that bring the arm to rest or only read.
     pub fn ask_always<T: Send + 'static>(
         &self,
-        job: impl FnOnce(&mut Machine) -> Result<T, Failure> + Send + 'static,
+        job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> Result<Receiver<Result<T, Failure>>, Failure> {
         self.hand_over(job)
     }
 
     fn hand_over<T: Send + 'static>(
         &self,
-        job: impl FnOnce(&mut Machine) -> Result<T, Failure> + Send + 'static,
+        job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> Result<Receiver<Result<T, Failure>>, Failure> {
         let (done, came) = channel();
-        let job: Job = Box::new(move |machine| {
-            let result = job(machine);
+        let job: Job = Box::new(move |state| {
+            let result = job(state);
             // The caller may have stopped waiting.
             let _ = done.send(result);
         });
@@ -130,7 +130,7 @@ impl Worker {
     pub fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        job: impl FnOnce(&mut Machine, &Asked) -> Result<T, Failure> + Send + 'static,
+        job: impl FnOnce(&mut WorkerState, &Asked) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         let came = self.ask(self.shared.halts(), job)?;
         Ok(self.wait(py, came)??)
@@ -140,7 +140,7 @@ impl Worker {
     pub fn call_always<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        job: impl FnOnce(&mut Machine) -> Result<T, Failure> + Send + 'static,
+        job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         let came = self.ask_always(job)?;
         Ok(self.wait(py, came)??)
@@ -204,7 +204,7 @@ impl Worker {
     /// Stops the motion of this connection and waits for standstill. A signal ends the wait. Cancels all earlier requests.
     pub fn rest(&self, py: Python<'_>) {
         self.shared.halt();
-        let Ok(came) = self.ask_always(Machine::rest).map(Mutex::new) else { return };
+        let Ok(came) = self.ask_always(WorkerState::rest).map(Mutex::new) else { return };
         let end = Instant::now() + STANDSTILL;
         while Instant::now() < end {
             let result = py.detach(|| lock(&came).recv_timeout(LOOK));
@@ -261,9 +261,9 @@ impl Drop for Worker {
 
 /// Runs jobs one after the other. Reads statuses between jobs, so that the last status is always recent. At the end, stops a motion of
 /// this connection.
-fn serve(machine: &mut Machine, waiting: Receiver<Job>) {
+fn serve(state: &mut WorkerState, waiting: Receiver<Job>) {
     loop {
-        let job = if machine.time_passes() {
+        let job = if state.time_passes() {
             match waiting.try_recv() {
                 Ok(job) => Some(job),
                 Err(TryRecvError::Empty) => None,
@@ -277,19 +277,19 @@ fn serve(machine: &mut Machine, waiting: Receiver<Job>) {
         };
         let done = catch_unwind(AssertUnwindSafe(|| {
             match job {
-                Some(job) => job(machine),
-                None => machine.idle(),
+                Some(job) => job(state),
+                None => state.idle(),
             }
-            machine.look();
+            state.look();
         }));
         if done.is_err() {
             // After a panic the state is unknown, so only a Stop is sent.
-            machine.shared.set_gone();
+            state.shared.set_gone();
             drop(waiting);
-            let _ = catch_unwind(AssertUnwindSafe(|| machine.abandon()));
+            let _ = catch_unwind(AssertUnwindSafe(|| state.abandon()));
             return;
         }
     }
     // An error is ignored, because no caller is left to report it to.
-    let _ = machine.rest();
+    let _ = state.rest();
 }

@@ -14,13 +14,13 @@ use ucom_host::master::io::Kind as Buffer;
 use ucom_host::master::probe::ProbeOptions;
 use ucom_host::session::{Assignment, Boards, Cache, Link, ParameterFile, SessionError};
 
-use super::hands::Config;
 use super::owner::Owner;
 use super::recording::{ChainRecording, Sink, Tap};
 use super::samples::ChainSamples;
 use super::shared::{Halt, Listener};
 use super::simulated::{Simulated, SimulatedChain};
 use super::update::{Read, Source, Update};
+use super::worker_state::Config;
 use super::{procedures, running, update, values};
 use crate::error::Failure;
 use crate::json;
@@ -145,7 +145,7 @@ impl Chain {
         // Read here, because the session's thread must not wait for a disk.
         let read = py.detach(|| file.filter(|file| file.exists()).map(Inventory::read).transpose());
         let listed = read.map_err(|e| Failure::usage(e.to_string()))?;
-        let init = move |hands: &mut _| procedures::init(hands, listed, (renew, force, check));
+        let init = move |state: &mut _| procedures::init(state, listed, (renew, force, check));
         let (value, made) = self.owner.call_after(py, after, init)?;
         if let (Some(file), Some(made)) = (file, made) {
             py.detach(|| made.write(file)).map_err(|e| Failure::usage(e.to_string()))?;
@@ -155,7 +155,7 @@ impl Chain {
 
     fn info<'py>(&self, py: Python<'py>, boards: &str) -> Object<'py> {
         let boards = self::boards(boards)?;
-        plain(py, self.owner.call(py, move |hands| procedures::info(hands, &boards))?)
+        plain(py, self.owner.call(py, move |state| procedures::info(state, &boards))?)
     }
 
     fn status<'py>(
@@ -169,27 +169,27 @@ impl Chain {
         let boards = self::boards(boards)?;
         plain(
             py,
-            self.owner.call(py, move |hands| procedures::status(hands, &boards, (&set, &clear), force))?,
+            self.owner.call(py, move |state| procedures::status(state, &boards, (&set, &clear), force))?,
         )
     }
 
     fn start<'py>(&self, py: Python<'py>, boards: &str, force: bool) -> Object<'py> {
         let boards = self::boards(boards)?;
-        plain(py, self.owner.call(py, move |hands| running::start(hands, &boards, force))?)
+        plain(py, self.owner.call(py, move |state| running::start(state, &boards, force))?)
     }
 
     fn xreset<'py>(&self, py: Python<'py>, boards: &str, force: bool) -> Object<'py> {
         let boards = self::boards(boards)?;
-        plain(py, self.owner.call(py, move |hands| procedures::xreset(hands, &boards, force))?)
+        plain(py, self.owner.call(py, move |state| procedures::xreset(state, &boards, force))?)
     }
 
     fn reset(&self, py: Python<'_>, boards: &str, force: bool) -> PyResult<Vec<u8>> {
         let boards = self::boards(boards)?;
-        self.owner.call(py, move |hands| procedures::reset(hands, &boards, force))
+        self.owner.call(py, move |state| procedures::reset(state, &boards, force))
     }
 
     fn repair<'py>(&self, py: Python<'py>, board: u8, flash_number: Option<u16>, force: bool) -> Object<'py> {
-        plain(py, self.owner.call(py, move |hands| procedures::repair(hands, board, flash_number, force))?)
+        plain(py, self.owner.call(py, move |state| procedures::repair(state, board, flash_number, force))?)
     }
 
     fn stop<'py>(&self, py: Python<'py>, boards: &str, application: bool) -> Object<'py> {
@@ -200,7 +200,7 @@ impl Chain {
             Boards::None => Halt::Boards(Vec::new()),
         };
         let level = if application { StopLevel::Application } else { StopLevel::Loop };
-        plain(py, self.owner.stop(py, halt, move |hands| running::stop(hands, &boards, level))?)
+        plain(py, self.owner.stop(py, halt, move |state| running::stop(state, &boards, level))?)
     }
 
     #[allow(clippy::too_many_arguments, reason = "they are named in Python")]
@@ -220,21 +220,21 @@ impl Chain {
         let (inputs, parameters) = (assignments(inputs)?, assignments(parameters)?);
         let file = file.map(|file| self.parameter_file(py, &file)).transpose()?;
         let run = running::Run { boards, active, inputs, parameters, file, texts, force };
-        plain(py, self.owner.call_after(py, after, move |hands| running::run(hands, run))?)
+        plain(py, self.owner.call_after(py, after, move |state| running::run(state, run))?)
     }
 
     fn outputs(&self, py: Python<'_>, boards: &str, active: bool) -> PyResult<()> {
         let boards = self::boards(boards)?;
-        self.owner.call(py, move |hands| running::outputs(hands, &boards, active))
+        self.owner.call(py, move |state| running::outputs(state, &boards, active))
     }
 
     fn signals<'py>(&self, py: Python<'py>, boards: &str) -> Object<'py> {
         let boards = self::boards(boards)?;
-        plain(py, self.owner.call(py, move |hands| values::signals(hands, &boards))?)
+        plain(py, self.owner.call(py, move |state| values::signals(state, &boards))?)
     }
 
     fn initial_inputs<'py>(&self, py: Python<'py>, board: u8) -> Object<'py> {
-        plain(py, self.owner.call(py, move |hands| values::initial_inputs(hands, board))?)
+        plain(py, self.owner.call(py, move |state| values::initial_inputs(state, board))?)
     }
 
     fn set<'py>(
@@ -255,17 +255,17 @@ impl Chain {
                 return Err(Failure::usage(text).into());
             }
         };
-        let set = move |hands: &mut _| values::set(hands, board, buffer, (&name, &value), force);
+        let set = move |state: &mut _| values::set(state, board, buffer, (&name, &value), force);
         plain(py, self.owner.call(py, set)?)
     }
 
     fn value<'py>(&self, py: Python<'py>, board: u8, name: String) -> Object<'py> {
-        plain(py, self.owner.call(py, move |hands| values::value(hands, board, &name))?)
+        plain(py, self.owner.call(py, move |state| values::value(state, board, &name))?)
     }
 
     fn values<'py>(&self, py: Python<'py>, boards: &str) -> Object<'py> {
         let boards = self::boards(boards)?;
-        plain(py, self.owner.call(py, move |hands| values::values(hands, &boards))?)
+        plain(py, self.owner.call(py, move |state| values::values(state, &boards))?)
     }
 
     fn running<'py>(&self, py: Python<'py>) -> Object<'py> {
@@ -274,28 +274,28 @@ impl Chain {
 
     fn parameters_text(&self, py: Python<'_>, boards: &str) -> PyResult<String> {
         let boards = self::boards(boards)?;
-        self.owner.call(py, move |hands| values::parameters_text(hands, &boards))
+        self.owner.call(py, move |state| values::parameters_text(state, &boards))
     }
 
     fn apply_parameters(&self, py: Python<'_>, path: PathBuf, dry_run: bool, force: bool) -> PyResult<usize> {
         let after = self.owner.now()?;
         let file = self.parameter_file(py, &path)?;
-        let apply = move |hands: &mut _| values::apply_parameters(hands, &file, dry_run, force);
+        let apply = move |state: &mut _| values::apply_parameters(state, &file, dry_run, force);
         self.owner.call_after(py, after, apply)
     }
 
     /// Returns a reader of samples of boards from now on.
     fn samples(this: PyRef<'_, Self>, py: Python<'_>, boards: Option<&str>) -> PyResult<ChainSamples> {
         let boards = boards.map(self::boards).transpose()?;
-        let listener = this.owner.call(py, move |hands| {
-            let running: Vec<u8> = hands.held.borrow().running().iter().copied().collect();
+        let listener = this.owner.call(py, move |state| {
+            let running: Vec<u8> = state.held.borrow().running().iter().copied().collect();
             let of_all = boards.as_ref().is_none_or(|boards| *boards == Boards::All);
             let numbers = match boards {
                 None if !running.is_empty() => running,
-                boards => hands.driver.numbers(&boards.unwrap_or(Boards::All))?,
+                boards => state.driver.numbers(&boards.unwrap_or(Boards::All))?,
             };
-            let listener = Arc::new(Listener::new(values::with_names(hands, &numbers, of_all)?));
-            hands.shared.listen(&listener);
+            let listener = Arc::new(Listener::new(values::with_names(state, &numbers, of_all)?));
+            state.shared.listen(&listener);
             Ok(listener)
         })?;
         Ok(ChainSamples { chain: this.into(), listener })
@@ -343,7 +343,7 @@ impl Chain {
             rewrite,
             check,
         };
-        let act = move |hands: &mut _, report: &dyn Fn(Value)| update::update(hands, update, report);
+        let act = move |state: &mut _, report: &dyn Fn(Value)| update::update(state, update, report);
         plain(py, self.owner.call_with(py, (Kind::Update, after), progress.as_ref(), act)?)
     }
 
@@ -362,7 +362,7 @@ impl Chain {
         let after = self.owner.now()?;
         let image = py.detach(|| image.as_deref().map(procedures::probed_image).transpose())?;
         let options = ProbeOptions { init, alive, image, force };
-        plain(py, self.owner.call_after(py, after, move |hands| procedures::probe(hands, options))?)
+        plain(py, self.owner.call_after(py, after, move |state| procedures::probe(state, options))?)
     }
 
     fn conformance<'py>(
@@ -375,7 +375,7 @@ impl Chain {
         force: bool,
     ) -> Object<'py> {
         let boards = self::boards(boards)?;
-        let act = move |hands: &mut _| procedures::conformance(hands, &boards, (init, run, force), only);
+        let act = move |state: &mut _| procedures::conformance(state, &boards, (init, run, force), only);
         plain(py, self.owner.call(py, act)?)
     }
 

@@ -2,13 +2,12 @@
 //!
 //! - [`owner`], [`shared`], [`alarms`]: the thread, its requests, the waits of Python threads, and the errors that are
 //!   raised.
-//! - [`hands`], [`operator`]: the session in that thread.
+//! - [`state`], [`operator`]: the session in that thread.
 //! - [`procedures`], [`running`], [`values`], [`update`]: procedures of the session; Python converts their JSON results to dataclasses.
 //! - [`chain`], [`samples`], [`recording`], [`simulated`]: the classes.
 
 mod alarms;
 mod chain;
-mod hands;
 mod objects;
 mod operator;
 mod owner;
@@ -20,6 +19,7 @@ mod shared;
 mod simulated;
 mod update;
 mod values;
+mod worker_state;
 
 use pyo3::prelude::*;
 

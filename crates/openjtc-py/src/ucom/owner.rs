@@ -10,8 +10,8 @@ use pyo3::prelude::*;
 use serde_json::Value;
 use ucom_host::session::Link;
 
-use super::hands::{Config, Hands};
 use super::shared::{Halt, Process, Shared, failure, fault, lock};
+use super::worker_state::{Config, WorkerState};
 use crate::error::Failure;
 use crate::json;
 
@@ -42,14 +42,14 @@ impl Owner {
         let thread = std::thread::spawn(move || {
             // This guard ensures that no caller waits without end after a fault of this thread.
             let gone = Gone(&own);
-            let mut hands = Hands::new(own.clone(), config, link);
-            match hands.serve() {
+            let mut state = WorkerState::new(own.clone(), config, link);
+            match state.serve() {
                 Ok(()) => {
-                    own.left(hands.leave());
+                    own.left(state.leave());
                     own.close(failure(ErrorKind::NoLink, "closed", "the chain is closed", "connect again"));
                 }
                 Err(error) => {
-                    own.left(hands.started());
+                    own.left(state.started());
                     own.close(error.into());
                 }
             }
@@ -63,7 +63,7 @@ impl Owner {
     pub fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
+        act: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         let after = self.now()?;
         self.call_after(py, after, act)
@@ -74,9 +74,9 @@ impl Owner {
         &self,
         py: Python<'_>,
         after: u64,
-        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
+        act: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
-        self.call_with(py, (Kind::Command, after), None, |hands, _| act(hands))
+        self.call_with(py, (Kind::Command, after), None, |state, _| act(state))
     }
 
     /// Returns the number of the last Stop. A method that reads files before its request takes the number first, so that a Stop in that
@@ -93,7 +93,7 @@ impl Owner {
         py: Python<'_>,
         (kind, after): (Kind, u64),
         progress: Option<&Bound<'_, PyAny>>,
-        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
+        act: impl FnOnce(&mut WorkerState, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.is_here()?;
         let before = self.shared.last_event();
@@ -133,8 +133,8 @@ impl Owner {
         if !self.process.is_this() {
             return;
         }
-        let answers = self.overtake(Halt::Started, |hands| {
-            hands.leave();
+        let answers = self.overtake(Halt::Started, |state| {
+            state.leave();
             Ok(())
         });
         while let Ok(Received::Nothing) = self.wait(py, &answers) {
@@ -149,7 +149,7 @@ impl Owner {
         &self,
         py: Python<'_>,
         halt: Halt,
-        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
+        act: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.is_here()?;
         let answers = self.overtake(halt, act);
@@ -179,9 +179,9 @@ impl Owner {
     fn overtake<T: Send + 'static>(
         &self,
         halt: Halt,
-        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
+        act: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> Answers<T> {
-        let (id, act, answers) = self.request(|hands, _| act(hands));
+        let (id, act, answers) = self.request(|state, _| act(state));
         self.shared.queue.stop(id, act);
         // After the current request is cancelled, so that it sends nothing after these frames.
         self.shared.halt(halt);
@@ -192,16 +192,16 @@ impl Owner {
     /// Returns the number of a new request, its function for the queue, and the channel for its answers.
     fn request<T: Send + 'static>(
         &self,
-        act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
-    ) -> (u64, Act<Hands>, Answers<T>) {
+        act: impl FnOnce(&mut WorkerState, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
+    ) -> (u64, Act<WorkerState>, Answers<T>) {
         let (sender, answers) = mpsc::channel();
         let id = self.shared.next_id();
         let own = self.shared.clone();
-        let act = move |hands: Result<&mut Hands, Refused>| {
+        let act = move |state: Result<&mut WorkerState, Refused>| {
             let report = |value| drop(sender.send(Message::Progress(value)));
-            let done = hands.map_err(|refused| own.refusal(refused)).and_then(|hands| {
-                let done = act(hands, &report);
-                hands.settle();
+            let done = state.map_err(|refused| own.refusal(refused)).and_then(|state| {
+                let done = act(state, &report);
+                state.settle();
                 done
             });
             // An error is ignored: a caller that has stopped waiting needs no answer.

@@ -15,8 +15,8 @@ use ucom_host::master::probe::ProbeOptions;
 use ucom_host::master::{InitOptions, Outcome, Reports, Request};
 use ucom_host::session::{Boards, Numbered, SessionError, nothing_shared};
 
-use super::hands::Hands;
 use super::objects;
+use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Time for which the doctor listens before it sends queries.
@@ -54,18 +54,18 @@ fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &'stati
 }
 
 /// Queries all boards, without changing anything.
-pub fn scan(hands: &mut Hands) -> Result<Value, Failure> {
-    let report = match hands.driver.run(Request::Scan)? {
+pub fn scan(state: &mut WorkerState) -> Result<Value, Failure> {
+    let report = match state.driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
         other => return Err(SessionError::from(other).into()),
     };
     if report.boards.is_empty() && report.reports.ids.is_empty() {
         return Err(SessionError::NoBoards.into());
     }
-    nothing_shared(&hands.driver.master)?;
-    let profile = hands.driver.master.profile();
+    nothing_shared(&state.driver.master)?;
+    let profile = state.driver.master.profile();
     Ok(json!({
-        "boards": objects::boards(&report.boards, &profile, hands.inventory.as_ref()),
+        "boards": objects::boards(&report.boards, &profile, state.inventory.as_ref()),
         "reports": report.reports.ids,
         "findings": objects::texts(&report.findings),
     }))
@@ -74,17 +74,17 @@ pub fn scan(hands: &mut Hands) -> Result<Value, Failure> {
 /// Resets and numbers the whole chain. `listed` is the present content of the inventory file. Returns the new inventory to the caller, who
 /// writes it, because a slow disk would delay the heartbeats here.
 pub fn init(
-    hands: &mut Hands,
+    state: &mut WorkerState,
     listed: Option<Inventory>,
     (renew, force, check): (bool, bool, bool),
 ) -> Result<(Value, Option<Inventory>), Failure> {
     // The comparison includes changes that another program has written to the file.
-    hands.inventory = listed.or_else(|| hands.inventory.take().map(Inventory::without_records));
-    let compared = hands.inventory.as_ref().filter(|_| hands.inventory_file.is_some() && !renew);
+    state.inventory = listed.or_else(|| state.inventory.take().map(Inventory::without_records));
+    let compared = state.inventory.as_ref().filter(|_| state.inventory_file.is_some() && !renew);
     let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());
     let options = InitOptions { expected: expected.unwrap_or_default(), force };
-    let outcome = hands.driver.run(Request::Init(options));
-    hands.renumbered(match &outcome {
+    let outcome = state.driver.run(Request::Init(options));
+    state.renumbered(match &outcome {
         Ok(Outcome::Init(report)) => Some(report),
         _ => None,
     });
@@ -93,36 +93,36 @@ pub fn init(
         other => return Err(SessionError::from(other).into()),
     };
     if report.is_ok() {
-        let made = Inventory::of_init(&report, hands.inventory.as_ref());
-        hands.inventory = Some(made.map_err(|e| Failure::usage(e.to_string()))?);
+        let made = Inventory::of_init(&report, state.inventory.as_ref());
+        state.inventory = Some(made.map_err(|e| Failure::usage(e.to_string()))?);
     }
     let texts = objects::texts(&report.findings);
     if let Some(kind) = report.failure().filter(|_| check) {
         return Err(findings(kind, "init", &texts, "doctor() looks for the reason"));
     }
-    let profile = hands.driver.master.profile();
+    let profile = state.driver.master.profile();
     let value = json!({
-        "boards": objects::boards(&report.boards, &profile, hands.inventory.as_ref()),
+        "boards": objects::boards(&report.boards, &profile, state.inventory.as_ref()),
         "reports": report.reports.ids,
         "findings": texts,
     });
-    Ok((value, hands.inventory.clone().filter(|_| report.is_ok())))
+    Ok((value, state.inventory.clone().filter(|_| report.is_ok())))
 }
 
 /// Reads the reports of boards about themselves.
-pub fn info(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
+pub fn info(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
     let mut all = Vec::new();
-    for board in hands.driver.numbers(boards)? {
-        all.push(hands.driver.seen(board)?);
+    for board in state.driver.numbers(boards)? {
+        all.push(state.driver.seen(board)?);
     }
-    let profile = hands.driver.master.profile();
-    Ok(objects::boards(&all, &profile, hands.inventory.as_ref()))
+    let profile = state.driver.master.profile();
+    Ok(objects::boards(&all, &profile, state.inventory.as_ref()))
 }
 
 /// Converts boards with their status.
-pub fn numbered(hands: &Hands, all: &[Numbered]) -> Value {
-    let profile = hands.driver.master.profile();
-    all.iter().map(|(n, info)| objects::info(*n, info, &profile, hands.inventory.as_ref())).collect()
+pub fn numbered(state: &WorkerState, all: &[Numbered]) -> Value {
+    let profile = state.driver.master.profile();
+    all.iter().map(|(n, info)| objects::info(*n, info, &profile, state.inventory.as_ref())).collect()
 }
 
 /// Converts names of status bits to bits.
@@ -138,7 +138,7 @@ fn bits(names: &[String]) -> Result<Status, Failure> {
 
 /// Sets and clears status bits, then returns the status.
 pub fn status(
-    hands: &mut Hands,
+    state: &mut WorkerState,
     boards: &Boards,
     (set, clear): (&[String], &[String]),
     force: bool,
@@ -152,39 +152,39 @@ pub fn status(
         let text = format!("{mirrors}: mirrors reality and cannot be written");
         return Err(Failure::usage(text).next("start(), stop() and init() change what these bits show"));
     }
-    let numbers = hands.driver.numbers(boards)?;
+    let numbers = state.driver.numbers(boards)?;
     let all = match set | clear {
-        Status(0) => hands.driver.statuses(&numbers)?,
+        Status(0) => state.driver.statuses(&numbers)?,
         mask => {
             let request = |board| Request::SetStatus { board, mask, value: set, force };
             let all = match set.has(Status::MSTART) {
-                true => hands.starting(&numbers, |session| session.driver.change_each(&numbers, request))?,
-                false => hands.driver.change_each(&numbers, request)?,
+                true => state.starting(&numbers, |session| session.driver.change_each(&numbers, request))?,
+                false => state.driver.change_each(&numbers, request)?,
             };
             for (board, info) in &all {
                 match (info.status.has(Status::INIT), info.status.has(Status::MSTART)) {
-                    (false, _) => hands.forget(*board),
-                    (true, false) => hands.runs_no_more(Some(*board)),
+                    (false, _) => state.forget(*board),
+                    (true, false) => state.runs_no_more(Some(*board)),
                     (true, true) => {}
                 }
             }
             all
         }
     };
-    Ok(numbered(hands, &all))
+    Ok(numbered(state, &all))
 }
 
 /// Resets boards into the exloader with programming enabled (PC_XRESET).
-pub fn xreset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, Failure> {
-    let numbers = hands.driver.numbers(boards)?;
-    let all = hands.driver.change_each(&numbers, |board| Request::XReset { board, force })?;
-    numbers.iter().for_each(|board| hands.forget(*board));
-    Ok(numbered(hands, &all))
+pub fn xreset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
+    let numbers = state.driver.numbers(boards)?;
+    let all = state.driver.change_each(&numbers, |board| Request::XReset { board, force })?;
+    numbers.iter().for_each(|board| state.forget(*board));
+    Ok(numbered(state, &all))
 }
 
 /// Resets boards (PC_RESET), all at once or one by one. Returns the low bytes of the flash numbers of the boards that
 /// have reported.
-pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
+pub fn reset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
     let targets: Vec<Option<u8>> = match boards {
         Boards::All => vec![None],
         Boards::None => Vec::new(),
@@ -192,15 +192,15 @@ pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>,
     };
     let mut reports = Reports::default();
     for board in targets {
-        match hands.driver.run(Request::Reset { board, force })? {
+        match state.driver.run(Request::Reset { board, force })? {
             Outcome::Reset(some) => reports.ids.extend(some.ids),
             other => return Err(SessionError::from(other).into()),
         }
         match board {
-            Some(board) => hands.forget(board),
+            Some(board) => state.forget(board),
             None => {
-                hands.runs_no_more(None);
-                hands.held.borrow_mut().known.clear();
+                state.runs_no_more(None);
+                state.held.borrow_mut().known.clear();
             }
         }
     }
@@ -213,33 +213,33 @@ pub fn reset(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Vec<u8>,
 
 /// Restores the number of one board.
 pub fn repair(
-    hands: &mut Hands,
+    state: &mut WorkerState,
     board: u8,
     flash_number: Option<u16>,
     force: bool,
 ) -> Result<Value, Failure> {
-    let listed = hands.inventory.as_ref().and_then(|i| i.get(board)).map(|known| known.flash_number);
+    let listed = state.inventory.as_ref().and_then(|i| i.get(board)).map(|known| known.flash_number);
     let flash_number = flash_number.or(listed).ok_or_else(|| {
         Failure::usage(format!("which board stands at number {board}? no inventory has it"))
             .next("pass its flash_number, or an inventory to connect()")
     })?;
-    match hands.driver.run(Request::Repair { board, flash_number, force })? {
+    match state.driver.run(Request::Repair { board, flash_number, force })? {
         Outcome::Repaired(seen) => {
-            hands.forget(board);
-            Ok(objects::board(&seen, &hands.driver.master.profile(), hands.inventory.as_ref()))
+            state.forget(board);
+            Ok(objects::board(&seen, &state.driver.master.profile(), state.inventory.as_ref()))
         }
         other => Err(SessionError::from(other).into()),
     }
 }
 
 /// Listens, sends queries if they cannot do harm, and reports the findings.
-pub fn doctor(hands: &mut Hands) -> Result<Value, Failure> {
-    let seen = hands.driver.examine(LISTEN)?;
-    let profile = hands.driver.master.profile();
+pub fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
+    let seen = state.driver.examine(LISTEN)?;
+    let profile = state.driver.master.profile();
     Ok(json!({
         "healthy": seen.failure().is_none(),
         "findings": seen.findings,
-        "boards": objects::boards(&seen.boards, &profile, hands.inventory.as_ref()),
+        "boards": objects::boards(&seen.boards, &profile, state.inventory.as_ref()),
     }))
 }
 
@@ -250,11 +250,11 @@ pub fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
 }
 
 /// Measures how boards interpret the protocol.
-pub fn probe(hands: &mut Hands, options: ProbeOptions) -> Result<Value, Failure> {
+pub fn probe(state: &mut WorkerState, options: ProbeOptions) -> Result<Value, Failure> {
     let init = options.init;
-    let outcome = hands.driver.run(Request::Probe(options));
+    let outcome = state.driver.run(Request::Probe(options));
     if init {
-        hands.renumbered(match &outcome {
+        state.renumbered(match &outcome {
             Ok(Outcome::Probe(report)) => report.init.as_ref(),
             _ => None,
         });
@@ -274,17 +274,17 @@ pub fn probe(hands: &mut Hands, options: ProbeOptions) -> Result<Value, Failure>
 
 /// Tests boards against the protocol.
 pub fn conformance(
-    hands: &mut Hands,
+    state: &mut WorkerState,
     boards: &Boards,
     (init, run, force): (bool, bool, bool),
     only: Vec<String>,
 ) -> Result<Value, Failure> {
     let boards = match boards {
         Boards::All => Vec::new(),
-        boards => hands.driver.numbers(boards)?,
+        boards => state.driver.numbers(boards)?,
     };
     let options = ConformanceOptions { boards, init, run, program: None, only, force };
-    match hands.driver.run(Request::Conformance(options))? {
+    match state.driver.run(Request::Conformance(options))? {
         Outcome::Conformance(report) => {
             if let Some(error) = report.error {
                 return Err(error.into());

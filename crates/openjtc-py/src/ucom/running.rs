@@ -6,19 +6,19 @@ use ucom_host::session::{
     Assignment, Boards, Cache, ParameterFile, Prepared, Session, SessionError, Stopped, only, plans, remember,
 };
 
-use super::hands::Hands;
 use super::procedures::numbered;
+use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Starts applications, without any movement.
-pub fn start(hands: &mut Hands, boards: &Boards, force: bool) -> Result<Value, Failure> {
-    let numbers = hands.driver.numbers(boards)?;
-    let all = hands.starting(&numbers, |hands| {
-        hands.driver.change_each(&numbers, |board| Request::Start { board, force })
+pub fn start(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
+    let numbers = state.driver.numbers(boards)?;
+    let all = state.starting(&numbers, |state| {
+        state.driver.change_each(&numbers, |board| Request::Start { board, force })
     })?;
     // The signal names of the boards are read. A failure does not undo the start.
-    numbers.iter().for_each(|board| drop(hands.known(*board)));
-    Ok(numbered(hands, &all))
+    numbers.iter().for_each(|board| drop(state.known(*board)));
+    Ok(numbered(state, &all))
 }
 
 /// Boards to run, with their values and options.
@@ -33,8 +33,8 @@ pub struct Run {
 }
 
 /// Starts applications and control loops, with their values.
-pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
-    let numbers = hands.driver.numbers(&run.boards)?;
+pub fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failure> {
+    let numbers = state.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
     // With `all`, every board of the parameter file must be present.
@@ -42,7 +42,7 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
     let file = run.file.take().map(|file| file.of_boards(meant));
     // The identities of the boards are checked first, because this does not need a started application.
     if let Some(file) = &file {
-        file.identities(&mut hands.driver)?;
+        file.identities(&mut state.driver)?;
     }
     let begin = |session: &mut Session, cache: &Cache| {
         let mut prepared = Prepared::default();
@@ -51,20 +51,20 @@ pub fn run(hands: &mut Hands, mut run: Run) -> Result<Value, Failure> {
         let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
         Ok((report, prepared))
     };
-    let (report, prepared) = hands.starting(&numbers, |hands| hands.by_names(begin))?;
+    let (report, prepared) = state.starting(&numbers, |state| state.by_names(begin))?;
     for known in prepared.known.into_values() {
-        hands.knows(known);
+        state.knows(known);
     }
-    hands.runs(&numbers);
+    state.runs(&numbers);
     for board in numbers.iter().filter(|_| run.texts) {
         let change = AdminChange { debug: Some(true), ..Default::default() };
         // The boards already run, perhaps with enabled outputs. If this returned an error, the caller would believe
         // that they are stopped.
-        if let Err(error) = hands.driver.run(Request::Admin { board: *board, change, force: true }) {
-            hands.driver.note(format!("board {board} may send no texts: {error}"));
+        if let Err(error) = state.driver.run(Request::Admin { board: *board, change, force: true }) {
+            state.driver.note(format!("board {board} may send no texts: {error}"));
         }
     }
-    hands.first_outputs(&numbers)?;
+    state.first_outputs(&numbers)?;
     Ok(json!({
         "boards": numbers,
         "active": run.active,
@@ -98,20 +98,20 @@ fn begin(
 
 /// Enables the outputs of running boards, or makes them safe. The command for safe outputs is sent to each board, even if
 /// another board fails.
-pub fn outputs(hands: &mut Hands, boards: &Boards, active: bool) -> Result<(), Failure> {
+pub fn outputs(state: &mut WorkerState, boards: &Boards, active: bool) -> Result<(), Failure> {
     let numbers = match boards {
-        Boards::All => hands.held.borrow().running().iter().copied().collect(),
-        boards => hands.driver.numbers(boards)?,
+        Boards::All => state.held.borrow().running().iter().copied().collect(),
+        boards => state.driver.numbers(boards)?,
     };
     if !active {
-        let Stopped { failed, .. } = hands.driver.outputs_safe(&numbers, false);
+        let Stopped { failed, .. } = state.driver.outputs_safe(&numbers, false);
         return all_certain("outputs not safe for certain", failed);
     }
     let mut done = Vec::new();
     for board in numbers {
         let change = AdminChange { active: Some(true), ..AdminChange::default() };
         let request = Request::Admin { board, change, force: false };
-        let enabled = hands.starting(&[board], |hands| hands.driver.run(request));
+        let enabled = state.starting(&[board], |state| state.driver.run(request));
         enabled.map_err(|failure| failure.after(done.iter().copied()))?;
         done.push(board);
     }
@@ -129,12 +129,12 @@ fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failur
 }
 
 /// Stops each selected board; `all` means boards that answer and boards that this session has started.
-pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
-    let was_master = hands.driver.master.is_master();
+pub fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
+    let was_master = state.driver.master.is_master();
     let wanted = match boards {
         Boards::All => {
-            let mut wanted = hands.started();
-            match hands.driver.numbers_to_stop(&Boards::All) {
+            let mut wanted = state.started();
+            match state.driver.numbers_to_stop(&Boards::All) {
                 Ok(found) => wanted.extend(found),
                 // A board without a number does not run.
                 Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) if !wanted.is_empty() => {}
@@ -146,17 +146,17 @@ pub fn stop(hands: &mut Hands, boards: &Boards, level: StopLevel) -> Result<Valu
         }
         boards => boards.clone(),
     };
-    let Stopped { boards: all, failed } = hands.driver.stop_each(&wanted, level)?;
+    let Stopped { boards: all, failed } = state.driver.stop_each(&wanted, level)?;
     for (board, _) in &all {
         match level {
-            StopLevel::Application => hands.runs_no_more(Some(*board)),
-            StopLevel::Loop | StopLevel::Outputs => hands.only_started(*board),
+            StopLevel::Application => state.runs_no_more(Some(*board)),
+            StopLevel::Loop | StopLevel::Outputs => state.only_started(*board),
         }
     }
-    if !was_master && hands.started().is_empty() {
+    if !was_master && state.started().is_empty() {
         // The session ends its role as master, because a stop must not make it the master of the bus.
-        hands.driver.master.end_session();
+        state.driver.master.end_session();
     }
     all_certain("not stopped for certain", failed)?;
-    Ok(numbered(hands, &all))
+    Ok(numbered(state, &all))
 }

@@ -12,7 +12,7 @@ use ucom_host::master::io::Snapshot;
 use ucom_host::session::Known;
 
 use super::alarms::Alarms;
-use super::hands::Hands;
+use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Largest number of stored events, newest last.
@@ -68,7 +68,7 @@ impl Listener {
 #[derive(Default)]
 pub struct Shared {
     /// Requests to the thread, each with its number.
-    pub queue: Queue<Hands, u64>,
+    pub queue: Queue<WorkerState, u64>,
     /// Reason why the queue is closed.
     closed: Mutex<Option<Failure>>,
     halts: Mutex<Vec<Halt>>,
@@ -269,10 +269,10 @@ impl Shared {
     }
 
     /// Takes the next request and runs it.
-    pub fn take(&self, hands: &mut Hands) -> bool {
+    pub fn take(&self, state: &mut WorkerState) -> bool {
         let Some(turn) = self.queue.take() else { return false };
-        hands.quiet();
-        turn.run(hands);
+        state.quiet();
+        turn.run(state);
         self.asked();
         self.queue.done();
         true

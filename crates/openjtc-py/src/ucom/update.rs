@@ -15,8 +15,8 @@ use ucom_host::master::update::{
 };
 use ucom_host::session::Boards;
 
-use super::hands::Hands;
 use super::shared::UPDATED;
+use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Source of an image.
@@ -139,7 +139,7 @@ fn advice(error: &ImageError) -> &'static str {
 }
 
 /// Returns the flash number that each board must have. The number comes from the caller, or else from the inventory.
-fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
+fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {
             [board] => Ok(vec![UpdateTarget { board: *board, flash_number: Some(flash) }]),
@@ -150,21 +150,21 @@ fn targets(hands: &Hands, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateT
         };
     }
     // A single board can be selected by its number alone. Several boards need an inventory.
-    if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &hands.inventory) {
+    if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &state.inventory) {
         return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
     }
     let target = |board: &u8| {
-        let listed = hands.inventory.as_ref().and_then(|inventory| inventory.get(*board));
-        let flash_number = listed.map(|known| known.flash_number).ok_or_else(|| not_listed(hands, *board))?;
+        let listed = state.inventory.as_ref().and_then(|inventory| inventory.get(*board));
+        let flash_number = listed.map(|known| known.flash_number).ok_or_else(|| not_listed(state, *board))?;
         Ok(UpdateTarget { board: *board, flash_number: Some(flash_number) })
     };
     numbers.iter().map(target).collect()
 }
 
 /// Returns the failure for a board that the inventory does not list.
-fn not_listed(hands: &Hands, board: u8) -> Failure {
-    let path = hands.inventory_file.clone().unwrap_or_else(|| "of this chain".into());
-    let error = match hands.inventory {
+fn not_listed(state: &WorkerState, board: u8) -> Failure {
+    let path = state.inventory_file.clone().unwrap_or_else(|| "of this chain".into());
+    let error = match state.inventory {
         Some(_) => IdentifyError::NotListed { board, path },
         None => IdentifyError::NoInventory { board, path },
     };
@@ -174,9 +174,9 @@ fn not_listed(hands: &Hands, board: u8) -> Failure {
 }
 
 /// Returns the selected boards. `all` means boards that answer and boards of the inventory, so that a missing board is reported.
-fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, Failure> {
-    let mut numbers = hands.driver.numbers(boards)?;
-    if let (Boards::All, Some(inventory)) = (boards, &hands.inventory) {
+fn numbers(state: &mut WorkerState, boards: &Boards) -> Result<Vec<u8>, Failure> {
+    let mut numbers = state.driver.numbers(boards)?;
+    if let (Boards::All, Some(inventory)) = (boards, &state.inventory) {
         numbers.extend(inventory.boards().map(|board| board.number));
         numbers.sort_unstable();
         numbers.dedup();
@@ -185,10 +185,10 @@ fn numbers(hands: &mut Hands, boards: &Boards) -> Result<Vec<u8>, Failure> {
 }
 
 /// Programs the selected boards; `report` receives the progress.
-pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Result<Value, Failure> {
-    let profile = hands.driver.master.profile();
-    let numbers = numbers(hands, &update.boards)?;
-    let targets = targets(hands, &update, &numbers)?;
+pub fn update(state: &mut WorkerState, update: Update, report: &dyn Fn(Value)) -> Result<Value, Failure> {
+    let profile = state.driver.master.profile();
+    let numbers = numbers(state, &update.boards)?;
+    let targets = targets(state, &update, &numbers)?;
     let several = targets.len() > 1;
     let options = UpdateOptions {
         dry_run: update.dry_run,
@@ -210,9 +210,9 @@ pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Resu
             report(step(progress));
         }
     };
-    let done = hands.session.driver.update(options, &mut hands.records, &mut see)?;
-    hands.updated(&done, update.start);
-    note_outcomes(hands, &done);
+    let done = state.session.driver.update(options, &mut state.records, &mut see)?;
+    state.updated(&done, update.start);
+    note_outcomes(state, &done);
     match done.failure().filter(|_| update.check) {
         Some(kind) => Err(failed(&done, kind)),
         None => Ok(object(&done, &profile)),
@@ -220,12 +220,12 @@ pub fn update(hands: &mut Hands, update: Update, report: &dyn Fn(Value)) -> Resu
 }
 
 /// Adds an event with the result of each board, in case no caller receives the report.
-fn note_outcomes(hands: &Hands, report: &UpdateReport) {
-    let time_s = hands.driver.now_us() as f64 * 1e-6;
+fn note_outcomes(state: &WorkerState, report: &UpdateReport) {
+    let time_s = state.driver.now_us() as f64 * 1e-6;
     for one in report.boards.iter().filter(|_| !report.dry_run) {
         let (board, outcome) = (one.board, one.outcome.name());
         let why = one.failure.as_ref().map_or_else(String::new, |failure| format!(": {failure}"));
-        hands.shared.event(time_s, UPDATED, Some(board), format!("board {board}: {outcome}{why}"));
+        state.shared.event(time_s, UPDATED, Some(board), format!("board {board}: {outcome}{why}"));
     }
 }
 

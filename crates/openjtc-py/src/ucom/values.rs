@@ -12,26 +12,26 @@ use ucom_host::session::{
     note_rounded, words, write,
 };
 
-use super::hands::Hands;
 use super::objects;
+use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Age after which the last outputs of a board are outdated, µs.
 const OLD_US: u64 = 500_000;
 
 /// Returns the signals of boards.
-pub fn signals(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
-    let numbers = hands.driver.numbers(boards)?;
+pub fn signals(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
+    let numbers = state.driver.numbers(boards)?;
     let mut all = Vec::new();
     for board in numbers {
-        all.push(objects::signals(&*hands.known(board)?));
+        all.push(objects::signals(&*state.known(board)?));
     }
     Ok(all.into())
 }
 
 /// Sets an input, or a parameter if no input has this name or `buffer` selects it. Returns the sent value in the signal's unit.
 pub fn set(
-    hands: &mut Hands,
+    state: &mut WorkerState,
     board: u8,
     buffer: Option<Buffer>,
     (name, value): (&str, &str),
@@ -40,7 +40,7 @@ pub fn set(
     let value = value.parse().map_err(|e| {
         Failure::usage(format!("{name}: {e}")).next("pass a number, \"15.5 deg\", \"0x05DC\" or a bool")
     })?;
-    let known = hands.known(board)?;
+    let known = state.known(board)?;
     let is_input = known.names.find(board, Buffer::Ci, name).is_ok();
     let is_parameter = known.names.find(board, Buffer::Par, name).is_ok();
     let buffer = buffer.unwrap_or(if is_parameter && !is_input { Buffer::Par } else { Buffer::Ci });
@@ -48,46 +48,46 @@ pub fn set(
     let Some(word) = words(&known, buffer, &[assignment])?.into_iter().next() else {
         return Err(SessionError::NoBoards.into());
     };
-    note_rounded(&hands.driver, board, buffer, std::slice::from_ref(&word));
-    let now_us = hands.driver.now_us();
-    let boards = hands.driver.master.boards();
+    note_rounded(&state.driver, board, buffer, std::slice::from_ref(&word));
+    let now_us = state.driver.now_us();
+    let boards = state.driver.master.boards();
     // The inputs of a running board are repeated, so a lost frame has no effect. A board without power does not run.
-    let runs = hands.driver.master.repeats_inputs(board)
+    let runs = state.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
     if !quick {
-        become_master(&mut hands.driver, board, force)?;
+        become_master(&mut state.driver, board, force)?;
     }
-    let (now, setting) = (hands.driver.now_us(), known.setting(buffer, &word));
-    let master = &mut hands.driver.master;
+    let (now, setting) = (state.driver.now_us(), known.setting(buffer, &word));
+    let master = &mut state.driver.master;
     match buffer {
         Buffer::Par => master.set_parameter(now, board, &setting.name, setting.value),
         _ => master.set_input(now, board, &setting.name, setting.value),
     }
     .map_err(|e| SessionError::from(Error::from(e)))?;
     if !quick {
-        arrived(&mut hands.driver, board).map_err(SessionError::from)?;
+        arrived(&mut state.driver, board).map_err(SessionError::from)?;
     }
     if buffer == Buffer::Par {
-        History::of(&hands.cache, &known.info).wrote([(word.index, word.word)].into_iter());
+        History::of(&state.cache, &known.info).wrote([(word.index, word.word)].into_iter());
     }
     let signal = known.signals.get(buffer, word.index.into());
     Ok(signal.map_or(Value::Null, |signal| signal.json(word.word)))
 }
 
 /// Returns outputs with their age, inputs and parameters of boards. Queries unknown signal names.
-pub fn values(hands: &mut Hands, boards: &Boards) -> Result<Value, Failure> {
-    let numbers = hands.driver.numbers(boards)?;
-    let numbers = with_names(hands, &numbers, *boards == Boards::All)?;
-    numbers.into_iter().map(|board| of_board(hands, board)).collect()
+pub fn values(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
+    let numbers = state.driver.numbers(boards)?;
+    let numbers = with_names(state, &numbers, *boards == Boards::All)?;
+    numbers.into_iter().map(|board| of_board(state, board)).collect()
 }
 
 /// Returns the boards whose signal names are known, and caches the names. With `all`, skips boards whose applications are not started.
 /// Returns an error if no board is left.
-pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSet<u8>, SessionError> {
+pub fn with_names(state: &mut WorkerState, boards: &[u8], all: bool) -> Result<BTreeSet<u8>, SessionError> {
     let (mut named, mut idle) = (BTreeSet::new(), None);
     for board in boards {
-        match hands.known(*board) {
+        match state.known(*board) {
             Ok(_) => drop(named.insert(*board)),
             Err(error @ SessionError::Procedure(Error::Signal(SignalError::NoApplication { .. }))) if all => {
                 idle = idle.or(Some(error));
@@ -102,28 +102,28 @@ pub fn with_names(hands: &mut Hands, boards: &[u8], all: bool) -> Result<BTreeSe
 }
 
 /// Like [`values`], for running boards. Returns an error for outdated outputs.
-pub fn running(hands: &mut Hands) -> Result<Value, Failure> {
-    let numbers: Vec<u8> = hands.held.borrow().running().iter().copied().collect();
-    let all = values(hands, &Boards::Some(numbers))?;
+pub fn running(state: &mut WorkerState) -> Result<Value, Failure> {
+    let numbers: Vec<u8> = state.held.borrow().running().iter().copied().collect();
+    let all = values(state, &Boards::Some(numbers))?;
     for one in all.as_array().into_iter().flatten().filter(|one| one["stale"] == json!(true)) {
         let board = one["board"].as_u64().and_then(|board| u8::try_from(board).ok()).unwrap_or_default();
-        let known = hands.held.borrow().known.get(&board).cloned();
+        let known = state.held.borrow().known.get(&board).cloned();
         if known.is_some_and(|known| known.names.dimensions().so == 0) {
             continue;
         }
         // Reports the reason first, if it is known.
-        hands.shared.check()?;
+        state.shared.check()?;
         return Err(no_value(board, "outputs", one["age_s"].as_f64()));
     }
     Ok(all)
 }
 
-fn of_board(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
-    let known = hands.known(board)?;
-    let (inputs, parameters) = objects::settings(&known, &hands.driver.master);
-    let now_us = hands.driver.now_us();
-    let held = hands.held.borrow();
-    let followed = held.followed.outputs(&hands.driver.master, now_us);
+fn of_board(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
+    let known = state.known(board)?;
+    let (inputs, parameters) = objects::settings(&known, &state.driver.master);
+    let now_us = state.driver.now_us();
+    let held = state.held.borrow();
+    let followed = held.followed.outputs(&state.driver.master, now_us);
     let followed =
         followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
     // If this session does not run the board, another program does.
@@ -144,8 +144,8 @@ fn of_board(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
 
 /// Returns a value by its name. This is an output of a board that sends outputs, else an input, else a parameter. Returns an error
 /// for an outdated output.
-pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure> {
-    let known = hands.known(board)?;
+pub fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Value, Failure> {
+    let known = state.known(board)?;
     let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
         .into_iter()
         .find_map(|buffer| Some((buffer, known.names.find(board, buffer, name).ok()?)));
@@ -154,7 +154,7 @@ pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure>
         let error = none.unwrap_or(SignalError::StaleNames { board });
         return Err(SessionError::from(Error::from(error)).into());
     };
-    let all = of_board(hands, board)?;
+    let all = of_board(state, board)?;
     let list = &all[match buffer {
         Buffer::So => "outputs",
         Buffer::Ci => "inputs",
@@ -162,7 +162,7 @@ pub fn value(hands: &mut Hands, board: u8, name: &str) -> Result<Value, Failure>
     }];
     if buffer == Buffer::So && all["stale"] == json!(true) {
         // Reports the reason first, if it is known.
-        hands.shared.check()?;
+        state.shared.check()?;
         return Err(no_value(board, name, all["age_s"].as_f64()));
     }
     Ok(list[usize::from(index)][1].clone())
@@ -180,11 +180,11 @@ fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
 }
 
 /// Returns the text of a parameter file: the values written last, and all other names as comments.
-pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, Failure> {
+pub fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Result<String, Failure> {
     let mut saved = Vec::new();
-    for board in hands.driver.numbers(boards)? {
-        let known = hands.known(board)?;
-        let history = History::of(&hands.cache, &known.info);
+    for board in state.driver.numbers(boards)? {
+        let known = state.known(board)?;
+        let history = History::of(&state.cache, &known.info);
         let par = known.signals.all(Buffer::Par).iter().enumerate().map(|(i, signal)| {
             let last = history.last(i);
             let remark = last.map_or_else(String::new, |w| format!("written {}", w.when()));
@@ -199,7 +199,7 @@ pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, Fai
         saved.push(SavedBoard {
             number: board,
             flash_number: known.info.flash_number,
-            name: name_of(hands.inventory.as_ref(), known.info.flash_number).unwrap_or_default().into(),
+            name: name_of(state.inventory.as_ref(), known.info.flash_number).unwrap_or_default().into(),
             program_id: known.info.program_id,
             description: known.names.clone(),
             par: par.collect(),
@@ -211,33 +211,33 @@ pub fn parameters_text(hands: &mut Hands, boards: &Boards) -> Result<String, Fai
 
 /// Checks a whole parameter file against the boards, then writes its parameters. Returns their number.
 pub fn apply_parameters(
-    hands: &mut Hands,
+    state: &mut WorkerState,
     file: &ParameterFile,
     dry_run: bool,
     force: bool,
 ) -> Result<usize, Failure> {
-    file.identities(&mut hands.driver)?;
+    file.identities(&mut state.driver)?;
     // Writing needs a started application. A dry run only needs the signal names.
-    let session = &mut hands.session;
+    let session = &mut state.session;
     let known = session.cache.all(&mut session.driver, &session.signals, &file.numbers(), |_| !dry_run)?;
     let checked =
         file.words(|number| known.iter().find(|k| k.board == number)).map_err(SessionError::from)?;
     let mut all = Vec::new();
     for (known, (_, (_, words))) in known.into_iter().zip(checked) {
-        note_rounded(&hands.driver, known.board, Buffer::Par, &words);
-        let history = History::of(&hands.cache, &known.info);
+        note_rounded(&state.driver, known.board, Buffer::Par, &words);
+        let history = History::of(&state.cache, &known.info);
         all.push(Parameters { known, words, history });
     }
     if !dry_run {
-        write(&mut hands.driver, &mut all, force)?;
+        write(&mut state.driver, &mut all, force)?;
     }
     Ok(all.iter().map(|p| p.words.len()).sum())
 }
 
 /// Reads the initial inputs that a board requests.
-pub fn initial_inputs(hands: &mut Hands, board: u8) -> Result<Value, Failure> {
-    let known = hands.known(board)?;
-    match hands.driver.run(Request::InitialInputs { board })? {
+pub fn initial_inputs(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
+    let known = state.known(board)?;
+    match state.driver.run(Request::InitialInputs { board })? {
         ucom_host::master::Outcome::InitialInputs { values, .. } => {
             let words: Vec<_> = values.into_iter().map(Some).collect();
             Ok(objects::named(&known, Buffer::Ci, &words))

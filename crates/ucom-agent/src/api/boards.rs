@@ -37,7 +37,7 @@ pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Proble
     responses((status = 200, description = "In the order of their numbers", body = Vec<BoardObject>), Refusals)
 )]
 pub(super) async fn boards(State(agent): State<Agent>) -> Json<Vec<BoardObject>> {
-    Json(BoardObject::all(&agent.shared.picture()))
+    Json(BoardObject::all(&agent.shared.snapshot()))
 }
 
 /// Returns one board as last seen.
@@ -56,9 +56,9 @@ pub(super) async fn board(
     State(agent): State<Agent>,
     Number(number): Number<u8>,
 ) -> Result<Json<BoardObject>, Problem> {
-    let picture = agent.shared.picture();
-    let board = picture.boards.get(number).ok_or_else(|| unknown(number))?;
-    Ok(Json(BoardObject::of(&picture, number, board)))
+    let snapshot = agent.shared.snapshot();
+    let board = snapshot.boards.get(number).ok_or_else(|| unknown(number))?;
+    Ok(Json(BoardObject::of(&snapshot, number, board)))
 }
 
 /// Returns the values of a board by name, with units if the signal table has them.
@@ -79,24 +79,24 @@ pub(super) async fn values(
     State(agent): State<Agent>,
     Number(number): Number<u8>,
 ) -> Result<Json<ValuesObject>, Problem> {
-    let picture = agent.shared.picture();
-    if picture.boards.get(number).is_none() {
+    let snapshot = agent.shared.snapshot();
+    if snapshot.boards.get(number).is_none() {
         return Err(unknown(number));
     }
-    if let Some(values) = picture.values.get(&number) {
-        return Ok(Json(ValuesObject::of(&picture, values)));
+    if let Some(values) = snapshot.values.get(&number) {
+        return Ok(Json(ValuesObject::of(&snapshot, values)));
     }
-    if picture.competing_us.is_some() {
+    if snapshot.competing_us.is_some() {
         // Even questions could mix with those of the other PC.
         let message = format!(
             "the names of board {number} are not known, and another PC commands on this bus: it is not asked"
         );
         return Err(Problem::new("competing-master", message, "end the other program, or ask it"));
     }
-    let asked = agent.shared.call(None, move |hands| {
-        let known = hands.known_to_viewers(number)?;
-        Ok(hands.values_of(&known))
+    let asked = agent.shared.call(None, move |worker| {
+        let known = worker.known_to_viewers(number)?;
+        Ok(worker.values_of(&known))
     });
     let values = asked.await?;
-    Ok(Json(ValuesObject::of(&agent.shared.picture(), &values)))
+    Ok(Json(ValuesObject::of(&agent.shared.snapshot(), &values)))
 }

@@ -18,7 +18,7 @@ use super::boards::numbers;
 use super::line::Line;
 use super::objects::{AnswerObject, ValueObject};
 use super::{Agent, Denials};
-use crate::owner::Hands;
+use crate::owner::Worker;
 
 /// Value in a request.
 #[derive(Clone, Debug, serde::Deserialize, serde::Serialize, ToSchema)]
@@ -100,7 +100,7 @@ impl Agent {
         &self,
         asker: &Asker,
         what: (&'static str, u8, Option<AskedAfter>),
-        act: impl FnOnce(&mut Hands) -> Result<T, SessionError> + Send + 'static,
+        act: impl FnOnce(&mut Worker) -> Result<T, SessionError> + Send + 'static,
     ) -> Result<T, Problem> {
         self.command_with(asker, what, json!({}), act).await
     }
@@ -111,7 +111,7 @@ impl Agent {
         asker: &Asker,
         (what, board, after): (&'static str, u8, Option<AskedAfter>),
         asked: serde_json::Value,
-        act: impl FnOnce(&mut Hands) -> Result<T, SessionError> + Send + 'static,
+        act: impl FnOnce(&mut Worker) -> Result<T, SessionError> + Send + 'static,
     ) -> Result<T, Problem> {
         let client = self.commander(asker)?;
         numbers([board])?;
@@ -119,8 +119,8 @@ impl Agent {
         let facts = json!({ "client": client.id, "command": what, "board": board, "asked": asked });
         let line = Arc::new(Line::new(&self.gate, facts));
         let own = line.clone();
-        let act = move |hands: &mut Hands| {
-            let done = act(hands).map_err(|error| hands.problem(&error));
+        let act = move |worker: &mut Worker| {
+            let done = act(worker).map_err(|error| worker.problem(&error));
             // Logged here, because the client may have disconnected.
             own.end(&done);
             done
@@ -133,37 +133,37 @@ impl Agent {
 
 /// Sets an input or a parameter of a board.
 fn set(
-    hands: &mut Hands,
+    worker: &mut Worker,
     buffer: Buffer,
     board: u8,
     name: &str,
     value: &SignalValue,
 ) -> Result<ValueObject, SessionError> {
-    let known = hands.known(board)?;
+    let known = worker.known(board)?;
     let assignment = Assignment { board: Some(board), name: name.to_owned(), value: value.clone() };
     let Some(word) = words(&known, buffer, &[assignment])?.into_iter().next() else {
         return Err(SessionError::NoBoards);
     };
-    note_rounded(&hands.driver, board, buffer, std::slice::from_ref(&word));
-    let now_us = hands.driver.now_us();
-    let boards = hands.driver.master.boards();
+    note_rounded(&worker.driver, board, buffer, std::slice::from_ref(&word));
+    let now_us = worker.driver.now_us();
+    let boards = worker.driver.master.boards();
     // Inputs of a running board are repeated, so a lost frame is followed by others. A board without power does not
     // run.
-    let runs = hands.driver.master.repeats_inputs(board)
+    let runs = worker.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
     if !quick {
-        become_master(&mut hands.driver, board, false)?;
+        become_master(&mut worker.driver, board, false)?;
     }
-    let (now, setting) = (hands.driver.now_us(), known.setting(buffer, &word));
-    let master = &mut hands.driver.master;
+    let (now, setting) = (worker.driver.now_us(), known.setting(buffer, &word));
+    let master = &mut worker.driver.master;
     match buffer {
         Buffer::Par => master.set_parameter(now, board, &setting.name, setting.value),
         _ => master.set_input(now, board, &setting.name, setting.value),
     }
     .map_err(Error::from)?;
     if !quick {
-        arrived(&mut hands.driver, board)?;
+        arrived(&mut worker.driver, board)?;
     }
     let index = usize::from(word.index);
     Ok(ValueObject::of(&word.name, index, known.signals.get(buffer, index), Some(word.word)))
@@ -179,7 +179,7 @@ impl Agent {
     ) -> Result<Json<ValueObject>, Problem> {
         let value = request.value.parsed(&name)?;
         let asked = json!({ "name": name, "value": request.value });
-        let set = move |hands: &mut Hands| set(hands, buffer, board, &name, &value);
+        let set = move |worker: &mut Worker| set(worker, buffer, board, &name, &value);
         Ok(Json(self.command_with(asker, (what, board, Some(after)), asked, set).await?))
     }
 }
@@ -258,9 +258,9 @@ pub(super) async fn set_outputs(
 ) -> Result<axum::http::StatusCode, Problem> {
     let change = AdminChange { active: Some(active), ..AdminChange::default() };
     let request = Request::Admin { board, change, force: false };
-    let act = move |hands: &mut Hands| match active {
-        true => hands.starting(&[board], |hands| hands.driver.run(request).map(drop)),
-        false => hands.driver.run(request).map(drop),
+    let act = move |worker: &mut Worker| match active {
+        true => worker.starting(&[board], |worker| worker.driver.run(request).map(drop)),
+        false => worker.driver.run(request).map(drop),
     };
     let asked = json!({ "active": active });
     agent.command_with(&asker, ("outputs", board, active.then_some(after)), asked, act).await?;
@@ -284,14 +284,14 @@ pub(super) async fn start_board(
     asker: Asker,
     after: AskedAfter,
 ) -> Result<Json<AnswerObject>, Problem> {
-    let act = move |hands: &mut Hands| {
-        let all = hands.starting(&[board], |hands| {
-            hands.driver.change_each(&[board], |board| Request::Start { board, force: false })
+    let act = move |worker: &mut Worker| {
+        let all = worker.starting(&[board], |worker| {
+            worker.driver.change_each(&[board], |board| Request::Start { board, force: false })
         })?;
         // Loads the names of its values; without them the application is started all the same.
-        let _ = hands.known(board);
+        let _ = worker.known(board);
         all.first()
-            .map(|one| AnswerObject::of(one, &hands.driver.master.profile()))
+            .map(|one| AnswerObject::of(one, &worker.driver.master.profile()))
             .ok_or(SessionError::NoBoards)
     };
     Ok(Json(agent.command(&asker, ("start", board, Some(after)), act).await?))
@@ -314,20 +314,20 @@ pub(super) async fn stop_board(
     Asked(StopRequest { level }): Asked<StopRequest>,
     asker: Asker,
 ) -> Result<Json<AnswerObject>, Problem> {
-    let act = move |hands: &mut Hands| {
+    let act = move |worker: &mut Worker| {
         let to = match level {
             Level::Loop => StopLevel::Loop,
             Level::Application => StopLevel::Application,
         };
-        let stopped = hands.driver.stop_each(&Boards::Some(vec![board]), to)?;
+        let stopped = worker.driver.stop_each(&Boards::Some(vec![board]), to)?;
         if let Some((_, error)) = stopped.failed.into_iter().next() {
             return Err(error);
         }
         match level {
-            Level::Loop => hands.only_started(board),
-            Level::Application => hands.runs_no_more(Some(board)),
+            Level::Loop => worker.only_started(board),
+            Level::Application => worker.runs_no_more(Some(board)),
         }
-        let profile = hands.driver.master.profile();
+        let profile = worker.driver.master.profile();
         stopped.boards.first().map(|one| AnswerObject::of(one, &profile)).ok_or(SessionError::NoBoards)
     };
     Ok(Json(agent.command(&asker, ("stop", board, None), act).await?))
@@ -350,12 +350,12 @@ pub(super) async fn reset_board(
     asker: Asker,
     after: AskedAfter,
 ) -> Result<Json<ResetObject>, Problem> {
-    let act = move |hands: &mut Hands| match hands
+    let act = move |worker: &mut Worker| match worker
         .driver
         .run(Request::Reset { board: Some(board), force: false })?
     {
         Outcome::Reset(reports) => {
-            hands.forget(board);
+            worker.forget(board);
             Ok(ResetObject { reports: reports.ids.into_iter().collect() })
         }
         other => Err(other.into()),

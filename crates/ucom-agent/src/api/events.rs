@@ -15,14 +15,14 @@ use tokio::time::Instant;
 
 use super::Agent;
 use super::objects::{BoardObject, StatusObject, ValuesObject};
-use crate::happening::Happening;
-use crate::picture::Values;
+use crate::event::ChainEvent;
+use crate::snapshot::Values;
 
 /// Interval at which a stream sends the status and the boards.
 const SLOWLY: Duration = Duration::from_secs(1);
 
 /// Event with its number and time.
-pub(super) type EventObject = Entry<Happening>;
+pub(super) type EventObject = Entry<ChainEvent>;
 type EventsObject = events::EventsObject<EventObject>;
 
 /// Returns the events after a number.
@@ -73,7 +73,7 @@ pub(super) async fn stream(
                     due = Instant::now() + SLOWLY;
                     messages.push(StreamMessage::Status(Box::new(agent.status(&caller))));
                     messages
-                        .push(StreamMessage::Boards { boards: BoardObject::all(&agent.shared.picture()) });
+                        .push(StreamMessage::Boards { boards: BoardObject::all(&agent.shared.snapshot()) });
                 }
                 if let Some((values, newest_us)) = new_values(&agent, shown_us) {
                     shown_us = newest_us;
@@ -89,10 +89,10 @@ pub(super) async fn stream(
 
 /// Returns the values that arrived after this time, and the time of the newest, µs.
 fn new_values(agent: &Agent, shown_us: u64) -> Option<(Vec<ValuesObject>, u64)> {
-    let picture = agent.shared.picture();
+    let snapshot = agent.shared.snapshot();
     let time_us = |values: &Values| values.outputs.as_ref().map_or(0, |outputs| outputs.time_us);
-    let new = picture.values.values().filter(|values| time_us(values) > shown_us);
-    let objects: Vec<ValuesObject> = new.map(|values| ValuesObject::of(&picture, values)).collect();
-    let newest_us = picture.values.values().map(time_us).max()?;
+    let new = snapshot.values.values().filter(|values| time_us(values) > shown_us);
+    let objects: Vec<ValuesObject> = new.map(|values| ValuesObject::of(&snapshot, values)).collect();
+    let newest_us = snapshot.values.values().map(time_us).max()?;
     (!objects.is_empty()).then_some((objects, newest_us))
 }

@@ -19,7 +19,7 @@ use super::commands::GivenValue;
 use super::objects::JobObject;
 use super::{Agent, Denials};
 use crate::jobs::Done;
-use crate::owner::{Hands, Kind};
+use crate::owner::{Kind, Worker};
 
 /// Listening time of a doctor before it asks.
 const LISTEN: Duration = Duration::from_millis(1500);
@@ -30,11 +30,11 @@ impl Agent {
         &self,
         (asker, after): (&Asker, Option<AskedAfter>),
         (kind, what): (Kind, &'static str),
-        act: impl FnOnce(&mut Hands) -> Result<(Done, Option<Problem>), SessionError> + Send + 'static,
+        act: impl FnOnce(&mut Worker) -> Result<(Done, Option<Problem>), SessionError> + Send + 'static,
     ) -> Result<(StatusCode, Json<JobObject>), Problem> {
         let client = self.commander(asker)?;
         let asked = self.shared.asked(client.id, after)?;
-        let act = move |hands: &mut Hands| act(hands).map_err(|error| hands.problem(&error));
+        let act = move |worker: &mut Worker| act(worker).map_err(|error| worker.problem(&error));
         let job = self.shared.begin((kind, asked), (what, &client.name), act);
         let why = job.as_ref().err().map(|error| error.message.clone());
         let number = job.as_ref().ok().map(|job| job.number);
@@ -59,7 +59,7 @@ pub(super) async fn scan(
     State(agent): State<Agent>,
     asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin((&asker, None), (Kind::Command, "scan"), |hands| match hands.driver.run(Request::Scan)? {
+    agent.begin((&asker, None), (Kind::Command, "scan"), |worker| match worker.driver.run(Request::Scan)? {
         Outcome::Scan(report) => Ok((Done::Chain(report.boards, texts(&report.findings)), None)),
         other => Err(other.into()),
     })
@@ -101,9 +101,9 @@ pub(super) async fn init(
     numbers(expected.iter().map(|board| board.board))?;
     let expected = expected.iter().map(|board| (board.board, board.flash_number)).collect();
     let options = InitOptions { expected, force: false };
-    agent.begin((&asker, Some(after)), (Kind::Command, "init"), |hands| {
-        let outcome = hands.driver.run(Request::Init(options));
-        hands.renumbered(match &outcome {
+    agent.begin((&asker, Some(after)), (Kind::Command, "init"), |worker| {
+        let outcome = worker.driver.run(Request::Init(options));
+        worker.renumbered(match &outcome {
             Ok(Outcome::Init(report)) => Some(report),
             _ => None,
         });
@@ -127,8 +127,8 @@ pub(super) async fn doctor(
     State(agent): State<Agent>,
     asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin((&asker, None), (Kind::Command, "doctor"), |hands| {
-        let seen = hands.driver.examine(LISTEN)?;
+    agent.begin((&asker, None), (Kind::Command, "doctor"), |worker| {
+        let seen = worker.driver.examine(LISTEN)?;
         Ok((Done::Findings(seen.findings), None))
     })
 }
@@ -191,12 +191,12 @@ pub(super) async fn run(
     request.boards.dedup();
     numbers(request.boards.iter().copied())?;
     let (ci, par) = (assignments(&request.inputs)?, assignments(&request.parameters)?);
-    agent.begin((&asker, Some(after)), (Kind::Command, "run"), move |hands| {
+    agent.begin((&asker, Some(after)), (Kind::Command, "run"), move |worker| {
         let boards = match request.boards.is_empty() {
             true => Boards::All,
             false => Boards::Some(request.boards.clone()),
         };
-        let numbers = hands.driver.numbers(&boards)?;
+        let numbers = worker.driver.numbers(&boards)?;
         only(&numbers, &ci, "run")?;
         only(&numbers, &par, "run")?;
         let begin = |session: &mut Session, cache: &Cache| {
@@ -206,11 +206,11 @@ pub(super) async fn run(
             let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
             Ok((report, prepared))
         };
-        let (report, prepared) = hands.starting(&numbers, |session| session.by_names(begin))?;
+        let (report, prepared) = worker.starting(&numbers, |session| session.by_names(begin))?;
         for known in prepared.known.into_values() {
-            hands.knows(known);
+            worker.knows(known);
         }
-        hands.runs(&numbers);
+        worker.runs(&numbers);
         Ok((Done::Running(report.boards, report.load), None))
     })
 }

@@ -11,7 +11,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::{Agent, Denials};
-use crate::happening::Policy;
+use crate::event::Policy;
 
 /// Request for the lease.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]

@@ -32,7 +32,7 @@ use utoipa::{IntoResponses, OpenApi, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::happening::Happening;
+use crate::event::ChainEvent;
 use crate::owner::{Owner, Shared};
 use events::EventObject;
 use objects::{LeaseObject, StatusObject};
@@ -130,7 +130,7 @@ impl Agent {
             agent: self.id.to_string(),
             last_event: self.shared.journal.last(),
             last_halt: self.shared.halts(),
-            ..StatusObject::of(&self.shared.picture())
+            ..StatusObject::of(&self.shared.snapshot())
         }
     }
 }
@@ -148,7 +148,7 @@ pub fn description() -> String {
                        the operator's from elsewhere. A Stop is taken from everyone who was let in.",
         license(name = "MIT OR Apache-2.0")
     ),
-    components(schemas(Problem, EventObject, Happening)),
+    components(schemas(Problem, EventObject, ChainEvent)),
     modifiers(&Bearer),
     security((), ("token" = []))
 )]

@@ -247,13 +247,13 @@ pub(super) async fn update(
     // Checked before the images are read.
     agent.commander(&asker)?;
     let Ok(room) = agent.images.clone().acquire_owned().await else { return Err(fault()) };
-    let profile = agent.shared.picture().profile;
+    let profile = agent.shared.snapshot().profile;
     let options = read(request, profile).await?;
     drop(room);
-    agent.begin((&asker, Some(after)), (Kind::Update, "update"), |hands| {
+    agent.begin((&asker, Some(after)), (Kind::Update, "update"), |worker| {
         let start = options.start;
-        let report = hands.session.driver.update(options, &mut hands.records, &mut |_| {})?;
-        hands.updated(&report, start);
+        let report = worker.session.driver.update(options, &mut worker.records, &mut |_| {})?;
+        worker.updated(&report, start);
         let error = failed(&report);
         Ok((Done::Update(report), error))
     })

@@ -8,9 +8,9 @@ use host_kit::ErrorKind;
 use host_kit::owner::{Kind, Refused, Request};
 use tokio::sync::oneshot;
 
-use super::Hands;
+use super::Worker;
 use super::shared::{CANCELLED, STOPPED, Shared};
-use crate::happening::Happening;
+use crate::event::ChainEvent;
 use crate::jobs::{Done, Job, Stage};
 
 /// Longest wait for a turn. Then the request is refused, because its HTTP request times out after ten seconds.
@@ -22,8 +22,8 @@ const WAITING_MAX: usize = 32;
 const QUESTIONS_MAX: usize = 8;
 
 /// Queue of the owner.
-pub(super) type Queue = host_kit::owner::Queue<Hands, Tag>;
-type Place<'a> = host_kit::owner::Place<'a, Hands, Tag>;
+pub(super) type Queue = host_kit::owner::Queue<Worker, Tag>;
+type Place<'a> = host_kit::owner::Place<'a, Worker, Tag>;
 
 /// Request of the lease holder. Before its turn a Stop may come, or the lease may pass to another client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,11 +74,11 @@ impl Shared {
     /// done: a Stop came before its turn, or its client has lost the lease.
     fn turn<'a>(
         &self,
-        hands: Result<&'a mut Hands, Refused>,
+        worker: Result<&'a mut Worker, Refused>,
         asked: Option<Asked>,
-    ) -> Result<&'a mut Hands, Problem> {
+    ) -> Result<&'a mut Worker, Problem> {
         // A refusal may come in a thread that holds the leases. Their lock is taken only below, in the owner's thread.
-        let hands = hands.map_err(|refused| match refused {
+        let worker = worker.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),
             Refused::Closed => gone(),
@@ -91,39 +91,39 @@ impl Shared {
             // The request must be marked as done before its client learns of the refusal.
             self.queue.done();
         }
-        late.map_or(Ok(hands), Err)
+        late.map_or(Ok(worker), Err)
     }
 
     /// Runs a short function in the owner's thread and waits for it: a command, or a question that needs no lease.
     pub async fn call<T: Send + 'static>(
         self: &Arc<Self>,
         asked: Option<Asked>,
-        act: impl FnOnce(&mut Hands) -> Result<T, Problem> + Send + 'static,
+        act: impl FnOnce(&mut Worker) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let (answer, answered) = oneshot::channel();
         let kind = if asked.is_some() { Kind::Command } else { Kind::Question };
         let only_ends = asked.is_some_and(|asked| !asked.moves);
         let begun = Instant::now();
         let own = self.clone();
-        let act = move |hands: Result<&mut Hands, Refused>| {
-            let hands = own.turn(hands, asked);
+        let act = move |worker: Result<&mut Worker, Refused>| {
+            let worker = own.turn(worker, asked);
             // If the client of a request has given up, the request must not move boards later.
             if answer.is_closed() && !only_ends {
                 return;
             }
             // The answer would come too late even if the request were done now.
-            let hands = hands.and_then(|hands| match begun.elapsed() > PATIENCE && !only_ends {
+            let worker = worker.and_then(|worker| match begun.elapsed() > PATIENCE && !only_ends {
                 true => {
                     // Before its client learns of it.
                     own.queue.done();
                     Err(Problem::new("busy", "its turn did not come in time: it is not done", "ask again"))
                 }
-                false => Ok(hands),
+                false => Ok(worker),
             });
             // A client that has disconnected needs no answer.
-            let _ = answer.send(hands.and_then(|hands| {
-                let done = act(hands);
-                hands.settle();
+            let _ = answer.send(worker.and_then(|worker| {
+                let done = act(worker);
+                worker.settle();
                 done
             }));
         };
@@ -137,19 +137,19 @@ impl Shared {
         self: &Arc<Self>,
         (kind, asked): (Kind, Asked),
         (what, client): (&str, &str),
-        act: impl FnOnce(&mut Hands) -> Result<(Done, Option<Problem>), Problem> + Send + 'static,
+        act: impl FnOnce(&mut Worker) -> Result<(Done, Option<Problem>), Problem> + Send + 'static,
     ) -> Result<Job, Problem> {
         let place = self.place(false)?;
         let job = self.jobs.add(what, client);
         let (number, own, begun) = (job.number, self.clone(), job.clone());
         let unfinished = Unfinished { shared: self.clone(), number };
-        let act = move |hands: Result<&mut Hands, Refused>| {
-            let hands = own.turn(hands, Some(asked));
+        let act = move |worker: Result<&mut Worker, Refused>| {
+            let worker = own.turn(worker, Some(asked));
             let Job { number, what, client, .. } = begun;
-            own.journal.write(Happening::Begun { job: number, what, client });
-            let acted = hands.and_then(|hands| {
-                let done = act(hands);
-                hands.settle();
+            own.journal.write(ChainEvent::Begun { job: number, what, client });
+            let acted = worker.and_then(|worker| {
+                let done = act(worker);
+                worker.settle();
                 done
             });
             let (done, error) = match acted {
@@ -204,7 +204,7 @@ impl Unfinished {
     fn end(&self, stage: Stage, done: Option<Done>, error: Option<Problem>) {
         if self.shared.jobs.end(self.number, stage, done, error.clone()) {
             let outcome = stage.name().to_owned();
-            self.shared.journal.write(Happening::Ended { job: self.number, outcome, error });
+            self.shared.journal.write(ChainEvent::Ended { job: self.number, outcome, error });
         }
     }
 }

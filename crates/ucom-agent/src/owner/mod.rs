@@ -1,9 +1,9 @@
 //! Owner of a bus: one thread with a session on it, for all clients.
 mod ask;
-mod hands;
 mod operator;
 mod shared;
 mod stop;
+mod worker;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,9 +14,9 @@ use ucom_host::files::SignalTable;
 use ucom_host::session::{Cache, CleanupList, Link, Prompt, SessionError};
 
 pub(crate) use ask::fault;
-pub(crate) use hands::Hands;
 pub(crate) use host_kit::owner::Kind;
 pub(crate) use shared::Shared;
+pub(crate) use worker::Worker;
 
 /// Configuration of the boards that is known beforehand.
 #[derive(Clone, Debug, Default)]
@@ -94,10 +94,10 @@ impl Drop for Gone<'_> {
 
 fn own_bus(shared: &Arc<Shared>, config: Config, link: Link) {
     let mut gone = Gone(shared, "the agent has a fault".into());
-    let mut hands = Hands::new(shared.clone(), config, link);
-    match hands.serve() {
+    let mut worker = Worker::new(shared.clone(), config, link);
+    match worker.serve() {
         Ok(()) => {
-            hands.leave();
+            worker.leave();
             gone.1 = "the agent was ended".into();
         }
         Err(error) => gone.1 = error.to_string(),

@@ -11,8 +11,8 @@ use ucom_host::master::{Event, Master, Supervision};
 use ucom_host::session::{Held, Known, Link, Operator};
 
 use super::shared::Shared;
-use crate::happening::Happening;
-use crate::picture::{Picture, Values};
+use crate::event::ChainEvent;
+use crate::snapshot::{BusSnapshot, Values};
 
 /// Interval between snapshots.
 const PICTURE: Duration = Duration::from_millis(40);
@@ -47,7 +47,7 @@ pub(super) struct Local {
     /// Time of the last snapshot; `None`: a new one is due at once.
     pub published: Option<Instant>,
     /// Events that are written after the next snapshot, so that their readers find the new state there.
-    pub happened: Vec<Happening>,
+    pub happened: Vec<ChainEvent>,
 }
 
 /// Operator of the session.
@@ -65,8 +65,8 @@ impl Operator for Hand {
     fn note(&self, text: String) {
         let mut local = self.local.borrow_mut();
         let note = match local.job {
-            Some(job) => Happening::JobNote { job, text },
-            None => Happening::Note { text },
+            Some(job) => ChainEvent::JobNote { job, text },
+            None => ChainEvent::Note { text },
         };
         local.happened.push(note);
     }
@@ -89,15 +89,17 @@ impl Operator for Hand {
                     Supervision::Rebooted { .. } => (Some(*board), "rebooted"),
                     Supervision::UnknownRebooted { .. } => (None, "rebooted"),
                 };
-                write.push(Happening::Heartbeat { board, change: change.into() });
+                write.push(ChainEvent::Heartbeat { board, change: change.into() });
             }
-            Event::BoardError { board, code, .. } => write.push(Happening::BoardError {
+            Event::BoardError { board, code, .. } => write.push(ChainEvent::BoardError {
                 board: *board,
                 code: code.number(),
                 name: code.name().into(),
                 meaning: code.meaning().into(),
             }),
-            Event::Debug { board, text } => write.push(Happening::Text { board: *board, text: text.clone() }),
+            Event::Debug { board, text } => {
+                write.push(ChainEvent::Text { board: *board, text: text.clone() })
+            }
             Event::Progress { progress, .. } => {
                 if let Some(job) = job {
                     let (boards, attempt, cycle) =
@@ -109,7 +111,7 @@ impl Operator for Hand {
                     };
                     if !local.progress.as_ref().is_some_and(soon) {
                         local.progress = Some((step, now_us));
-                        write.push(Happening::Progress { job, boards, attempt, cycle, bytes, total });
+                        write.push(ChainEvent::Progress { job, boards, attempt, cycle, bytes, total });
                     }
                 }
             }
@@ -117,12 +119,12 @@ impl Operator for Hand {
                 let new = local.competing_us.is_none_or(|at| now_us.saturating_sub(at) > COMPETING_US);
                 local.competing_us = Some(now_us);
                 if let Some(text) = text.filter(|_| new) {
-                    write.push(Happening::Note { text });
+                    write.push(ChainEvent::Note { text });
                 }
             }
             _ => write.extend(text.map(|text| match job {
-                Some(job) => Happening::JobNote { job, text },
-                None => Happening::Note { text },
+                Some(job) => ChainEvent::JobNote { job, text },
+                None => ChainEvent::Note { text },
             })),
         }
         local.happened.extend(write);
@@ -164,7 +166,7 @@ impl Hand {
         for (number, state) in &states {
             if local.states.get(number) != Some(state) {
                 let state = (*state).to_owned();
-                local.happened.push(Happening::State { board: *number, state });
+                local.happened.push(ChainEvent::State { board: *number, state });
             }
         }
         local.states = states;
@@ -181,7 +183,7 @@ impl Hand {
         };
         let values = held.known.iter().filter(is_its).map(values).collect();
         let competing_us = master.competing_master().map(|(at, ..)| at);
-        let picture = Picture {
+        let snapshot = BusSnapshot {
             now_us: local.now_us,
             at: Instant::now(),
             profile: master.profile(),
@@ -193,6 +195,6 @@ impl Hand {
             shared: master.shared_numbers().iter().map(ToString::to_string).collect(),
             values,
         };
-        self.shared.publish(picture, std::mem::take(&mut local.happened));
+        self.shared.publish(snapshot, std::mem::take(&mut local.happened));
     }
 }

@@ -10,11 +10,11 @@ use host_kit::owner::Refused;
 use tokio::sync::watch;
 use ucom::Profile;
 
-use super::Hands;
+use super::Worker;
 use super::ask::{Asked, Queue, Tag, cancelled};
-use crate::happening::{Happening, Journal, Policy};
+use crate::event::{ChainEvent, Journal, Policy};
 use crate::jobs::Jobs;
-use crate::picture::Picture;
+use crate::snapshot::BusSnapshot;
 
 /// Hold-off after a Stop of another client.
 const CALM: Duration = Duration::from_secs(3);
@@ -69,7 +69,7 @@ impl Halts {
 /// State that the owner shares with its callers.
 pub(crate) struct Shared {
     start: Instant,
-    picture: Mutex<Arc<Picture>>,
+    snapshot: Mutex<Arc<BusSnapshot>>,
     changed: watch::Sender<()>,
     pub(super) queue: Queue,
     halts: Mutex<Halts>,
@@ -94,7 +94,7 @@ impl Shared {
     pub(super) fn new(profile: Profile) -> Self {
         Self {
             start: Instant::now(),
-            picture: Mutex::new(Arc::new(Picture::new(profile))),
+            snapshot: Mutex::new(Arc::new(BusSnapshot::new(profile))),
             changed: watch::Sender::new(()),
             queue: Queue::default(),
             halts: Mutex::default(),
@@ -114,8 +114,8 @@ impl Shared {
     }
 
     /// Returns the snapshot of the boards.
-    pub fn picture(&self) -> Arc<Picture> {
-        lock(&self.picture).clone()
+    pub fn snapshot(&self) -> Arc<BusSnapshot> {
+        lock(&self.snapshot).clone()
     }
 
     /// Returns a receiver that announces each new snapshot.
@@ -130,9 +130,9 @@ impl Shared {
 
     /// Stops all boards ahead of all other requests, and checks that they have stopped. Returns the number of the Stop.
     pub fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
-        let act = |hands: Result<&mut Hands, Refused>| {
-            if let Ok(hands) = hands {
-                hands.see_to_stop();
+        let act = |worker: Result<&mut Worker, Refused>| {
+            if let Ok(worker) = worker {
+                worker.see_to_stop();
             }
         };
         let number = {
@@ -185,7 +185,7 @@ impl Shared {
         let lapsed = leases.lapse(now);
         let holder = leases.lease().map(|lease| lease.holder);
         if std::mem::replace(&mut *lock(&self.holder), holder.clone()) != holder {
-            self.journal.write(Happening::Lease { holder });
+            self.journal.write(ChainEvent::Lease { holder });
         }
         if let Some(client) = lapsed
             && client.policy == Policy::Stop
@@ -221,7 +221,7 @@ impl Shared {
             let by = halts.last_by().to_owned();
             let more = std::mem::take(&mut halts.more);
             halts.shown = Some(Instant::now());
-            self.journal.write(Happening::Halt { by, times: Some(more).filter(|more| *more > 1) });
+            self.journal.write(ChainEvent::Halt { by, times: Some(more).filter(|more| *more > 1) });
         }
     }
 
@@ -253,8 +253,8 @@ impl Shared {
     }
 
     /// Publishes a snapshot and then events, so that readers of the events find the new state.
-    pub(super) fn publish(&self, picture: Picture, happened: Vec<Happening>) {
-        *lock(&self.picture) = Arc::new(picture);
+    pub(super) fn publish(&self, snapshot: BusSnapshot, happened: Vec<ChainEvent>) {
+        *lock(&self.snapshot) = Arc::new(snapshot);
         happened.into_iter().for_each(|event| self.journal.write(event));
         self.changed.send_replace(());
     }
@@ -263,7 +263,7 @@ impl Shared {
     pub(super) fn close(&self, why: String) {
         *lock(&self.lost) = Some(why.clone());
         self.queue.close();
-        self.journal.write(Happening::Lost { why });
+        self.journal.write(ChainEvent::Lost { why });
         self.changed.send_replace(());
     }
 }

@@ -5,10 +5,10 @@ use ucom::Status;
 use ucom_host::master::StopLevel;
 use ucom_host::session::{Boards, SessionError};
 
-use super::Hands;
-use crate::happening::Happening;
+use super::Worker;
+use crate::event::ChainEvent;
 
-impl Hands {
+impl Worker {
     /// After a Stop, asks each board and stops its application. This covers boards that answer, and boards that may
     /// run but do not answer.
     pub(super) fn see_to_stop(&mut self) {
@@ -43,7 +43,7 @@ impl Hands {
             self.driver.master.end_session();
         }
         let boards = confirmed.into_iter().collect();
-        self.local.borrow_mut().happened.push(Happening::Stopped { boards, not_stopped });
+        self.local.borrow_mut().happened.push(ChainEvent::Stopped { boards, not_stopped });
         self.settle();
     }
 

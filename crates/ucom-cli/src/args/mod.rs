@@ -424,7 +424,7 @@ mod tests {
     #[test]
     fn the_command_line_is_sound_and_has_an_example_for_each_command() {
         Cli::command().debug_assert();
-        cli_kit::trial::check_help_is_wrapped_once(&Cli::command());
+        cli_kit::testing::check_help_is_wrapped_once(&Cli::command());
         for sub in Cli::command().get_subcommands() {
             let help = sub.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(help.contains("Examples:"), "{} has no example", sub.get_name());

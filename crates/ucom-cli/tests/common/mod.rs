@@ -5,7 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use can_link::{CanBus, CanFrame, Id};
-use cli_kit::trial::{CommandOutput, ended, program, run, signal};
+use cli_kit::testing::{CommandOutput, ended, program, run, signal};
 use serde_json::Value;
 use test_kit::patience::Patience;
 

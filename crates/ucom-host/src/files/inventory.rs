@@ -13,7 +13,7 @@
 //! `program` is the [`FlashRecord`] of the last update that was read back. An update changes only this key. Everything else in the file
 //! stays unchanged, including comments.
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, write_whole};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, write_atomically};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -203,7 +203,7 @@ impl Inventory {
     /// Writes a file atomically.
     pub fn write(&self, path: &Path) -> Result<(), InventoryError> {
         let io = |source| InventoryError::Io { path: path.into(), source };
-        write_whole(path, self.to_toml().as_bytes()).map_err(io)
+        write_atomically(path, self.to_toml().as_bytes()).map_err(io)
     }
 
     /// Adds a board. Refuses a number above 31, a position that is already used, and a flash number that is already listed.
@@ -309,7 +309,7 @@ impl Inventory {
             (Some(board), None) if board.contains_key("program") => drop(board.remove("program")),
             (Some(_), None) | (None, _) => return Ok(()),
         }
-        write_whole(path, document.to_string().as_bytes()).map_err(io)
+        write_atomically(path, document.to_string().as_bytes()).map_err(io)
     }
 
     /// Returns the inventory as the text of a file.

@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use host_kit::write_whole;
+use host_kit::write_atomically;
 
 /// Size limit of a file in bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 20;
@@ -46,7 +46,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
 ///
 /// The system returned an error. In this case the file is unchanged.
 pub fn write_text(path: &Path, text: &str) -> Result<(), TextError> {
-    write_whole(path, text.as_bytes()).map_err(|source| TextError::Io { path: path.into(), source })
+    write_atomically(path, text.as_bytes()).map_err(|source| TextError::Io { path: path.into(), source })
 }
 
 /// Returns a text as a basic string of TOML. The result is also a double-quoted scalar of YAML.

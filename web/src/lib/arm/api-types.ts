@@ -179,7 +179,7 @@ export interface components {
         /** @description Event with its number and time. */
         EventObject: {
             /** @description Event. */
-            event: components["schemas"]["Happening"];
+            event: components["schemas"]["ArmEvent"];
             /**
              * Format: u-int64
              * @description Number of the event; counts up from 1 as long as this agent runs.
@@ -247,7 +247,7 @@ export interface components {
             stored_number?: number | null;
         };
         /** @description Event of an arm or a job. */
-        Happening: {
+        ArmEvent: {
             /** @description Name of the holder; missing: no client holds the lease. */
             holder?: string | null;
             /** @enum {string} */
@@ -1336,7 +1336,7 @@ export type FindingObject = components['schemas']['FindingObject'];
 export type FlangeObject = components['schemas']['FlangeObject'];
 export type FrameObject = components['schemas']['FrameObject'];
 export type GivenObject = components['schemas']['GivenObject'];
-export type Happening = components['schemas']['Happening'];
+export type ArmEvent = components['schemas']['ArmEvent'];
 export type HeldStopObject = components['schemas']['HeldStopObject'];
 export type InfoObject = components['schemas']['InfoObject'];
 export type JobObject = components['schemas']['JobObject'];

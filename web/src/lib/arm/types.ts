@@ -1,9 +1,9 @@
 // Objects of the agent's API, under the names that the page uses.
-import type { ControllerObject, Happening, PageObject, PointsObject, PoseObject, StatusObject } from './api-types.ts';
+import type { ControllerObject, ArmEvent, PageObject, PointsObject, PoseObject, StatusObject } from './api-types.ts';
 import type { Entry } from '../connection.ts';
 
 export type {
-  ArmObject, BoundObject, CheckObject, DoctorObject, Happening, InfoObject, JobObject, JointObject, JointPlan, JointResult, LogStatusObject, LogValues,
+  ArmObject, BoundObject, CheckObject, DoctorObject, ArmEvent, InfoObject, JobObject, JointObject, JointPlan, JointResult, LogStatusObject, LogValues,
   PayloadObject, PlanObject, PlanRequest, ProblemObject, ResultObject, SettingObject, SpeedObject, TrajectoryObject,
 } from './api-types.ts';
 
@@ -14,4 +14,4 @@ export type Points = Omit<PointsObject, 'digest'> & { digest?: string };
 export type Pose = PoseObject;
 export type Page = PageObject;
 
-export type ArmEntry = Entry & { event: Happening };
+export type ArmEntry = Entry & { event: ArmEvent };

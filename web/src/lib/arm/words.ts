@@ -1,5 +1,5 @@
 // Reports of the controller as text: state, cause, and next step.
-import type { Controller, Happening, InfoObject } from './types.ts';
+import type { Controller, ArmEvent, InfoObject } from './types.ts';
 import { count, duration } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
 
@@ -213,7 +213,7 @@ export function jobWords(what: string): string {
 }
 
 /** Returns an event as text. Undefined: the event is not shown. */
-export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {
+export function eventWords(event: ArmEvent): { text: string; tone: EventTone; of: string } | undefined {
   const of = 'job' in event ? `job ${event.job}` : '';
   const line = (text: string, tone: EventTone = 'info', whose = of) => ({ text, tone, of: whose });
   switch (event.kind) {

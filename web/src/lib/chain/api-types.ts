@@ -135,7 +135,7 @@ export interface components {
         /** @description Event with its number and time. */
         EventObject: {
             /** @description Event. */
-            event: components["schemas"]["Happening"];
+            event: components["schemas"]["ChainEvent"];
             /**
              * Format: u-int64
              * @description Number of the event; counts up from 1 as long as this agent runs.
@@ -210,7 +210,7 @@ export interface components {
         /** @description Value in a request. */
         GivenValue: boolean | number | string;
         /** @description Event of the chain or a job. */
-        Happening: {
+        ChainEvent: {
             /** @description Name of the holder; missing: no client holds the lease. */
             holder?: string | null;
             /** @enum {string} */
@@ -796,7 +796,7 @@ export type ExpectedBoard = components['schemas']['ExpectedBoard'];
 export type FindingObject = components['schemas']['FindingObject'];
 export type FoundObject = components['schemas']['FoundObject'];
 export type GivenValue = components['schemas']['GivenValue'];
-export type Happening = components['schemas']['Happening'];
+export type ChainEvent = components['schemas']['ChainEvent'];
 export type ImageFormat = components['schemas']['ImageFormat'];
 export type InitRequest = components['schemas']['InitRequest'];
 export type JobObject = components['schemas']['JobObject'];

@@ -4,7 +4,7 @@ import { getContext, setContext } from 'svelte';
 import { History } from '../history.ts';
 import { ApiError } from '../api.ts';
 import { type Driven, provideSession, Session } from '../session.svelte.ts';
-import type { BoardObject, BoardsMessage, ChainEntry, Happening, JobObject, Status, Values, ValuesMessage } from './types.ts';
+import type { BoardObject, BoardsMessage, ChainEntry, ChainEvent, JobObject, Status, Values, ValuesMessage } from './types.ts';
 import { boardWords, busWords, type BusWords, eventWords, jobResult, jobWords, stoppedWords } from './words.ts';
 
 /** Number of stored rows of a board's outputs: two minutes at 25 Hz. */
@@ -184,7 +184,7 @@ export class ChainPage {
     this.#did = { text, failed };
   }
 
-  #wordStop(event: Extract<Happening, { kind: 'stopped' }>): void {
+  #wordStop(event: Extract<ChainEvent, { kind: 'stopped' }>): void {
     const { text, failed, why } = stoppedWords(event, this.#stop?.ran ?? true);
     if (!this.#stop && !failed) return;
     const took = this.#stop?.ran && !failed && event.boards.length > 0 ? ` ${((performance.now() - this.#stop.at) / 1000).toFixed(1)} s.` : '';
@@ -267,7 +267,7 @@ export class ChainPage {
     }
   }
 
-  #happened(event: Happening, isNew: boolean): void {
+  #happened(event: ChainEvent, isNew: boolean): void {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':

@@ -1,9 +1,9 @@
 // Types of a chain's agent, from its OpenAPI description, and the messages of its stream, which OpenAPI does not cover.
 import type { Entry } from '../connection.ts';
 import type { SessionStatus } from '../session.svelte.ts';
-import type { BoardObject, Happening, StatusObject, ValueObject } from './api-types.ts';
+import type { BoardObject, ChainEvent, StatusObject, ValueObject } from './api-types.ts';
 
-export type { BoardObject, ChainObject, FindingObject, Happening, JobObject, UpdateObject, UpdateRequest, UpdatedObject } from './api-types.ts';
+export type { BoardObject, ChainObject, FindingObject, ChainEvent, JobObject, UpdateObject, UpdateRequest, UpdatedObject } from './api-types.ts';
 
 /** Limits of the signal table, if the agent sends them. */
 export type Value = ValueObject & { min?: number | null; max?: number | null };
@@ -20,7 +20,7 @@ export interface Values {
 export type Status = StatusObject & SessionStatus;
 
 export interface ChainEntry extends Entry {
-  event: Happening;
+  event: ChainEvent;
 }
 
 export interface BoardsMessage {

@@ -1,7 +1,7 @@
 // Reports of boards and bus as text: state, cause, and next step.
 import { count } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
-import type { BoardObject, Happening, JobObject, Status } from './types.ts';
+import type { BoardObject, ChainEvent, JobObject, Status } from './types.ts';
 
 export function hex(value: number | null | undefined, digits = 2): string {
   return value == null ? '–' : `0x${value.toString(16).toUpperCase().padStart(digits, '0')}`;
@@ -189,7 +189,7 @@ export function jobResult(job: JobObject): string {
 }
 
 /** Returns the result of a Stop, according to the confirmations of the boards. */
-export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran = true): { text: string; failed: boolean; why: string } {
+export function stoppedWords(event: Extract<ChainEvent, { kind: 'stopped' }>, ran = true): { text: string; failed: boolean; why: string } {
   const { boards, not_stopped } = event;
   const done = boards.length === 0 ? '' : ran ? `Stopped: ${boardList(boards)} confirmed it.` : `Stop was sent. No board was running; ${boardList(boards)} confirmed it.`;
   if (not_stopped.length > 0) {
@@ -202,7 +202,7 @@ export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran
 }
 
 /** Returns an event as text. Undefined: the event is not shown. */
-export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {
+export function eventWords(event: ChainEvent): { text: string; tone: EventTone; of: string } | undefined {
   const line = (text: string, tone: EventTone, of: string) => ({ text, tone, of });
   switch (event.kind) {
     case 'lease':

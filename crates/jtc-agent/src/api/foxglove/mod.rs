@@ -21,9 +21,9 @@ use axum::response::{IntoResponse as _, Response};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
 use host_kit::FrontEnd;
+use jtc_host::labels;
 use jtc_host::recording::{MessageWriter, Topic};
 use jtc_host::sample::Sample;
-use jtc_host::words;
 use jtc_wire::{ExecCommand, Status};
 use serde_json::json;
 use tokio::sync::Notify;
@@ -325,12 +325,12 @@ impl Sender<'_> {
             "state": status.state.name(),
             "trajectory": status.trajectory.name(),
             "point": status.point,
-            "errors": words::causes(status),
+            "errors": labels::causes(status),
             "held_stop": cause.map(ToString::to_string).unwrap_or_default(),
-            "errors_occurred": words::errors(status.occurred),
+            "errors_occurred": labels::errors(status.occurred),
             "next": jtc_host::held_stop::next_step(status, cause).plain(FrontEnd::Agent),
             "age_ms": age.as_millis() as u64,
-            "commanded_by": self.agent.line.commander().unwrap_or_default(),
+            "commanded_by": self.agent.line.http_session().unwrap_or_default(),
             "simulated": self.agent.simulated,
         });
         words.to_string().into_bytes()

@@ -22,10 +22,10 @@ fn finished() -> Ending {
 }
 
 /// Returns a writer, and the receiver of its notices.
-fn writer(shelf: Shelf) -> (Writer, Receiver<Notice>) {
+fn writer(retention: Retention) -> (Writer, Receiver<Notice>) {
     let (notices, reported) = channel();
     let notify = Box::new(move |notice| notices.send(notice).expect("it is awaited"));
-    (Writer::new(shelf, notify, Duration::ZERO), reported)
+    (Writer::new(retention, notify, Duration::ZERO), reported)
 }
 
 fn files(dir: &tempfile::TempDir) -> Vec<PathBuf> {
@@ -59,7 +59,7 @@ fn what_finds_no_room_is_counted() {
 fn recordings_stay_within_their_limit() {
     const LIMIT: u64 = 400_000;
     let dir = tempfile::tempdir().unwrap();
-    let (mut writer, reported) = writer(Shelf::open(dir.path(), LIMIT).unwrap());
+    let (mut writer, reported) = writer(Retention::open(dir.path(), LIMIT).unwrap());
     writer.take(Message::Begin(Box::default()));
     let mut seen = std::collections::BTreeSet::new();
     for i in 0..20_000 {
@@ -95,11 +95,11 @@ fn recordings_stay_within_their_limit() {
 fn a_full_disk_is_reported_once_and_recording_goes_on() {
     static FULL: Mutex<bool> = Mutex::new(true);
     let dir = tempfile::tempdir().unwrap();
-    let shelf = Shelf::open(dir.path(), 1_000_000).unwrap().making(|path| {
+    let retention = Retention::open(dir.path(), 1_000_000).unwrap().making(|path| {
         let file = std::fs::File::create_new(path)?;
         if *FULL.lock().unwrap() { std::fs::File::options().write(true).open("/dev/full") } else { Ok(file) }
     });
-    let (mut writer, reported) = writer(shelf);
+    let (mut writer, reported) = writer(retention);
     for _ in 0..2 {
         writer.take(Message::Begin(Box::default()));
         (0..100).for_each(|i| writer.take(Message::Sample(sample(i))));

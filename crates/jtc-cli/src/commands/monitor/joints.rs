@@ -2,8 +2,8 @@
 
 use cli_kit::figure;
 use cli_kit::view::panel;
+use jtc_host::labels;
 use jtc_host::sample::is_measured;
-use jtc_host::words;
 use jtc_wire::Status;
 use ratatui::layout::Constraint;
 use ratatui::style::{Color, Style, Stylize};
@@ -72,10 +72,10 @@ fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
             let text = if known(j) { figure(value.into(), digits) } else { "-".into() };
             Cell::from(format!("{text:>width$}"))
         };
-        let mut trouble: Vec<&str> = words::joint_errors(joint.internal);
-        trouble.extend(words::node_errors(joint.errors));
-        trouble.extend(words::motor_faults(joint.mc_current));
-        trouble.extend(words::node_warnings(joint.warnings));
+        let mut trouble: Vec<&str> = labels::joint_errors(joint.internal);
+        trouble.extend(labels::node_errors(joint.errors));
+        trouble.extend(labels::motor_faults(joint.mc_current));
+        trouble.extend(labels::node_warnings(joint.warnings));
         if silent {
             trouble.clear();
         }
@@ -98,8 +98,8 @@ fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
             (true, true) => "pumps",
             (true, false) => "off",
         };
-        let mut trouble: Vec<&str> = words::node_errors(g.errors);
-        trouble.extend(words::node_warnings(g.warnings));
+        let mut trouble: Vec<&str> = labels::node_errors(g.errors);
+        trouble.extend(labels::node_warnings(g.warnings));
         if g.pressure1 != 0 || g.pressure2 != 0 {
             trouble.push("vacuum");
         }

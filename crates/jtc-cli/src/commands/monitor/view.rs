@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small};
 use cli_kit::{Failure, figure};
+use jtc_host::labels;
 use jtc_host::sample::is_measured;
-use jtc_host::words;
 use jtc_wire::{Code, ControllerState, Status};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -174,12 +174,12 @@ impl View {
                 (vec![cause], Vec::new(), "jtc doctor".into())
             }
             (Some(s), None) => {
-                let causes = words::causes(s);
-                let mut warnings = words::warnings(s);
+                let causes = labels::causes(s);
+                let mut warnings = labels::warnings(s);
                 if causes.is_empty() && s.is_coming_up() {
-                    warnings.insert(0, words::waiting_for(s));
+                    warnings.insert(0, labels::waiting_for(s));
                 }
-                (causes, warnings, words::next_step(s).to_string())
+                (causes, warnings, labels::next_step(s).to_string())
             }
         };
         Trouble { causes, warnings, next, message: reply }

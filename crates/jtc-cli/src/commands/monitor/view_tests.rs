@@ -95,7 +95,7 @@ fn no_cause_is_cut_and_none_vanishes() {
     for joint in &mut s.joints {
         (joint.state, joint.internal, joint.mc_current, joint.warnings) = (NodeState::FAULT, 0x3F, 0x41, 7);
     }
-    let causes = [words::causes(&s), words::warnings(&s)].concat();
+    let causes = [labels::causes(&s), labels::warnings(&s)].concat();
     assert!(causes.len() > 60);
     for size in SIZES {
         let mut view = of(s);
@@ -154,7 +154,7 @@ fn every_cause_is_explained() {
         (joint.state, joint.internal, joint.errors) = (NodeState::new(254 + (n as u8 & 1)), 0x3F, 0x0F);
         (joint.mc_current, joint.warnings) = (0xFF, 0x0F);
     }
-    for words in [words::causes(&s), words::warnings(&s)].concat() {
+    for words in [labels::causes(&s), labels::warnings(&s)].concat() {
         assert!(!jtc_host::explain::find(&words).is_empty(), "{words}");
     }
 }

@@ -1,6 +1,6 @@
 //! The last usable answers of a joint, and the rate of their positions.
 use crate::DT;
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 
 /// Number of answers over which a rate is computed, and least time for it, ms.
 const WINDOW: usize = 5;
@@ -63,8 +63,8 @@ pub(super) struct History {
     as_predicted: u8,
 }
 
-remembered!(Kept { position, at_ms });
-remembered!(History { answers, next, in_turn, as_predicted });
+bit_codec!(Kept { position, at_ms });
+bit_codec!(History { answers, next, in_turn, as_predicted });
 
 impl History {
     /// Creates a history that has only this answer.

@@ -9,8 +9,8 @@ use jtc_wire::StopKind;
 use super::Reading;
 use super::history::{Answered, History};
 use crate::DT;
+use crate::bit_codec::bit_codec;
 use crate::config::Config;
-use crate::remembered::remembered;
 
 /// Number of answers in which a difference must be constant before it is a jump.
 const CONSTANT: u8 = 5;
@@ -52,7 +52,7 @@ pub(super) struct Jumps {
     found: Option<StopKind>,
 }
 
-remembered!(Jumps { taken_off, before, value, answers, looks, changes, found });
+bit_codec!(Jumps { taken_off, before, value, answers, looks, changes, found });
 
 /// Meaning of an unexpected answer.
 #[derive(Clone, Copy, Debug, PartialEq)]

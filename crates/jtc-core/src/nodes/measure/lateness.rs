@@ -6,7 +6,7 @@
 //! outstanding, at most as many as have come in together. Without evidence they are counted as lost. Evidence may be wrong, because a frame
 //! that the bus repeats comes twice. A lost answer is found in the long run, because the count does not return to zero: the lowest count of
 //! a window is subtracted.
-use crate::remembered::remembered;
+use crate::bit_codec::bit_codec;
 
 /// Time for which evidence is valid, ms.
 const LASTS_MS: u16 = 1_000;
@@ -31,7 +31,7 @@ pub(super) struct Lateness {
     moves: u8,
 }
 
-remembered!(Lateness { left_ms, outstanding, most, fewest, window, moves });
+bit_codec!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 
 impl Lateness {
     /// Returns `true` if no answer is considered late and the `answers` of a tick, at most one, are not evidence. [`Self::count`] need not

@@ -5,7 +5,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::*;
-use crate::drawn::is_in_the_protocol;
+use crate::docs_check::is_in_the_protocol;
 
 /// States of a drive, without those that it leaves by itself after some time; the request that leads to each, and its name.
 const STATES: [(NodeState, Target, &str); 5] = [

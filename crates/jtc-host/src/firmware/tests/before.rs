@@ -40,7 +40,7 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     let new = image(H745, 2);
     let own = asked(&board, Some(true));
     assert_eq!(own.to_confirm(&new), None);
-    for before in [asked(&board, Some(false)), asked(&board, None), Before::default()] {
+    for before in [asked(&board, Some(false)), asked(&board, None), Preflight::default()] {
         assert!(before.to_confirm(&new).unwrap().contains("supported"), "{before:?}");
     }
     // A report on the line of another board is not a report of this board. In addition to the board's own line it does no
@@ -49,7 +49,8 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     let silent = asked(&board, Some(true));
     assert_eq!(silent.lines[0].answers, Answers::Nothing { bytes: 0 });
     board.hold(false);
-    let both = |one: &Before, other: Before| Before { lines: [&one.lines[..], &other.lines].concat() };
+    let both =
+        |one: &Preflight, other: Preflight| Preflight { lines: [&one.lines[..], &other.lines].concat() };
     let question = both(&silent, asked(&board, Some(false))).to_confirm(&new).unwrap();
     assert!(question.contains("not whether it is the board with this drive"), "{question}");
     assert_eq!(both(&own, asked(&board, Some(false))).to_confirm(&new), None);
@@ -100,7 +101,7 @@ fn the_question_names_what_no_file_and_no_line_shows() {
     let noise = crate::port::test::ScriptedPort::new(None, |_, _| vec![0x55; 3]);
     let answers = look(&mut Session::new(noise)).unwrap();
     assert!(matches!(answers, Answers::Nothing { bytes: 1.. }), "{answers:?}");
-    let before = Before { lines: vec![Asked { port: "ttyX".into(), same_device: Some(true), answers }] };
+    let before = Preflight { lines: vec![Asked { port: "ttyX".into(), same_device: Some(true), answers }] };
     let said = before.to_confirm(&listed).unwrap();
     assert!(said.contains("--baud"), "{said}");
 }
@@ -166,7 +167,8 @@ fn an_image_goes_onto_its_own_board_only() {
         (link, drive)
     };
     let ask_over = |board: &str, drive: &Drive, runs: Option<&str>, same_device, permissions| {
-        let before = runs.map_or(Before::default(), |runs| asked(&Board::running(runs, None), same_device));
+        let before =
+            runs.map_or(Preflight::default(), |runs| asked(&Board::running(runs, None), same_device));
         let asked = may_flash(&image(board, 2), drive, &before, permissions);
         asked.map_err(|error| {
             assert_eq!(error.kind(), ErrorKind::Refused, "{error}");
@@ -219,7 +221,7 @@ fn a_controller_that_does_not_report_its_board_has_an_unknown_supply() {
     });
     let answers = look(&mut Session::new(port)).unwrap();
     assert!(matches!(answers, Answers::Controller { info: None, .. }), "{answers:?}");
-    let before = Before { lines: vec![Asked { port: "ttyX".into(), same_device: Some(true), answers }] };
+    let before = Preflight { lines: vec![Asked { port: "ttyX".into(), same_device: Some(true), answers }] };
     let asked = may_flash(&image(H745, 2), &link.drive(), &before, Permissions::default());
     assert!(matches!(asked, Err(FirmwareError::Supply { runs: None, .. })), "{asked:?}");
 }

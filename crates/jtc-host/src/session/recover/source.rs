@@ -5,7 +5,7 @@ use jtc_wire::{ControllerState, Status};
 use super::RecoverStep;
 use crate::arm::ParameterSet;
 use crate::error::ParametersError;
-use crate::words;
+use crate::labels;
 
 /// Source of friction, gains and arm model for a controller that lacks some of them (J-55).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,7 +43,7 @@ impl ParameterSource<'_> {
     pub(super) fn enough_for(&self, status: &Status) -> Result<(), ParametersError> {
         match self {
             ParameterSource::None if status.jtc_init != 0 => {
-                Err(ParametersError::NoSource { missing: words::missing_parameters(status.jtc_init) })
+                Err(ParametersError::NoSource { missing: labels::missing_parameters(status.jtc_init) })
             }
             _ => Ok(()),
         }

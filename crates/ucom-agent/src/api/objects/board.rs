@@ -4,7 +4,7 @@ use ucom_host::date_text;
 use ucom_host::master::{Board, BoardSeen, Life};
 use utoipa::ToSchema;
 
-use crate::picture::Picture;
+use crate::snapshot::BusSnapshot;
 
 /// Board as last seen.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
@@ -67,16 +67,16 @@ fn bits(status: Status) -> Vec<String> {
 
 impl BoardObject {
     /// Returns all boards of a snapshot.
-    pub(crate) fn all(picture: &Picture) -> Vec<Self> {
-        picture.boards.iter().map(|(number, board)| Self::of(picture, number, board)).collect()
+    pub(crate) fn all(snapshot: &BusSnapshot) -> Vec<Self> {
+        snapshot.boards.iter().map(|(number, board)| Self::of(snapshot, number, board)).collect()
     }
 
     /// Returns one board of a snapshot.
-    pub(crate) fn of(picture: &Picture, number: u8, board: &Board) -> Self {
-        let now_us = picture.clock_us();
+    pub(crate) fn of(snapshot: &BusSnapshot, number: u8, board: &Board) -> Self {
+        let now_us = snapshot.clock_us();
         let info = board.info;
         let program = info.filter(|info| info.has_application());
-        let offers = picture.values.get(&number).map(|values| &values.known.names);
+        let offers = snapshot.values.get(&number).map(|values| &values.known.names);
         Self {
             number,
             flash_number: info.map(|info| info.flash_number),
@@ -88,10 +88,10 @@ impl BoardObject {
             active: board.admin.is_some_and(|admin| admin.active),
             application: program.is_some(),
             program_id: program.map(|info| info.program_id),
-            flash_date: program.map(|info| date_text(&picture.profile, info.date)),
+            flash_date: program.map(|info| date_text(&snapshot.profile, info.date)),
             errors: board.error_count,
             last_error: board.errors.last().map(|(_, code)| code.name().into()),
-            frames_per_s: picture.statistics.frames_per_s(number, now_us),
+            frames_per_s: snapshot.statistics.frames_per_s(number, now_us),
             offers: offers.map(|names| OffersObject {
                 description: names.description.clone(),
                 inputs: names.ci.clone(),

@@ -2,7 +2,7 @@
 use agent_kit::access::Role;
 use utoipa::ToSchema;
 
-use crate::picture::Picture;
+use crate::snapshot::BusSnapshot;
 
 /// Status of the bus, and the lease.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
@@ -85,23 +85,23 @@ pub struct ControllerObject {
 
 impl StatusObject {
     /// Returns the status of a snapshot; values that the snapshot does not contain are empty.
-    pub(crate) fn of(picture: &Picture) -> Self {
-        let (statistics, now_us) = (&picture.statistics, picture.now_us);
+    pub(crate) fn of(snapshot: &BusSnapshot) -> Self {
+        let (statistics, now_us) = (&snapshot.statistics, snapshot.now_us);
         Self {
             simulated: false,
             bus: String::new(),
             at_ms: 0,
             lost: None,
-            age_ms: picture.at.elapsed().as_millis() as u64,
-            boards: picture.boards.iter().count(),
+            age_ms: snapshot.at.elapsed().as_millis() as u64,
+            boards: snapshot.boards.iter().count(),
             load_percent: statistics.load_percent(now_us),
             received: statistics.received,
             sent: statistics.sent,
             foreign_frames: statistics.foreign_count(),
-            is_master: picture.is_master,
-            competing_master: picture.competing_us.is_some(),
-            shared_numbers: picture.shared.clone(),
-            controller: picture.controller.map(|controller| ControllerObject {
+            is_master: snapshot.is_master,
+            competing_master: snapshot.competing_us.is_some(),
+            shared_numbers: snapshot.shared.clone(),
+            controller: snapshot.controller.map(|controller| ControllerObject {
                 bus_off: controller.bus_off,
                 times_bus_off: controller.times_bus_off,
                 passive: controller.passive,

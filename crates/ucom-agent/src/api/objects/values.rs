@@ -5,7 +5,7 @@ use ucom_host::master::Life;
 use ucom_host::master::io::{Kind, ParValue};
 use utoipa::ToSchema;
 
-use crate::picture::{Picture, Values};
+use crate::snapshot::{BusSnapshot, Values};
 
 /// Age after which outputs are stale, µs.
 const OLD_US: u64 = 500_000;
@@ -75,9 +75,9 @@ impl ValueObject {
 }
 
 impl ValuesObject {
-    pub(crate) fn of(picture: &Picture, values: &Values) -> Self {
-        let (known, now_us) = (&values.known, picture.clock_us());
-        let board = picture.boards.get(known.board);
+    pub(crate) fn of(snapshot: &BusSnapshot, values: &Values) -> Self {
+        let (known, now_us) = (&values.known, snapshot.clock_us());
+        let board = snapshot.boards.get(known.board);
         let list = |kind: Kind, words: Vec<Option<u16>>| {
             let (names, signals) = (known.names.names(kind), known.signals.all(kind));
             let value = |(index, word): (usize, Option<u16>)| {

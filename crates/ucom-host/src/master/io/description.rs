@@ -1,5 +1,5 @@
 //! Names of a board's inputs, outputs and parameters (D-36).
-use host_kit::likeness;
+use host_kit::similarity;
 use serde::{Deserialize, Serialize};
 
 use crate::master::error::SignalError;
@@ -91,9 +91,9 @@ impl IoDescription {
             return Ok(index);
         }
         // Units in brackets do not make names less similar.
-        let like = |n: &str| likeness(n, name).max(likeness(short(n), name));
+        let like = |n: &str| similarity(n, name).max(similarity(short(n), name));
         let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
-        near.retain(|(likeness, _)| *likeness > 0.6);
+        near.retain(|(similarity, _)| *similarity > 0.6);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
         let near = near.into_iter().take(3).map(|(_, n)| n.clone()).collect();
         Err(SignalError::NoSignal { board, kind: kind.name(), name: name.into(), near })

@@ -1,0 +1,141 @@
+//! Queue of Stops and Pauses: sent before all other frames, and repeated until the controller has confirmed them.
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use jtc_host::port::line_time;
+use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
+
+use super::ClientId;
+use super::frame_class::HostFrame;
+
+/// Time after which a frame without a record is sent again. The time of three statuses on the line is added.
+const AWAITED: Duration = Duration::from_millis(150);
+/// Number of times that a frame is sent at the interval of [`AWAITED`].
+const TRIES: u32 = 20;
+/// Interval of the later repetitions, until the controller answers.
+const LATER: Duration = Duration::from_secs(1);
+
+/// A Stop or a Pause, and the clients that have requested it.
+#[derive(Debug)]
+struct Halt {
+    command: ExecCommand,
+    askers: Vec<ClientId>,
+    tries: u32,
+    /// Time at which the frame is sent again.
+    again_at: Duration,
+}
+
+impl Halt {
+    fn ask(&mut self, client: ClientId) {
+        if !self.askers.contains(&client) {
+            self.askers.push(client);
+        }
+    }
+}
+
+/// Stops and Pauses without a record. The requests of several clients share one frame, and each of the clients receives
+/// its record.
+#[derive(Debug, Default)]
+pub(super) struct StopQueue {
+    waiting: Option<Halt>,
+    /// Written frames, oldest first.
+    written: VecDeque<Halt>,
+    /// Set if a frame that may begin a motion was written after the last Stop or Pause.
+    motion_since: bool,
+}
+
+impl StopQueue {
+    /// Adds the request of a client. A Stop replaces a queued Pause, but a Pause never replaces a Stop.
+    pub fn ask(&mut self, client: ClientId, command: ExecCommand) {
+        let covers = |halt: &Halt| halt.command == ExecCommand::Stop || halt.command == command;
+        if let Some(waiting) = &mut self.waiting {
+            if !covers(waiting) {
+                waiting.command = command;
+            }
+            waiting.tries = 0;
+            waiting.ask(client);
+        } else if let Some(written) =
+            self.written.back_mut().filter(|halt| covers(halt) && !self.motion_since)
+        {
+            written.tries = 0;
+            written.ask(client);
+        } else {
+            self.waiting = Some(Halt { command, askers: vec![client], tries: 0, again_at: Duration::ZERO });
+        }
+    }
+
+    /// Returns the frame that must be written before all others.
+    pub fn frame(&self) -> Option<HostFrame> {
+        self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
+    }
+
+    /// Notes that the frame was written. The line finishes its last byte at `at`.
+    pub fn written(&mut self, at: Duration, baud: Option<u32>) {
+        if let Some(mut halt) = self.waiting.take() {
+            halt.tries += 1;
+            let awaited = if halt.tries > TRIES { LATER } else { AWAITED };
+            halt.again_at = at + awaited + line_time(3 * STATUS_LEN, baud);
+            self.written.push_back(halt);
+            self.motion_since = false;
+        }
+    }
+
+    /// Notes that a frame that may begin a motion was written.
+    pub fn motion_written(&mut self) {
+        self.motion_since = true;
+    }
+
+    /// Takes the record of the oldest written frame. Returns the clients that receive the record. If the controller
+    /// received the frame damaged, it is sent again.
+    pub fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
+        let Some(halt) = self.written.pop_front() else { return Vec::new() };
+        if !arrived {
+            self.again(halt);
+            return Vec::new();
+        }
+        halt.askers.into_iter().map(|asker| (asker, *response)).collect()
+    }
+
+    /// Repeats the frames whose record is overdue. Returns true if one of the frames has now been sent [`TRIES`] times.
+    pub fn look(&mut self, now: Duration) -> bool {
+        let mut many = false;
+        while let Some(halt) = self.written.pop_front_if(|halt| now >= halt.again_at) {
+            many |= halt.tries == TRIES;
+            self.again(halt);
+        }
+        many
+    }
+
+    fn again(&mut self, halt: Halt) {
+        // A Pause after a Stop would replace the Stop.
+        if let Some(stop) = self.written.iter_mut().find(|halt| halt.command == ExecCommand::Stop) {
+            return halt.askers.into_iter().for_each(|asker| stop.ask(asker));
+        }
+        match &mut self.waiting {
+            Some(waiting) => {
+                if halt.command == ExecCommand::Stop {
+                    waiting.command = halt.command;
+                }
+                halt.askers.into_iter().for_each(|asker| waiting.ask(asker));
+            }
+            None => self.waiting = Some(halt),
+        }
+    }
+
+    /// Returns the time at which the next frame is written or repeated.
+    pub fn due(&self, now: Duration) -> Option<Duration> {
+        if self.waiting.is_some() { Some(now) } else { self.written.front().map(|halt| halt.again_at) }
+    }
+
+    /// Returns the command that was sent more than once because the controller does not confirm it. If both a Stop and
+    /// a Pause were, returns the Stop.
+    pub fn untaken(&self) -> Option<ExecCommand> {
+        let again = self.waiting.iter().chain(&self.written).filter(|halt| halt.tries > 1);
+        again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)
+    }
+
+    /// Returns true if every request has its record.
+    pub fn are_done(&self) -> bool {
+        self.waiting.is_none() && self.written.is_empty()
+    }
+}

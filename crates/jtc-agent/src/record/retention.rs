@@ -1,0 +1,366 @@
+//! Recording directory: file names, size limit, and deletion of the oldest recordings.
+//!
+//! A file in the directory lists the recordings that agents have made in it, so that no other file is ever removed. The
+//! list is locked, so two agents cannot share a directory.
+use std::collections::VecDeque;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Name of the list.
+pub const LIST: &str = ".jtc-recordings";
+/// Ending of a complete recording.
+const WHOLE: &str = ".mcap";
+/// Ending of a recording that is incomplete or in progress. Every command can read such a file.
+const PART: &str = ".part.mcap";
+/// Number of list lines for removed files after which the list is rewritten.
+const GONE_MAX: usize = 10_000;
+
+/// Recording that an agent has made in this directory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Own {
+    /// Name without its ending.
+    name: String,
+    /// Length in bytes; 0 if it is not known. A file of another length was changed from outside and is never removed.
+    bytes: u64,
+    /// `true` if the recording is incomplete or in progress.
+    part: bool,
+}
+
+impl Own {
+    fn path(&self, dir: &Path) -> PathBuf {
+        dir.join(format!("{}{}", self.name, if self.part { PART } else { WHOLE }))
+    }
+}
+
+/// Function that creates a new file.
+type Make = fn(&Path) -> io::Result<File>;
+
+/// Recording directory.
+pub struct Retention {
+    dir: PathBuf,
+    make: Make,
+    limit: u64,
+    list: File,
+    /// Completed and interrupted recordings, oldest first. The recording in progress is not included.
+    own: VecDeque<Own>,
+    number: u64,
+    gone: usize,
+}
+
+/// Recording in progress.
+pub struct Begun {
+    /// Path of its file.
+    pub path: PathBuf,
+    name: String,
+}
+
+impl Retention {
+    /// Opens or creates a directory. `limit`: largest size of all recordings together, bytes.
+    ///
+    /// # Errors
+    ///
+    /// The directory cannot be created or written, or another agent uses it.
+    pub fn open(dir: &Path, limit: u64) -> io::Result<Self> {
+        std::fs::create_dir_all(dir)?;
+        let path = dir.join(LIST);
+        let mut list = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+        list.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => {
+                io::Error::new(io::ErrorKind::WouldBlock, "another agent records into this directory")
+            }
+            TryLockError::Error(error) => error,
+        })?;
+        let mut text = Vec::new();
+        list.read_to_end(&mut text)?;
+        let mut retention =
+            Self { dir: dir.to_owned(), make, limit, list, own: VecDeque::new(), number: 0, gone: 0 };
+        for line in String::from_utf8_lossy(&text).lines() {
+            retention.take_line(line);
+        }
+        retention.look();
+        retention.rewrite()?;
+        Ok(retention)
+    }
+
+    /// Takes a line of the list. Ignores invalid lines.
+    fn take_line(&mut self, line: &str) {
+        let mut words = line.split(' ');
+        let (Some(what), Some(name), bytes) = (words.next(), words.next(), words.next()) else { return };
+        let Some(number) = number_of(name) else { return };
+        self.number = self.number.max(number);
+        self.own.retain(|own| own.name != name);
+        let name = name.to_owned();
+        match (what, bytes.and_then(|bytes| bytes.parse().ok())) {
+            ("begin", _) => self.own.push_back(Own { name, bytes: 0, part: true }),
+            ("part", Some(bytes)) => self.own.push_back(Own { name, bytes, part: true }),
+            ("end", Some(bytes)) => self.own.push_back(Own { name, bytes, part: false }),
+            _ => {}
+        }
+    }
+
+    /// Checks the listed files, and drops from the list those that were removed or changed from outside. The length of
+    /// a recording whose agent was killed is not known.
+    fn look(&mut self) {
+        let dir = self.dir.clone();
+        self.own.retain_mut(|own| match length(&own.path(&dir)) {
+            Some(bytes) if own.part && own.bytes == 0 => {
+                own.bytes = bytes;
+                true
+            }
+            found => found == Some(own.bytes),
+        });
+    }
+
+    /// Rewrites the list without removed files.
+    fn rewrite(&mut self) -> io::Result<()> {
+        let mut text = String::new();
+        let line =
+            |own: &Own| format!("{} {} {}\n", if own.part { "part" } else { "end" }, own.name, own.bytes);
+        // The number continues after removed recordings.
+        if self.number > 0 {
+            text += &format!("gone {}\n", name(Duration::ZERO, self.number));
+        }
+        text.extend(self.own.iter().map(line));
+        self.list.set_len(0)?;
+        self.list.write_all(text.as_bytes())?;
+        self.gone = 0;
+        Ok(())
+    }
+
+    /// Appends a line to the list, completely or not at all.
+    fn note(&mut self, line: &str) -> io::Result<()> {
+        let end = self.list.seek(SeekFrom::End(0))?;
+        let written = self.list.write_all(format!("{line}\n").as_bytes());
+        if written.is_err() {
+            // Even if this fails, the list is still valid.
+            let _ = self.list.set_len(end);
+        }
+        written
+    }
+
+    /// Creates a file with the next number, at this time since 1970. Its name is added to the list first.
+    ///
+    /// # Errors
+    ///
+    /// The disk cannot be written.
+    pub fn begin(&mut self, now: Duration) -> io::Result<(File, Begun)> {
+        loop {
+            let name = name(now, self.number + 1);
+            let (whole, path) =
+                (self.dir.join(format!("{name}{WHOLE}")), self.dir.join(format!("{name}{PART}")));
+            self.number += 1;
+            if whole.symlink_metadata().is_ok() || path.symlink_metadata().is_ok() {
+                // A file of this name exists that is not a recording of an agent.
+                continue;
+            }
+            self.note(&format!("begin {name}"))?;
+            let file = (self.make)(&path)?;
+            return Ok((file, Begun { path, name }));
+        }
+    }
+
+    /// Completes a recording: it gets its final name.
+    ///
+    /// # Errors
+    ///
+    /// The recording keeps its name of an incomplete recording.
+    pub fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
+        let bytes = length(&begun.path).unwrap_or(0);
+        let mut own = Own { name: begun.name, bytes, part: true };
+        let whole = Own { part: false, ..own.clone() }.path(&self.dir);
+        let renamed = std::fs::rename(&begun.path, &whole);
+        own.part = renamed.is_err();
+        let noted = self.note(&format!("{} {} {bytes}", if own.part { "part" } else { "end" }, own.name));
+        self.own.push_back(own);
+        renamed.and(noted).map(|()| whole)
+    }
+
+    /// Ends a recording without completing it. The file is kept if it contains samples.
+    pub fn break_off(&mut self, begun: Begun, samples: u64) {
+        if samples == 0 && std::fs::remove_file(&begun.path).is_ok() {
+            let _ = self.note(&format!("gone {}", begun.name));
+            self.gone += 1;
+            // The next recording may use its number.
+            self.number -= u64::from(number_of(&begun.name) == Some(self.number));
+            return;
+        }
+        let bytes = length(&begun.path).unwrap_or(0);
+        let _ = self.note(&format!("part {} {bytes}", begun.name));
+        self.own.push_back(Own { name: begun.name, bytes, part: true });
+    }
+
+    /// Removes the oldest recordings until `bytes` fit within the limit; returns the removed paths.
+    pub fn make_room(&mut self, bytes: u64) -> Vec<PathBuf> {
+        let mut removed = Vec::new();
+        while self.bytes() + bytes > self.limit
+            && let Some(oldest) = self.own.pop_front()
+        {
+            let path = oldest.path(&self.dir);
+            // If another program has replaced the recording by another file, that file is kept.
+            if length(&path) == Some(oldest.bytes) && std::fs::remove_file(&path).is_ok() {
+                removed.push(path);
+            }
+            self.gone += 1;
+            let _ = self.note(&format!("gone {}", oldest.name));
+        }
+        if self.gone > GONE_MAX {
+            // The old list is still valid if this fails.
+            let _ = self.rewrite();
+        }
+        removed
+    }
+
+    /// Returns the size in bytes after which a recording continues in another file. So old parts can be removed.
+    pub fn longest(&self) -> u64 {
+        self.limit / 4
+    }
+
+    /// Replaces the function that creates files.
+    #[cfg(test)]
+    pub fn making(self, make: Make) -> Self {
+        Self { make, ..self }
+    }
+
+    fn bytes(&self) -> u64 {
+        self.own.iter().map(|own| own.bytes).sum()
+    }
+}
+
+fn make(path: &Path) -> io::Result<File> {
+    OpenOptions::new().write(true).create_new(true).open(path)
+}
+
+/// Returns the length of the file itself. For a link this is not the length of its target.
+fn length(path: &Path) -> Option<u64> {
+    path.symlink_metadata().ok().filter(std::fs::Metadata::is_file).map(|found| found.len())
+}
+
+/// Returns a name that consists of time (UTC) and number, such as `20261123T154412Z-000017`. The numbers are always in
+/// the order of time. The names are in this order unless the clock was set back.
+fn name(now: Duration, number: u64) -> String {
+    let since = now.as_secs();
+    let (year, month, day) = date((since / 86_400) as i64);
+    let (hour, minute, second) = (since / 3600 % 24, since / 60 % 60, since % 60);
+    format!("{year:04}{month:02}{day:02}T{hour:02}{minute:02}{second:02}Z-{number:06}")
+}
+
+/// Returns the number in a name; `None` for names in another format.
+fn number_of(name: &str) -> Option<u64> {
+    let (time, number) = name.split_once('-')?;
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let (date, time) = time.strip_suffix('Z')?.split_once('T')?;
+    (digits(date) && digits(time) && digits(number)).then(|| number.parse().ok())?
+}
+
+/// Returns the date of a day since 1970-01-01 (Hinnant, *chrono-Compatible Low-Level Date Algorithms*).
+fn date(days: i64) -> (i64, i64, i64) {
+    let days = days + 719_468;
+    let (era, of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let month = if month < 10 { month + 3 } else { month - 9 };
+    (year + 400 * era + i64::from(month <= 2), month, day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2026-11-23 15:44:12 UTC.
+    const NOW: Duration = Duration::from_secs(1_795_448_652);
+
+    /// Makes a recording of this number of bytes. If `whole` is false, the agent is killed before the recording is
+    /// complete.
+    fn make(retention: &mut Retention, bytes: usize, whole: bool) -> PathBuf {
+        make_at(retention, NOW, bytes, whole)
+    }
+
+    fn make_at(retention: &mut Retention, now: Duration, bytes: usize, whole: bool) -> PathBuf {
+        let (mut file, begun) = retention.begin(now).unwrap();
+        file.write_all(&vec![1; bytes]).unwrap();
+        let part = begun.path.clone();
+        if whole { retention.end(begun).unwrap() } else { part }
+    }
+
+    #[test]
+    fn names_have_time_and_number() {
+        let at = Duration::from_secs;
+        assert_eq!(name(NOW, 17), "20261123T154412Z-000017");
+        assert_eq!(name(at(951_782_400), 1_234_567), "20000229T000000Z-1234567");
+        assert_eq!(number_of("20261123T154412Z-000017"), Some(17));
+        for other in ["", "../../etc/passwd", "20261123T154412Z", "20261123T154412Z-../1", "aTbZ-1"] {
+            assert_eq!(number_of(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn the_oldest_go_first_and_only_those_that_were_made_here() {
+        let dir = tempfile::tempdir().unwrap();
+        let others = dir.path().join("20200101T000000Z-000001.mcap");
+        std::fs::write(&others, [0; 5000]).unwrap();
+        let mut retention = Retention::open(dir.path(), 1000).unwrap();
+        let files: Vec<PathBuf> = (0..4).map(|_| make(&mut retention, 200, true)).collect();
+        assert!(retention.make_room(200).is_empty());
+        // The first file was replaced from outside by another file, and the second by a link.
+        std::fs::write(&files[0], [0; 10]).unwrap();
+        std::fs::remove_file(&files[1]).unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(&others, &files[1]).unwrap();
+        assert_eq!(retention.make_room(700), [files[2].clone()]);
+        assert!(files[0].exists() && others.exists() && files[3].exists());
+        #[cfg(unix)]
+        assert!(files[1].symlink_metadata().is_ok());
+        // If the requested space exceeds the limit, all recordings made here are removed.
+        assert_eq!(retention.make_room(5000), [files[3].clone()]);
+        assert!(retention.make_room(5000).is_empty() && others.exists());
+    }
+
+    /// Even if the computer's clock is changed, during an agent or between two agents, the oldest recording is removed
+    /// first and no number is used twice.
+    #[test]
+    fn the_oldest_are_those_that_were_made_first_whatever_the_clock_shows() {
+        let dir = tempfile::tempdir().unwrap();
+        let day = Duration::from_secs(86_400);
+        let clock = [NOW, NOW - 4000 * day, NOW + 4000 * day, Duration::ZERO, NOW - day, NOW];
+        let mut files = Vec::new();
+        for times in clock.chunks(2) {
+            let mut retention = Retention::open(dir.path(), 600).unwrap();
+            files.extend(times.iter().map(|now| make_at(&mut retention, *now, 100, true)));
+        }
+        let numbers = files.iter().map(|file| number_of(file.file_stem()?.to_str()?));
+        assert!(numbers.eq((1..=6).map(Some)), "{files:?}");
+        let mut retention = Retention::open(dir.path(), 600).unwrap();
+        for (room, file) in (1..).map(|n| 100 * n).zip(files) {
+            assert_eq!(retention.make_room(room), [file]);
+        }
+    }
+
+    #[test]
+    fn another_agent_goes_on_where_the_last_one_ended() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut retention = Retention::open(dir.path(), 1000).unwrap();
+        let first = make(&mut retention, 300, true);
+        let killed = make(&mut retention, 300, false);
+        assert!(killed.to_str().unwrap().ends_with("-000002.part.mcap"), "{killed:?}");
+        let error = Retention::open(dir.path(), 1000).err().unwrap();
+        assert_eq!(error.kind(), io::ErrorKind::WouldBlock);
+        drop(retention);
+        // An incomplete line is ignored.
+        let mut list = OpenOptions::new().append(true).open(dir.path().join(LIST)).unwrap();
+        list.write_all(b"end 20261123T154412Z-0000").unwrap();
+        drop(list);
+        let mut retention = Retention::open(dir.path(), 1000).unwrap();
+        let third = make(&mut retention, 300, true);
+        assert!(third.to_str().unwrap().ends_with("-000003.mcap"), "{third:?}");
+        assert_eq!(retention.make_room(300), [first]);
+        assert_eq!(retention.make_room(600), [killed]);
+        assert_eq!(retention.make_room(1000), [third]);
+        drop(retention);
+        let mut retention = Retention::open(dir.path(), 1000).unwrap();
+        assert!(make(&mut retention, 1, true).to_str().unwrap().ends_with("-000004.mcap"));
+    }
+}

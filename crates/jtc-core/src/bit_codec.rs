@@ -1,0 +1,320 @@
+//! State that the controller keeps from tick to tick, as bits. The flight recorder writes it in a snapshot (J-56), and a replay reads it.
+//!
+//! [`bit_codec!`] lists the fields of a type. The compiler checks the list: a field that is missing in the list is a compile error, so
+//! that every snapshot has it. Reading never fails: bits that are not from a snapshot give some value, and [`BitSource::is_damaged`]
+//! reports that.
+use jtc_bus::{JointReport, NodeState};
+use jtc_wire::{ControllerState, StopKind, TrajectoryState};
+
+/// Destination of bits.
+pub(crate) trait BitSink {
+    /// Appends the lowest `bits` (0 to 32) of `value`. The higher bits must be zero.
+    fn put(&mut self, value: u32, bits: u32);
+
+    /// Appends 64 bits, or a single bit if all of them are zero, as for joints at rest.
+    fn put_double(&mut self, value: u64) {
+        self.put((value != 0).into(), 1);
+        if value != 0 {
+            self.put(value as u32, 32);
+            self.put((value >> 32) as u32, 32);
+        }
+    }
+}
+
+/// Source of bits, in the order in which they were written.
+pub(crate) trait BitSource {
+    /// Returns the next `bits` (0 to 32). Bits after the end are zero.
+    fn take(&mut self, bits: u32) -> u32;
+    /// Records that bits were read that cannot have been written.
+    fn damage(&mut self);
+    /// Returns `true` if bits were read after the end, or bits that cannot have been written.
+    fn is_damaged(&self) -> bool;
+}
+
+/// A value that is part of a snapshot.
+pub(crate) trait BitCodec: Sized {
+    /// Appends the value.
+    fn write<S: BitSink>(&self, to: &mut S);
+    /// Reads the value back.
+    fn read<S: BitSource>(from: &mut S) -> Self;
+}
+
+/// Makes a structure part of a snapshot: all of its fields, in this order.
+macro_rules! bit_codec {
+    ($type:ty { $($field:ident),+ $(,)? }) => {
+        impl $crate::bit_codec::BitCodec for $type {
+            fn write<S: $crate::bit_codec::BitSink>(&self, to: &mut S) {
+                let Self { $($field),+ } = self;
+                $($crate::bit_codec::BitCodec::write($field, to);)+
+            }
+
+            fn read<S: $crate::bit_codec::BitSource>(from: &mut S) -> Self {
+                $(let $field = $crate::bit_codec::BitCodec::read(from);)+
+                Self { $($field),+ }
+            }
+        }
+    };
+}
+pub(crate) use bit_codec;
+
+impl BitCodec for bool {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        to.put((*self).into(), 1);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        from.take(1) != 0
+    }
+}
+
+macro_rules! whole {
+    ($($type:ty, $bits:literal;)+) => {$(
+        impl BitCodec for $type {
+            fn write<S: BitSink>(&self, to: &mut S) {
+                to.put((*self).into(), $bits);
+            }
+
+            fn read<S: BitSource>(from: &mut S) -> Self {
+                from.take($bits) as $type
+            }
+        }
+    )+};
+}
+
+whole! { u8, 8; u16, 16; u32, 32; }
+
+impl BitCodec for u64 {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        to.put_double(*self);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        if from.take(1) == 0 {
+            return 0;
+        }
+        let low = from.take(32);
+        u64::from(low) | u64::from(from.take(32)) << 32
+    }
+}
+
+impl BitCodec for u128 {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        (*self as u64).write(to);
+        ((*self >> 64) as u64).write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        let low = u64::read(from);
+        u128::from(low) | u128::from(u64::read(from)) << 64
+    }
+}
+
+impl BitCodec for usize {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        // All values in this program fit.
+        to.put(*self as u32, 32);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        from.take(32) as usize
+    }
+}
+
+impl BitCodec for f64 {
+    // Not inlined, because a snapshot has hundreds of these values.
+    #[inline(never)]
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.to_bits().write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        f64::from_bits(u64::read(from))
+    }
+}
+
+impl BitCodec for f32 {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.to_bits().write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        f32::from_bits(u32::read(from))
+    }
+}
+
+impl<A: BitCodec, B: BitCodec> BitCodec for (A, B) {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.0.write(to);
+        self.1.write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        let first = A::read(from);
+        (first, B::read(from))
+    }
+}
+
+impl<T: BitCodec, const N: usize> BitCodec for [T; N] {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        for value in self {
+            value.write(to);
+        }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        core::array::from_fn(|_| T::read(from))
+    }
+}
+
+impl<T: BitCodec> BitCodec for Option<T> {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.is_some().write(to);
+        if let Some(value) = self {
+            value.write(to);
+        }
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        bool::read(from).then(|| T::read(from))
+    }
+}
+
+impl BitCodec for NodeState {
+    fn write<S: BitSink>(&self, to: &mut S) {
+        self.code().write(to);
+    }
+
+    fn read<S: BitSource>(from: &mut S) -> Self {
+        Self::new(u8::read(from))
+    }
+}
+
+/// Implements [`BitCodec`] for a code that is one byte with a fixed list of values.
+macro_rules! code {
+    ($($type:ty),+) => {$(
+        impl BitCodec for $type {
+            fn write<S: BitSink>(&self, to: &mut S) {
+                (*self as u8).write(to);
+            }
+
+            fn read<S: BitSource>(from: &mut S) -> Self {
+                Self::from_byte(u8::read(from)).unwrap_or_else(|| {
+                    from.damage();
+                    Self::default()
+                })
+            }
+        }
+    )+};
+}
+
+code!(ControllerState, StopKind, TrajectoryState);
+
+bit_codec!(JointReport {
+    position,
+    velocity,
+    torque,
+    temperature,
+    state,
+    mc_current,
+    mc_occurred,
+    errors,
+    warnings,
+    motor_temperature,
+});
+
+#[cfg(test)]
+pub(crate) mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Bits in a list of words.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub(crate) struct Bits {
+        words: Vec<u32>,
+        len: usize,
+        at: usize,
+        damaged: bool,
+    }
+
+    impl BitSink for Bits {
+        fn put(&mut self, value: u32, bits: u32) {
+            for bit in 0..bits {
+                if self.len.is_multiple_of(32) {
+                    self.words.push(0);
+                }
+                *self.words.last_mut().unwrap() |= (value >> bit & 1) << (self.len % 32);
+                self.len += 1;
+            }
+        }
+    }
+
+    impl BitSource for Bits {
+        fn take(&mut self, bits: u32) -> u32 {
+            let mut value = 0;
+            for bit in 0..bits {
+                if self.at < self.len {
+                    value |= (self.words[self.at / 32] >> (self.at % 32) & 1) << bit;
+                } else {
+                    self.damaged = true;
+                }
+                self.at += 1;
+            }
+            value
+        }
+
+        fn damage(&mut self) {
+            self.damaged = true;
+        }
+
+        fn is_damaged(&self) -> bool {
+            self.damaged
+        }
+    }
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Mixed {
+        flag: bool,
+        count: u16,
+        value: f64,
+        list: [Option<u8>; 3],
+        history: u128,
+        place: usize,
+        state: ControllerState,
+    }
+
+    bit_codec!(Mixed { flag, count, value, list, history, place, state });
+
+    proptest! {
+        #[test]
+        fn j56_what_is_remembered_reads_back_bit_for_bit(
+            (flag, count, value) in (any::<bool>(), any::<u16>(), prop_oneof![Just(0.0f64), any::<f64>()]),
+            list in prop::array::uniform3(any::<Option<u8>>()),
+            (history, place, state) in (any::<u128>(), 0..1usize << 20, 0..6usize),
+        ) {
+            let state = ControllerState::ALL[state];
+            let mixed = Mixed { flag, count, value, list, history, place, state };
+            let mut bits = Bits::default();
+            mixed.write(&mut bits);
+            let read = Mixed::read(&mut bits);
+            prop_assert!(!bits.is_damaged() && bits.at == bits.len);
+            prop_assert_eq!(read.value.to_bits(), value.to_bits());
+            prop_assert_eq!(Mixed { value: 0.0, ..read }, Mixed { value: 0.0, ..mixed });
+        }
+    }
+
+    #[test]
+    fn j56_bits_that_were_never_written_are_seen() {
+        let mut bits = Bits::default();
+        bits.put(0xEE, 8);
+        assert_eq!(ControllerState::read(&mut bits), ControllerState::default());
+        assert!(bits.is_damaged());
+        let mut bits = Bits::default();
+        bits.put(1, 1);
+        assert_eq!(f64::read(&mut bits), 0.0);
+        assert!(bits.is_damaged());
+    }
+}

@@ -1,0 +1,53 @@
+//! Priority of Stop and Pause, which take effect before earlier frames are executed (J-04).
+use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
+
+use crate::TrajectoryState;
+use crate::bit_codec::bit_codec;
+
+/// State of the urgent commands of a line, until it is the turn of their frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Priority {
+    /// Stops and Pauses that were accepted and have no record yet.
+    pub(super) stops: u8,
+    pub(super) pauses: u8,
+    /// The Stops and Pauses have cancelled an Execute.
+    pub(super) cancelled: bool,
+    /// A Stop has arrived on either line, accepted or not, so an upload that was begun before it is dropped (J-30). The flag is cleared by
+    /// the first event that was received after the Stop; the record of an earlier Stop does not clear it.
+    pub(super) stopped: bool,
+}
+
+bit_codec!(Priority { stops, pauses, cancelled, stopped });
+
+impl Priority {
+    /// Adds the number of urgent commands that were accepted.
+    pub fn accept(&mut self, command: UrgentCommand, count: u8) {
+        let accepted = self.accepted(command);
+        *accepted = accepted.saturating_add(count);
+    }
+
+    /// Returns the data status of an execution command that an urgent command has overtaken. A Stop or a Pause is reported as accepted in
+    /// two cases: it was accepted, or it has cancelled an Execute and the `trajectory` is in the commanded state.
+    pub fn overtaken(&mut self, exec: ExecCommand, trajectory: TrajectoryState) -> Result<(), DataStatus> {
+        let Some(command) = UrgentCommand::from_exec(exec) else {
+            self.cancelled = true;
+            return Err(DataStatus::NotAllowed);
+        };
+        let rests = match command {
+            UrgentCommand::Stop => TrajectoryState::Stop,
+            UrgentCommand::Pause => TrajectoryState::Pause,
+        };
+        let cancelled = core::mem::take(&mut self.cancelled) && trajectory == rests;
+        let accepted = self.accepted(command);
+        let acted = *accepted > 0;
+        *accepted = accepted.saturating_sub(1);
+        if acted || cancelled { Ok(()) } else { Err(DataStatus::NotAllowed) }
+    }
+
+    fn accepted(&mut self, command: UrgentCommand) -> &mut u8 {
+        match command {
+            UrgentCommand::Stop => &mut self.stops,
+            UrgentCommand::Pause => &mut self.pauses,
+        }
+    }
+}

@@ -1,0 +1,446 @@
+//! Parameters received from the host: gains, model and friction. Each is accepted completely or not at all (J-06).
+mod floats;
+mod frames;
+
+pub(crate) use frames::read_pid;
+use jtc_dynamics::{ArmModel, Dynamics};
+use jtc_wire::{DataStatus, missing_parameter};
+
+use crate::JOINTS;
+use crate::bit_codec::bit_codec;
+use crate::config::Config;
+use crate::defaults;
+use crate::gains::{FeltInertia, POSES, Trial};
+use crate::host::slices::{SliceOutcome, SliceProgress};
+use crate::motion::ControlParameters;
+use crate::parameters::{PidGains, TableOf};
+use crate::payload::{BlendState, PayloadBlend};
+
+/// Floats in the friction table of one joint. A tick checks or copies the table of one joint.
+const TABLE_FLOATS: usize = 20 + 20 + 400;
+
+/// Placeholder for a table that was not received; not in use.
+const NO_TABLE: TableOf<f32> =
+    TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
+
+/// Parameters in use (the defaults if the host has sent none), and a record of those that the host has sent.
+#[derive(Clone, Debug)]
+pub(crate) struct HostParameters {
+    /// Parameters that were received, one bit each ([`missing_parameter`]).
+    received: u8,
+    /// Parameters that were received since the start, even if they have been withdrawn since.
+    given: u8,
+    /// Model from which `dynamics` was computed.
+    model: ArmModel,
+    pub dynamics: Dynamics,
+    payload: PayloadBlend,
+    pub pid: [PidGains; JOINTS],
+    /// Inertia that the joints feel in the received model, and in the model that is being checked (J-71).
+    felt: FeltInertia,
+    looked_at: FeltInertia,
+    /// Trial of gains that were received under torque.
+    pub trial: Trial,
+    polynomial: [[f64; 6]; JOINTS],
+    /// Zeros until tables are received.
+    pub tables: [TableOf<f32>; JOINTS],
+    pub friction_is_table: bool,
+    /// Friction was received since the trajectory was checked.
+    pub friction_is_new: bool,
+}
+
+/// State of the parameters without their values, which are part of the arm.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HostParametersState {
+    received: u8,
+    given: u8,
+    friction_is_table: bool,
+    friction_is_new: bool,
+    payload: BlendState,
+    felt: FeltInertia,
+    trial: Trial,
+}
+
+bit_codec!(HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial });
+
+impl HostParameters {
+    /// Returns the state of the parameters, without their values.
+    pub fn state(&self) -> HostParametersState {
+        let Self { received, given, friction_is_table, friction_is_new, felt, trial, .. } = *self;
+        let payload = self.payload.state();
+        HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial }
+    }
+
+    /// Restores the state, with the payload in these settings.
+    pub fn restore(&mut self, state: &HostParametersState, config: &Config) {
+        let HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial } =
+            *state;
+        (self.felt, self.trial) = (felt, trial);
+        self.set_gravity(config);
+        self.payload.restore(&payload, &mut self.dynamics);
+        (self.received, self.given) = (received, given);
+        (self.friction_is_table, self.friction_is_new) = (friction_is_table, friction_is_new);
+    }
+
+    /// Returns for gains, model and polynomial whether each is the built-in one.
+    pub fn built_in(&self) -> [bool; 3] {
+        [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
+    }
+
+    /// Uses the built-in gains, model or polynomial if the value is `true`.
+    pub fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
+        if pid {
+            self.pid = defaults::PID;
+        }
+        if model {
+            self.model = defaults::MODEL;
+        }
+        if polynomial {
+            self.polynomial = defaults::POLYNOMIAL;
+        }
+    }
+
+    /// Creates the parameters in the state before any was received.
+    pub fn new(config: &Config) -> Self {
+        let dynamics = dynamics(&defaults::MODEL, config);
+        Self {
+            received: 0,
+            given: 0,
+            model: defaults::MODEL,
+            payload: PayloadBlend::none(&dynamics),
+            dynamics,
+            pid: defaults::PID,
+            felt: FeltInertia::NONE,
+            looked_at: FeltInertia::NONE,
+            trial: Trial::default(),
+            polynomial: defaults::POLYNOMIAL,
+            tables: [NO_TABLE; JOINTS],
+            friction_is_table: false,
+            friction_is_new: false,
+        }
+    }
+
+    /// Resets the parameters in place, as if none had been received.
+    pub fn begin(&mut self, config: &Config) {
+        self.model = defaults::MODEL;
+        self.set_gravity(config);
+        self.pid = defaults::PID;
+        self.polynomial = defaults::POLYNOMIAL;
+        self.tables.iter_mut().for_each(|table| *table = NO_TABLE);
+        self.forget();
+    }
+
+    /// Marks the parameters as not sent by a host, because they were loaded.
+    pub fn forget(&mut self) {
+        (self.received, self.given) = (0, 0);
+        (self.friction_is_table, self.friction_is_new) = (false, false);
+    }
+
+    /// Returns the byte of the status: a bit is 1 if the parameter is missing.
+    pub fn missing(&self) -> u8 {
+        !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
+    }
+
+    /// Returns `true` if each parameter was received since the start. Then no built-in value is in use that a host has not requested.
+    pub fn all_given(&self) -> bool {
+        self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
+    }
+
+    fn receive(&mut self, part: u8) {
+        self.received |= part;
+        self.given |= part;
+    }
+
+    /// Returns the friction tables, unless polynomials are in use.
+    pub fn tables_in_use(&self) -> Option<&[TableOf<f32>; JOINTS]> {
+        self.friction_is_table.then_some(&self.tables)
+    }
+
+    /// Returns the parameters that the control law needs.
+    pub fn control(&self) -> ControlParameters<'_> {
+        let (dynamics, pid, polynomial) = (&self.dynamics, &self.pid, &self.polynomial);
+        let on_trial = self.trial.is_on();
+        ControlParameters { dynamics, pid, polynomial, table: self.tables_in_use(), on_trial }
+    }
+
+    /// Returns `true` if the torque limits suffice to hold the arm at `position` (rad) (J-06).
+    pub fn holdable(&self, position: &[f64; JOINTS], config: &Config) -> bool {
+        holdable(&self.dynamics, position, config)
+    }
+
+    /// Withdraws the model, so that the host must send it again.
+    pub fn withdraw_model(&mut self) {
+        self.received &= !missing_parameter::MODEL;
+    }
+
+    /// Withdraws all parameters, so that the host must send them again.
+    pub fn withdraw_all(&mut self) {
+        self.received = 0;
+    }
+
+    /// Uses the gravity and the payload in these settings from now on.
+    pub fn set_gravity(&mut self, config: &Config) {
+        self.dynamics = dynamics(&self.model, config);
+        self.payload.forget();
+    }
+
+    /// Returns `true` if every joint can hold the payload in these settings at `at` (rad), or needs less torque than now (J-60). Also
+    /// returns `true` while it cannot be decided: before all positions are known and the model is received. The payload is checked again
+    /// when Init ends.
+    pub fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
+        let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
+        let next = dynamics(&self.model, config).gravity_torque(at);
+        let now = self.dynamics.gravity_torque(at);
+        // With this comparison NaN is too much. An absent joint holds nothing (J-53).
+        let held =
+            |j: usize| config.absent[j] || next[j].abs() <= config.joints[j].torque_max.max(now[j].abs());
+        (0..JOINTS).all(held)
+    }
+
+    /// Begins to blend the payload in these settings into the model, over half a second (J-60). `heavier`: its mass minus the mass of the
+    /// last one, kg.
+    pub fn change_payload(&mut self, config: &Config, heavier: f64) {
+        self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
+    }
+
+    /// Runs one tick of the payload blend. The arm is held or taught.
+    pub fn blend_payload(&mut self) {
+        self.payload.step(&mut self.dynamics);
+    }
+
+    /// Ends the blend in a tick without torque: the payload is added completely.
+    pub fn end_blend(&mut self) {
+        self.payload.end(&mut self.dynamics);
+    }
+
+    /// Returns the mass that the next [`blend_payload`](Self::blend_payload) adds, kg.
+    pub fn next_mass(&self) -> f64 {
+        self.payload.next_mass()
+    }
+
+    /// Returns the time until the payload is completely in the model, ms; 0 if it is.
+    pub fn blend_left_ms(&self) -> u16 {
+        self.payload.left_ms()
+    }
+
+    /// Returns `true` if the parameters received since the start are also within the bounds in these settings (J-06). For friction tables
+    /// see [`table_fits`](Self::table_fits).
+    pub fn fits(&self, config: &Config) -> bool {
+        let bounds = &config.parameter_bounds;
+        let has = |part: u8| self.given & part != 0;
+        let joints = || config.joints.iter();
+        let gains =
+            || self.pid.iter().zip(joints()).all(|(gains, joint)| bounds.check_gains(gains, joint).is_ok());
+        let friction = || self.friction_is_table || check_polynomials(&self.polynomial, config).is_ok();
+        (!has(missing_parameter::PID) || gains())
+            && (!has(missing_parameter::FRICTION) || friction())
+            && (!has(missing_parameter::MODEL) || bounds.check_masses(&self.model).is_ok())
+    }
+
+    /// Returns `true` if the friction table of the joint with this index is within the bounds. Also returns `true` if tables are not in
+    /// use.
+    pub fn table_fits(&self, j: usize, config: &Config) -> bool {
+        let table = self.tables_in_use().and_then(|tables| tables.get(j)).zip(config.joints.get(j));
+        table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
+    }
+
+    /// Checks gains against their bounds and, if the model is known, against the inertia of the joints (J-71).
+    pub fn check_pid(&self, gains: &[PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
+        for (gains, joint) in gains.iter().zip(&config.joints) {
+            config.parameter_bounds.check_gains(gains, joint)?;
+        }
+        let borne = self.missing() & missing_parameter::MODEL != 0 || self.felt.bears(gains, config);
+        borne.then_some(()).ok_or(DataStatus::IncorrectValue)
+    }
+
+    /// Runs one tick under torque after gains were received. Returns the gains of this tick while they are blended in. `held`: all joints
+    /// have settled, and none yields.
+    #[inline(never)]
+    pub fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
+        self.trial.step(held);
+        self.trial.blended(&self.pid)
+    }
+
+    /// Returns `true` if the joints of the model in use are heavy enough for the gains, with the present settings.
+    pub fn gains_are_borne(&self, config: &Config) -> bool {
+        self.felt.is_known() && self.felt.bears(&self.pid, config)
+    }
+
+    /// Returns `true` if the joints of the model that was checked last, accepted or not, are too light for the gains.
+    #[cfg(test)]
+    pub fn gains_were_too_much(&self, config: &Config) -> bool {
+        self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
+    }
+
+    /// Uses gains that have passed [`check_pid`](Self::check_pid).
+    pub fn put_pid(&mut self, gains: &[PidGains; JOINTS]) {
+        self.pid = *gains;
+        self.receive(missing_parameter::PID);
+    }
+
+    /// Computes the inertia of a model with these settings, one pose per slice (J-71). Then the model is refused if the received gains need
+    /// more inertia; otherwise `used` is called.
+    fn look_at(
+        &mut self,
+        model: &ArmModel,
+        progress: SliceProgress,
+        config: &Config,
+        used: impl FnOnce(&mut Self) -> Result<(), DataStatus>,
+    ) -> SliceOutcome {
+        let number = if let SliceProgress::Pose(number) = progress { number } else { 0 };
+        if number == 0 {
+            self.looked_at = FeltInertia::NONE;
+        }
+        if number < POSES {
+            self.looked_at.look(number, model, config);
+            return SliceOutcome::Unfinished(SliceProgress::Pose(number + 1));
+        }
+        let given = self.missing() & missing_parameter::PID == 0;
+        if given && !self.looked_at.bears(&self.pid, config) {
+            return SliceOutcome::Refused(DataStatus::IncorrectValue);
+        }
+        let looked_at = self.looked_at;
+        let outcome = used(self);
+        if outcome.is_ok() {
+            self.felt = looked_at;
+            self.trial.keep_if(|gains| looked_at.bears(gains, config));
+        }
+        outcome.into()
+    }
+
+    /// Computes the inertia of the model in use again, if other settings affect it (J-71).
+    pub fn look_again(&mut self, progress: SliceProgress, config: &Config, before: &Config) -> SliceOutcome {
+        let same = |j: usize| {
+            config.joints[j].rotor_inertia == before.joints[j].rotor_inertia
+                && config.position_range(j) == before.position_range(j)
+        };
+        if config.delay_ticks == before.delay_ticks && (0..JOINTS).all(same) {
+            return SliceOutcome::Done;
+        }
+        if self.missing() & missing_parameter::MODEL != 0 {
+            // The model is checked when it is received again.
+            self.felt = FeltInertia::NONE;
+            return SliceOutcome::Done;
+        }
+        let model = self.model;
+        self.look_at(&model, progress, config, |_| Ok(()))
+    }
+
+    /// Takes a model in slices. `at`: measured positions (rad), if all are known.
+    pub fn set_model(
+        &mut self,
+        model: &ArmModel,
+        progress: SliceProgress,
+        at: Option<&[f64; JOINTS]>,
+        config: &Config,
+    ) -> SliceOutcome {
+        if let SliceProgress::Pose(_) = progress {
+            return self.look_at(model, progress, config, |own| own.put_model(model, at, config));
+        }
+        match check_model(model, config) {
+            Ok(()) => SliceOutcome::Unfinished(SliceProgress::Pose(0)),
+            Err(status) => SliceOutcome::Refused(status),
+        }
+    }
+
+    /// Uses a model that has passed [`check_model`].
+    fn put_model(
+        &mut self,
+        model: &ArmModel,
+        at: Option<&[f64; JOINTS]>,
+        config: &Config,
+    ) -> Result<(), DataStatus> {
+        let dynamics = dynamics(model, config);
+        // Before all positions are known this cannot be decided. The model is checked again when Init ends.
+        if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
+            return Err(DataStatus::IncorrectValue);
+        }
+        (self.model, self.dynamics) = (*model, dynamics);
+        self.payload.forget();
+        self.receive(missing_parameter::MODEL);
+        Ok(())
+    }
+
+    pub fn take_default_polynomial(&mut self, config: &Config) -> Result<(), DataStatus> {
+        self.set_polynomial(&defaults::POLYNOMIAL, config)
+    }
+
+    fn set_polynomial(&mut self, polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result<(), DataStatus> {
+        check_polynomials(polynomial, config)?;
+        self.polynomial = *polynomial;
+        self.friction_received(false);
+        Ok(())
+    }
+
+    /// Takes the default tables in the same way.
+    pub fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
+        self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
+    }
+
+    /// Takes the table of one joint per tick. All tables are checked before the first one is copied, so that a refused table changes
+    /// nothing.
+    fn take_tables(
+        &mut self,
+        table: impl Fn(usize) -> Result<TableOf<f32>, DataStatus>,
+        progress: SliceProgress,
+        config: &Config,
+    ) -> SliceOutcome {
+        match progress {
+            SliceProgress::TableCopy(j) => {
+                if let (Some(slot), Ok(table)) = (self.tables.get_mut(j), table(j)) {
+                    *slot = table;
+                }
+                if j + 1 < JOINTS {
+                    return SliceOutcome::Unfinished(SliceProgress::TableCopy(j + 1));
+                }
+                self.friction_received(true);
+                SliceOutcome::Done
+            }
+            progress => {
+                let j = if let SliceProgress::TableCheck(j) = progress { j } else { 0 };
+                let table = table(j).and_then(|table| {
+                    let joint = config.joints.get(j).ok_or(DataStatus::IncorrectValue)?;
+                    config.parameter_bounds.check_table(&table, joint).map_err(DataStatus::from)
+                });
+                match table {
+                    Err(status) => SliceOutcome::Refused(status),
+                    Ok(()) if j + 1 < JOINTS => SliceOutcome::Unfinished(SliceProgress::TableCheck(j + 1)),
+                    Ok(()) => SliceOutcome::Unfinished(SliceProgress::TableCopy(0)),
+                }
+            }
+        }
+    }
+
+    fn friction_received(&mut self, table: bool) {
+        self.friction_is_table = table;
+        self.friction_is_new = true;
+        self.receive(missing_parameter::FRICTION);
+    }
+}
+
+fn check_model(model: &ArmModel, config: &Config) -> Result<(), DataStatus> {
+    model.check().map_err(|_| DataStatus::IncorrectValue)?;
+    Ok(config.parameter_bounds.check_masses(model)?)
+}
+
+fn check_polynomials(polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result<(), DataStatus> {
+    for (coefficients, joint) in polynomial.iter().zip(&config.joints) {
+        config.parameter_bounds.check_polynomial(coefficients, joint)?;
+    }
+    Ok(())
+}
+
+/// Returns the dynamics of a model with the gravity and the payload in these settings.
+#[inline(never)]
+fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
+    Dynamics::with_payload(model, config.gravity, &config.payload)
+}
+
+/// Returns `true` if the torque limits suffice to hold an arm with these dynamics at `position` (rad) (J-06).
+fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> bool {
+    let gravity = dynamics.gravity_torque(position);
+    // With this comparison NaN is too much. An absent joint holds nothing (J-53).
+    (0..JOINTS).all(|j| config.absent[j] || gravity[j].abs() <= config.joints[j].torque_max)
+}
+
+#[cfg(test)]
+mod tests;

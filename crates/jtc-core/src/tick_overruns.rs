@@ -1,0 +1,78 @@
+//! Late and missing ticks (J-12). A few are tolerated; ten within a second are a failure of the device.
+use crate::bit_codec::bit_codec;
+
+/// Number of late ticks that is a failure.
+const COUNT: usize = 10;
+/// Length of the window, ms: the first and the last of these ticks must be less than this apart.
+const WINDOW_MS: u64 = 1_000;
+
+/// Times of the last late or missing ticks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TickOverruns {
+    now_ms: u64,
+    /// The last times, in a ring. Empty slots have times that are far enough in the past.
+    at_ms: [u64; COUNT],
+    next: usize,
+}
+
+bit_codec!(TickOverruns { now_ms, at_ms, next });
+
+impl Default for TickOverruns {
+    fn default() -> Self {
+        Self { now_ms: WINDOW_MS, at_ms: [0; COUNT], next: 0 }
+    }
+}
+
+impl TickOverruns {
+    /// Records one tick, before which `missed` ticks were missing or late. Returns `true` if there have been too many.
+    pub fn count(&mut self, missed: u16) -> bool {
+        self.now_ms += 1 + u64::from(missed);
+        let mut too_many = false;
+        for _ in 0..usize::from(missed).min(COUNT) {
+            if let Some(slot) = self.at_ms.get_mut(self.next) {
+                *slot = self.now_ms;
+            }
+            self.next = (self.next + 1) % COUNT;
+            // This slot now holds the oldest of the last ten times.
+            too_many |= self.at_ms.get(self.next).is_some_and(|oldest| self.now_ms - oldest < WINDOW_MS);
+        }
+        too_many
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the tick in which there are too many late ticks, if every `n`-th tick comes after `missed` missing ones.
+    fn until_too_many(n: u32, missed: u16) -> Option<u32> {
+        let mut late = TickOverruns::default();
+        (1..20_000).find(|tick| late.count(if tick % n == 0 { missed } else { 0 }))
+    }
+
+    #[test]
+    fn j12_ten_late_ticks_within_a_second_are_too_many() {
+        assert_eq!(until_too_many(1, 1), Some(10));
+        assert_eq!(until_too_many(2, 1), Some(20), "every second or third one");
+        assert_eq!(until_too_many(100, 1), Some(1000), "the tenth 909 ms after the first");
+        // A late tick every 112 ms: the first and the tenth are 1008 ms apart.
+        assert_eq!(until_too_many(111, 1), None);
+        assert_eq!(until_too_many(109, 1), Some(1090));
+        // Each of several ticks that are missing at once is counted.
+        assert_eq!(until_too_many(50, 5), Some(100));
+        assert_eq!(until_too_many(1_500, 9), None);
+        assert_eq!(until_too_many(1_500, 10), Some(1_500));
+        assert_eq!(until_too_many(1_500, u16::MAX), Some(1_500));
+    }
+
+    #[test]
+    fn j12_ten_late_ticks_in_exactly_a_second_are_borne() {
+        // The first and the ninth late tick are 16 ms apart. The tenth comes 2 ms after the last of the ticks `between`, which are in time.
+        for (between, too_many) in [(981, true), (982, false)] {
+            let mut late = TickOverruns::default();
+            assert!(!(0..9).any(|_| late.count(1)));
+            assert!(!(0..between).any(|_| late.count(0)));
+            assert_eq!(late.count(1), too_many, "{} ms", 18 + between);
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! Check of a board before it is flashed: the state of its controller, and whether it is safe to stop the controller.
+//!
+//! A flash resets the processor. The drives then receive no more frames, and an arm that they hold falls. So a board whose
+//! controller reports torque is never flashed. If the report is incomplete, or may come from another controller, an
+//! operator must confirm the flash.
+
+use std::time::Duration;
+
+use jtc_wire::{Code, ControllerState, Info, Joint, NodeState, Status, StoreState, can_flag};
+
+use super::drive::{has_two_supplies, same_board};
+use super::{Drive, FirmwareError, Fit, Image};
+use crate::error::LinkError;
+use crate::port::Port;
+use crate::session::{Session, Timeouts};
+
+/// If no status arrives for this time, no controller runs on the line. A controller sends a status every 40 ms.
+const SILENT: Duration = Duration::from_millis(1_500);
+
+/// Report of the controller on a serial line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answers {
+    /// No readable data: the board has no firmware, another firmware, or another rate.
+    Nothing {
+        /// Number of bytes received.
+        bytes: u64,
+    },
+    /// A controller answers.
+    Controller {
+        /// State of the controller.
+        state: Code<ControllerState>,
+        /// `true` if the arm has torque.
+        torque: bool,
+        /// Joints that do not answer the controller, so that their torque is unknown.
+        silent: Vec<Joint>,
+        /// `true` if the gripper is on, so that it may hold a part.
+        grips: bool,
+        /// Identity of the controller. `None` if it has no extensions, or if the report was not understood.
+        info: Option<Box<Info>>,
+    },
+}
+
+/// Serial line over which the board was asked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asked {
+    /// Name of the port.
+    pub port: String,
+    /// `true` if line and drive belong to one USB device, and so to one board. `None` if the operating system does not
+    /// know.
+    pub same_device: Option<bool>,
+    /// Report of the controller on the line.
+    pub answers: Answers,
+}
+
+impl Asked {
+    fn info(&self) -> Option<&Info> {
+        match &self.answers {
+            Answers::Controller { info, .. } => info.as_deref(),
+            Answers::Nothing { .. } => None,
+        }
+    }
+
+    /// Returns `true` if the line belongs to the board with the drive.
+    fn is_own(&self) -> bool {
+        self.same_device == Some(true)
+    }
+
+    /// Returns the reasons why the flash needs a confirmation. This method does not check if the line belongs to the
+    /// board.
+    fn doubts(&self) -> Option<String> {
+        match &self.answers {
+            Answers::Nothing { bytes: 0 } => None,
+            Answers::Nothing { .. } => Some(format!(
+                "{}: bytes arrive, and no status can be read: something runs at another rate (--baud).",
+                self.port
+            )),
+            Answers::Controller { silent, grips, .. } => {
+                let joints = silent.iter().map(Joint::to_string).collect::<Vec<_>>().join(", ");
+                let joints = (!silent.is_empty())
+                    .then(|| format!("{}: no answer from {joints}: torque is not known there.", self.port));
+                let gripper = grips.then(|| {
+                    format!("{}: the gripper is on, and a part that it holds is dropped.", self.port)
+                });
+                let doubts: Vec<String> = joints.into_iter().chain(gripper).collect();
+                (!doubts.is_empty()).then(|| doubts.join(" "))
+            }
+        }
+    }
+}
+
+/// Facts about a board before it is flashed: the report on each line that was asked. Without lines, no controller was asked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Preflight {
+    /// Lines that were asked.
+    pub lines: Vec<Asked>,
+}
+
+impl Preflight {
+    /// Returns the identities of the controllers on the lines of the board itself.
+    pub fn own_info(&self) -> impl Iterator<Item = &Info> {
+        self.lines.iter().filter(|line| line.is_own()).filter_map(Asked::info)
+    }
+
+    /// Returns the identity of the board's own controller, or, if it is unknown, of another controller that was asked.
+    pub fn info(&self) -> Option<&Info> {
+        self.own_info().next().or_else(|| self.lines.iter().find_map(Asked::info))
+    }
+
+    /// Returns `true` if the board stores an arm, which a flash might remove.
+    pub fn stored_arm(&self) -> Option<bool> {
+        self.info().map(|info| info.store == StoreState::Stored)
+    }
+
+    /// Returns the statement that an operator must confirm before the board is flashed with this image. Returns `None` if
+    /// the board's own controller reports that the arm has no torque, that each joint answers, and that the gripper is off.
+    pub fn to_confirm(&self, image: &Image) -> Option<String> {
+        let reports = |line: &Asked| matches!(line.answers, Answers::Controller { .. });
+        let mut doubts: Vec<String> = self.lines.iter().filter_map(Asked::doubts).collect();
+        if !self.lines.iter().any(|line| line.is_own() && reports(line)) {
+            let who = match self.lines.iter().find(|line| reports(line)) {
+                Some(line) => format!(
+                    "The controller at {} reports that its arm has no torque, but not whether it is the board with this drive.",
+                    line.port
+                ),
+                None => "No controller reports what the board does.".to_owned(),
+            };
+            doubts.insert(0, who);
+        }
+        if doubts.is_empty() {
+            return None;
+        }
+        doubts.push("Flashing resets the board, and an arm that it holds falls.".into());
+        if !image.is_whole() {
+            doubts.push("That the file is not cut short cannot be proved before it is written.".into());
+        }
+        doubts.push(
+            "No file reports how its safety wires are (PD3 in and PD4 out, or swapped): are they as on this board? Is its arm \
+             supported, and are its drives without power?"
+                .into(),
+        );
+        Some(doubts.join(" "))
+    }
+}
+
+/// Statements that the operator has confirmed beforehand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Permissions {
+    /// A drive whose board is unknown belongs to the image's board.
+    pub assume_board: bool,
+    /// The solder bridges of the board are set for the core supply that the image needs.
+    pub accept_supply: bool,
+}
+
+/// Requests the present state from the controller on a line.
+///
+/// # Errors
+///
+/// [`FirmwareError::Port`] if the port is lost.
+pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError> {
+    session.timeouts = Timeouts { status: SILENT, confirmation: Duration::from_millis(300), tries: 3 };
+    let before = session.statistics().bytes_received;
+    let silent =
+        |session: &Session<P>| Ok(Answers::Nothing { bytes: session.statistics().bytes_received - before });
+    if answered(session.poll(SILENT))?.flatten().is_none() {
+        return silent(session);
+    }
+    // The statuses may have been buffered for minutes while the operator was asked. Waiting for this answer skips them.
+    let info = answered(session.info())?.flatten().map(Box::new);
+    match answered(session.fresh_status())? {
+        Some(status) => Ok(controller(&status, info)),
+        None => silent(session),
+    }
+}
+
+/// Returns the result of a request, or `None` if no usable answer arrived. A lost port is an error.
+fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(LinkError::Port(e)) => Err(FirmwareError::Port(e)),
+        Err(_) => Ok(None),
+    }
+}
+
+fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
+    let flag = |joint: &Joint| status.can_current & can_flag::no_answer(joint.index()) != 0;
+    // All joints begin in Start. A joint that is still in this state has not answered yet.
+    let begins = |joint: &Joint| status.joints[joint.index()].state == NodeState::START;
+    let grips = status.gripper.is_some_and(|gripper| gripper.pump != 0 || !is_idle(gripper.state));
+    Answers::Controller {
+        state: status.state,
+        torque: has_torque(status),
+        silent: Joint::ALL.into_iter().filter(|joint| flag(joint) || begins(joint)).collect(),
+        grips,
+        info,
+    }
+}
+
+/// Returns `true` if the arm has or may have torque. This is derived from the states of the controller and the drives.
+fn has_torque(status: &Status) -> bool {
+    let idle = [ControllerState::Init, ControllerState::Error].into_iter().any(|idle| status.state == idle);
+    !idle || status.joints.iter().any(|joint| !is_idle(joint.state))
+}
+
+/// Returns `true` if the motor of this node is off. Returns `false` in the transitions to and from *enabled*, in the
+/// reaction to a fault, and in states of later drives that this program does not know, because the motor may hold, align or
+/// calibrate then.
+fn is_idle(state: NodeState) -> bool {
+    [
+        NodeState::START,
+        NodeState::START_TO_INIT,
+        NodeState::INIT,
+        NodeState::INIT_TO_READY,
+        NodeState::READY,
+        NodeState::FAULT,
+    ]
+    .contains(&state)
+}
+
+/// Checks that this image may be written to the board of this drive.
+///
+/// # Errors
+///
+/// [`FirmwareError::HasTorque`], [`FirmwareError::OtherBoard`], [`FirmwareError::OtherController`],
+/// [`FirmwareError::UnnamedBoard`] and [`FirmwareError::Supply`]: no byte was written.
+pub fn may_flash(
+    image: &Image,
+    drive: &Drive,
+    before: &Preflight,
+    permissions: Permissions,
+) -> Result<(), FirmwareError> {
+    let board = &image.record().board;
+    for line in &before.lines {
+        if let Answers::Controller { state, torque: true, .. } = line.answers {
+            return Err(FirmwareError::HasTorque { port: line.port.clone(), state });
+        }
+    }
+    for line in &before.lines {
+        if let Some(info) = line.info().filter(|info| same_board(info.board.as_str()) != same_board(board)) {
+            let (port, runs) = (line.port.clone(), info.board.as_str().to_owned());
+            return Err(FirmwareError::OtherController { port, runs, board: board.clone() });
+        }
+    }
+    let fit = drive.fit(board);
+    if fit == Fit::Other {
+        let named = drive.board().map(|(name, _)| name.to_owned()).unwrap_or_default();
+        return Err(FirmwareError::OtherBoard { drive: drive.path.clone(), named, board: board.clone() });
+    }
+    // A controller on the USB device of the drive also identifies the board.
+    let named = fit == Fit::Same || before.own_info().next().is_some();
+    if !named && !permissions.assume_board {
+        return Err(FirmwareError::UnnamedBoard {
+            drive: drive.path.clone(),
+            label: drive.label.clone(),
+            board: board.clone(),
+        });
+    }
+    // A program that runs shows that the board has the supply that it needs. The solder bridges cannot be read.
+    let mut runs = before.own_info().map(|info| info.board.as_str());
+    let runs_this = runs.next().is_some_and(|runs| runs == board) && runs.all(|runs| runs == board);
+    let supply_known = !has_two_supplies(board) || runs_this;
+    if !supply_known && !permissions.accept_supply {
+        let runs = before.own_info().find(|info| info.board.as_str() != board);
+        let runs = runs.map(|info| info.board.as_str().to_owned());
+        return Err(FirmwareError::Supply { board: board.clone(), runs });
+    }
+    Ok(())
+}

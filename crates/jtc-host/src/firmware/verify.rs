@@ -1,0 +1,277 @@
+//! Verification after an image was copied to a drive: the report of the drive, and the flash report of the running program.
+
+use std::fmt;
+use std::thread::sleep;
+use std::time::Duration;
+
+use jtc_wire::{Info, Program, StoreState};
+
+use super::{Drive, FirmwareError, Image, Places, Written};
+use crate::error::LinkError;
+use crate::port::{Port, PortError};
+use crate::session::{Session, Timeouts};
+
+/// Time after its start in which a device reads its flash (J-67).
+const READ_WITHIN: Duration = Duration::from_secs(3);
+/// Tolerance between two clocks: a relative difference, and a delay until the start is observed.
+const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
+
+/// Time after the copying in which the previous program may still run, until the ST-LINK stops it.
+const OTHER_STOPS: Duration = Duration::from_secs(10);
+/// Longest wait for a controller to read its flash, on the clock of the line.
+const READS_NOW: Duration = Duration::from_secs(5);
+
+/// Waiting times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Total wait for the controller to start with the image.
+    pub wait: Duration,
+    /// Pause between two attempts.
+    pub pause: Duration,
+}
+
+impl Default for Limits {
+    /// Returns 120 s and 250 ms. The ST-LINK needs half a minute for a megabyte, and an operating system needs some more
+    /// seconds to mount a drive.
+    fn default() -> Self {
+        Self { wait: Duration::from_secs(120), pause: Duration::from_millis(250) }
+    }
+}
+
+/// Function that opens the serial port of the board.
+pub type OpenPort<'a> = dyn FnMut() -> Result<Box<dyn Port>, PortError> + 'a;
+
+/// Behaviour of the drive after the copying.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriveAfter {
+    /// The drive vanished and came back, which is normal after an accepted image.
+    CameBack,
+    /// The drive vanished and has not come back. This happens on a system that does not mount drives automatically.
+    Gone,
+    /// The drive was present all the time.
+    Stayed,
+}
+
+impl fmt::Display for DriveAfter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::CameBack => "the drive vanished and came back without a report",
+            Self::Gone => "the drive vanished, and has not come back",
+            Self::Stayed => "the drive has not vanished, as it does when it takes an image",
+        })
+    }
+}
+
+/// Result of the verification that a controller runs the image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verification {
+    /// Identity of the controller.
+    pub info: Info,
+    /// Report of the controller about its flash.
+    pub program: Program,
+    /// Behaviour of the drive.
+    pub drive: DriveAfter,
+    /// Time from the copying to the verification.
+    pub took: Duration,
+}
+
+impl Verification {
+    /// Returns `true` if the board stores an arm.
+    pub fn stored_arm(&self) -> bool {
+        self.info.store == StoreState::Stored
+    }
+}
+
+/// Observes a drive again and again.
+struct Watch<'a> {
+    places: &'a Places,
+    drive: &'a Drive,
+    written: &'a Written,
+    seen: DriveAfter,
+}
+
+impl Watch<'_> {
+    /// Returns an error if the drive reports one.
+    fn look(&mut self) -> Result<(), FirmwareError> {
+        let now = self.places.again(self.drive);
+        self.seen = match (&now, self.seen) {
+            (None, _) => DriveAfter::Gone,
+            (Some(now), DriveAfter::Stayed) if now.path == self.drive.path && now.usb == self.drive.usb => {
+                DriveAfter::Stayed
+            }
+            (Some(_), _) => DriveAfter::CameBack,
+        };
+        let Some(now) = now else { return Ok(()) };
+        // The drive shows an old report until it vanishes. Such a report is not about this image.
+        let stale = |text: &String| {
+            self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
+        };
+        match now.failure() {
+            Some(text) if !stale(&text) => Err(FirmwareError::Refused { drive: now.path, text }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Waits until the drive has come back, or until the time limit. Used for boards without a serial line. The result does not
+/// prove that the image runs.
+///
+/// # Errors
+///
+/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] if the drive has not vanished, or if it has not come back and
+/// the operating system could not confirm that all bytes were written.
+pub fn wait_for_drive(
+    places: &Places,
+    drive: &Drive,
+    written: &Written,
+    limits: Limits,
+) -> Result<DriveAfter, FirmwareError> {
+    let mut watch = Watch { places, drive, written, seen: DriveAfter::Stayed };
+    loop {
+        watch.look()?;
+        if watch.seen == DriveAfter::CameBack || written.began.elapsed() >= limits.wait {
+            break;
+        }
+        sleep(limits.pause);
+    }
+    let (seen, doubt) = (watch.seen, written.doubt.clone());
+    match seen {
+        DriveAfter::CameBack => Ok(seen),
+        // On a system that does not mount drives automatically, the drive does not come back.
+        DriveAfter::Gone if doubt.is_none() => Ok(seen),
+        DriveAfter::Gone | DriveAfter::Stayed => Err(FirmwareError::NotTaken { seen, doubt }),
+    }
+}
+
+/// Waits until the controller on the line has started with the image, and verifies the image.
+///
+/// # Errors
+///
+/// [`FirmwareError::Refused`] if the drive reports a failure, [`FirmwareError::OtherProgram`] if another program runs,
+/// [`FirmwareError::NotReported`] if the program does not report its flash, [`FirmwareError::NotStarted`] if no program
+/// started in time.
+pub fn verify_program(
+    places: &Places,
+    image: &Image,
+    drive: &Drive,
+    written: &Written,
+    open: &mut OpenPort<'_>,
+    limits: Limits,
+) -> Result<Verification, FirmwareError> {
+    let mut watch = Watch { places, drive, written, seen: DriveAfter::Stayed };
+    loop {
+        watch.look()?;
+        let last = match open().map_err(LinkError::from).and_then(|port| ask(port, limits)) {
+            Ok(Some(info)) if !started_since(&info, written.began.elapsed()) => {
+                "the program of before still runs".into()
+            }
+            Ok(Some(info)) if still_reads(&info) => "it still reads its flash".into(),
+            Ok(Some(info)) => match compare(image, &info) {
+                Ok(program) => {
+                    // The drive may have come back in the meantime, and it may contain a report.
+                    watch.look()?;
+                    return Ok(Verification {
+                        info,
+                        program,
+                        drive: watch.seen,
+                        took: written.began.elapsed(),
+                    });
+                }
+                Err(error) if settled(&watch, limits) => return Err(error),
+                Err(error) => error.to_string(),
+            },
+            Ok(None) => "a controller without extensions answers".into(),
+            Err(e) => e.to_string(),
+        };
+        if written.began.elapsed() >= limits.wait {
+            let waited_s = written.began.elapsed().as_secs_f64();
+            return Err(FirmwareError::NotStarted { waited_s, last, doubt: written.doubt.clone() });
+        }
+        sleep(limits.pause);
+    }
+}
+
+/// Returns `true` if the running program will not be replaced any more. The previous program restarts before the ST-LINK
+/// begins to write, and after a reset without a write.
+fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
+    let written = watch.written;
+    watch.seen == DriveAfter::CameBack
+        || written.ended.elapsed() >= OTHER_STOPS
+        || written.began.elapsed() >= limits.wait
+}
+
+/// Returns `true` if the device has started within this time.
+fn started_since(info: &Info, time: Duration) -> bool {
+    let (share, late) = CLOCKS_DIFFER;
+    Duration::from_millis(info.uptime_ms) + time.mul_f64(share) + late < time
+}
+
+/// Returns `true` if the device has just started and may still be reading its flash.
+fn still_reads(info: &Info) -> bool {
+    info.program.is_none() && Duration::from_millis(info.uptime_ms) < READ_WITHIN
+}
+
+/// Returns the identity of the controller after it has read its flash, at the latest after five seconds. Returns `None` for
+/// a device without extensions.
+///
+/// # Errors
+///
+/// Returns the errors of [`Session::info`].
+pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Info>, LinkError> {
+    let end = session.now() + READS_NOW;
+    loop {
+        match session.info()? {
+            Some(info) if still_reads(&info) && session.now() < end => drop(session.next_status()?),
+            info => return Ok(info),
+        }
+    }
+}
+
+/// Returns the identity of the controller. The timeouts are short, because the caller repeats the request.
+fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
+    let mut session = Session::new(port);
+    session.timeouts = Timeouts { status: limits.pause * 4, confirmation: limits.pause * 2, tries: 2 };
+    // While the ST-LINK holds the processor, a request would only time out.
+    session.next_status()?;
+    session.info()
+}
+
+/// Checks that the program that the controller reports is the image (J-67).
+///
+/// # Errors
+///
+/// [`FirmwareError::OtherProgram`] and [`FirmwareError::NotReported`].
+pub fn compare(image: &Image, info: &Info) -> Result<Program, FirmwareError> {
+    let runs = format!("{} on {}", info.firmware_and_revision(), info.board);
+    let Some(program) = info.program else {
+        return Err(FirmwareError::NotReported { runs });
+    };
+    match image.is_what_runs(program) {
+        Ok(()) => Ok(program),
+        Err(why) => Err(FirmwareError::OtherProgram { path: image.path().to_owned(), runs, why }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_start_before_the_copying_is_none_since() {
+        let since = |uptime_ms, time_s| {
+            started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
+        };
+        // The device started just before the copying began, and its clock is 5 % slow.
+        assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
+        assert!(since(1_000, 10.0) && since(0, 0.4));
+    }
+
+    #[test]
+    fn j67_a_device_that_has_just_started_may_still_read_its_flash() {
+        let program = Some(Program { bytes: 1, crc32: 1 });
+        let reads = |uptime_ms, program| still_reads(&Info { uptime_ms, program, ..Info::default() });
+        assert!(reads(0, None) && reads(2_999, None));
+        assert!(!reads(3_000, None) && !reads(0, program));
+    }
+}

@@ -1,0 +1,98 @@
+//! Copying an image to the drive of a board.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+use std::time::Instant;
+
+use super::drive::volume;
+use super::{Drive, FirmwareError, Image};
+
+/// Name of the file on the drive. The ST-LINK consumes the bytes when they arrive, so the file does not remain.
+const FILE: &str = "openjtc.bin";
+/// Number of bytes per write. Small writes make it possible to show the progress. The operating system decides in which
+/// order the bytes reach the drive. A flush after each write would also write the length of a partial file into the
+/// directory, and the ST-LINK might consider that part the whole file. The flash report of the program reveals damage from
+/// a wrong order.
+const PIECE: usize = 32 * 1024;
+
+/// Image that was passed to the drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Written {
+    /// Time when the copying began. A controller that started before this time runs the previous program.
+    pub began: Instant,
+    /// Time when this computer had passed on all bytes.
+    pub ended: Instant,
+    /// Content of `FAIL.TXT` before the copying.
+    pub failure_before: Option<String>,
+    /// Reason why the operating system could not confirm that all bytes were written. The drive vanishes after the last
+    /// byte, and some systems report this as an error. Only the content of the flash shows if the write succeeded.
+    pub doubt: Option<String>,
+}
+
+/// Copies the image to the drive. `progress` receives the number of bytes so far. Writes nothing if the drive was removed
+/// in the meantime, so that its folder is on a disk of this computer.
+///
+/// # Errors
+///
+/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`]: no byte was written. [`FirmwareError::DriveFull`] and
+/// [`FirmwareError::NotWritten`]: the board has the previous program, or only a part of one.
+pub fn write_image(
+    drive: &Drive,
+    image: &Image,
+    progress: &mut dyn FnMut(usize),
+) -> Result<Written, FirmwareError> {
+    let failure_before = drive.failure();
+    let path = drive.path.join(FILE);
+    let began = Instant::now();
+    let full = || FirmwareError::DriveFull {
+        drive: drive.path.clone(),
+        bytes: image.bytes().len(),
+        failure: drive.failure(),
+    };
+    let failed = |source: io::Error, written: usize| match source.kind() {
+        ErrorKind::StorageFull => full(),
+        _ => FirmwareError::NotWritten { path: path.clone(), written, source },
+    };
+    let mut file = open(drive, &path).map_err(|error| match error {
+        FirmwareError::NotOpened { source, .. } if source.kind() == ErrorKind::StorageFull => full(),
+        error => error,
+    })?;
+    let mut written = 0;
+    for piece in image.bytes().chunks(PIECE) {
+        file.write_all(piece).map_err(|e| failed(e, written))?;
+        written += piece.len();
+        progress(written);
+    }
+    let doubt = match flushed(&file) {
+        Err(e) if e.kind() == ErrorKind::StorageFull => return Err(failed(e, written)),
+        Err(e) => Some(e.to_string()),
+        Ok(()) => None,
+    };
+    Ok(Written { began, ended: Instant::now(), failure_before, doubt })
+}
+
+/// Creates the file on the drive. A file that was created on another file system instead is removed.
+fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
+    let gone = || FirmwareError::Changed { what: format!("{}: the drive has gone", drive.path.display()) };
+    let is_drive = |found: &fs::Metadata| drive.volume.is_none() || volume(found) == drive.volume;
+    if !drive.is_there() || !fs::metadata(&drive.path).is_ok_and(|found| is_drive(&found)) {
+        return Err(gone());
+    }
+    let not_opened =
+        |source| FirmwareError::NotOpened { path: path.to_owned(), device: drive.device.clone(), source };
+    let file = OpenOptions::new().write(true).create(true).truncate(true).open(path).map_err(not_opened)?;
+    // The drive may have been removed since the first check. The open file cannot move to another file system.
+    if file.metadata().is_ok_and(|found| !found.is_file() || is_drive(&found)) {
+        return Ok(file);
+    }
+    drop(file);
+    // The file is empty and on a disk of this computer.
+    let _ = fs::remove_file(path);
+    Err(gone())
+}
+
+/// Waits until the bytes have left this computer.
+fn flushed(file: &File) -> io::Result<()> {
+    file.sync_all()
+}

@@ -1,0 +1,93 @@
+//! Path through the waypoints of a file. The path goes through joint positions, or along lines and arcs of the flange.
+
+use super::kinematics::Route;
+use super::{Aside, PlanError, Planned, Planner, Waypoint, corners, furthest_aside};
+use crate::arm::Arm;
+use crate::waypoints::{WaypointError, WaypointFile};
+
+/// A larger deviation of the flange from a straight line is reported, m.
+const ASIDE_M: f64 = 5e-4;
+
+/// Options for the path through waypoints.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WayOptions {
+    /// If `true`, the flange moves on a straight line on each leg for which the file does not specify the motion.
+    pub line: bool,
+    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. With 0 the arm stops at each
+    /// waypoint.
+    pub blend: f64,
+    /// Rounding of the corner between two lines or arcs, m. With 0 the arm stops there.
+    pub blend_m: f64,
+}
+
+/// Path of a plan.
+#[derive(Debug)]
+pub struct WaypointPath<'a> {
+    file: &'a WaypointFile,
+    options: WayOptions,
+    course: Course,
+}
+
+#[derive(Debug)]
+enum Course {
+    Joints(Vec<Waypoint>),
+    /// Alternative routes (the fastest is used), and the times of the waypoints.
+    Lines(Vec<Route>, Vec<Option<f64>>),
+}
+
+impl<'a> WaypointPath<'a> {
+    /// Returns the path of an arm through the waypoints of a file.
+    ///
+    /// # Errors
+    ///
+    /// Returns the errors of [`WaypointFile::positions`] and [`WaypointFile::route`], and [`PlanError::Blend`].
+    pub fn of(file: &'a WaypointFile, arm: &Arm, options: WayOptions) -> Result<Self, WaypointError> {
+        let WayOptions { line, blend, blend_m } = options;
+        corners::within_reason(blend, blend_m)?;
+        let course = if file.has_lines(line) {
+            let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
+            // A stop is within every blend. Near a sharp corner it may be faster than a small blend, so both routes are
+            // planned.
+            let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
+            Course::Lines([rounded].into_iter().chain(sharp).collect(), times)
+        } else {
+            Course::Joints(file.positions(arm)?)
+        };
+        Ok(Self { file, options, course })
+    }
+
+    /// Returns `true` if the flange moves on a line or an arc on any leg.
+    pub fn has_lines(&self) -> bool {
+        matches!(self.course, Course::Lines(..))
+    }
+
+    /// Plans the motion along the path.
+    ///
+    /// # Errors
+    ///
+    /// Returns the errors of [`Planner::through`] and [`Planner::on_route`].
+    pub fn planned(&self, planner: &Planner) -> Result<Planned, PlanError> {
+        let (routes, times) = match &self.course {
+            Course::Joints(waypoints) => return planner.through(waypoints),
+            Course::Lines(routes, times) => (routes, times),
+        };
+        let seconds = |planned: &Planned| planned.trajectory.duration_s();
+        let mut fastest = None::<Result<Planned, PlanError>>;
+        for route in routes {
+            let planned = planner.on_route(route, times);
+            fastest = match (fastest, planned) {
+                (Some(Ok(before)), Ok(planned)) if seconds(&planned) < seconds(&before) => Some(Ok(planned)),
+                (Some(Err(_)) | None, planned) => Some(planned),
+                (before, _) => before,
+            };
+        }
+        fastest.unwrap_or(Err(PlanError::Nowhere { count: 0 }))
+    }
+
+    /// Returns the largest deviation of the flange from the straight line between two of its poses, if above 0.5 mm.
+    pub fn off_the_line(&self, planned: &Planned, arm: &Arm) -> Option<Aside> {
+        // With the option `line`, the user has chosen joint space for each remaining leg.
+        let legs = if self.options.line { Vec::new() } else { self.file.legs_between_flange_poses() };
+        furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)
+    }
+}

@@ -1,0 +1,88 @@
+//! Capture of the arm's pose at rest.
+
+use std::time::Duration;
+
+use jtc_wire::{Joint, Status};
+
+use super::Session;
+use crate::error::{Error, StateError};
+use crate::port::Port;
+use crate::{labels, sample};
+
+/// Movement within [`WATCHED`] below which the arm is at rest, rad. The slowest jog moves twice as far.
+const STILL: f64 = 1.2e-3;
+/// Time for which the arm is observed. A slow jog does not appear in any field of the status.
+const WATCHED: Duration = Duration::from_millis(250);
+
+impl<P: Port> Session<P> {
+    /// Observes the arm and returns its status if it is at rest. The positions in the status can be saved as a pose.
+    ///
+    /// # Errors
+    ///
+    /// [`StateError::Moving`] if the arm moves, [`StateError::NotMeasured`] if the position of a joint is unknown; the
+    /// errors of [`Session::next_status`].
+    pub fn standing(&mut self) -> Result<Status, Error> {
+        let begin = self.fresh_status()?;
+        let (start, mut now) = (self.now(), begin);
+        loop {
+            stands(&begin, &now)?;
+            if self.now() - start >= WATCHED {
+                return Ok(now);
+            }
+            now = self.next_status()?;
+        }
+    }
+}
+
+fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
+    let moving = |what: String| Err(StateError::Moving { what });
+    // This also detects the beginning, a reversal and the end of a motion, at which the speed is zero for a moment.
+    if now.is_executing() {
+        return moving("the arm is on the path of a trajectory".into());
+    }
+    for joint in Joint::ALL {
+        let j = joint.index();
+        if !sample::is_measured(now, j) || labels::is_absent(now, j) {
+            return Err(StateError::NotMeasured { joint });
+        }
+    }
+    if let Some((joint, speed)) = labels::moving_joint(now) {
+        return moving(format!("{joint} moves at {speed:.2} rad/s"));
+    }
+    for joint in Joint::ALL {
+        let j = joint.index();
+        let way = now.positions()[j] - begin.positions()[j];
+        if way.abs() > STILL {
+            return moving(format!("{joint} moves slowly, by {:.1} mrad since a moment ago", way * 1e3));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use host_kit::{Diagnose as _, ErrorKind};
+    use jtc_wire::TrajectoryState;
+
+    use super::*;
+
+    /// A slow jog does not appear in any field of the status, but the positions differ.
+    #[test]
+    fn an_arm_that_is_jogged_slowly_does_not_stand() {
+        let at = |q: f32| {
+            let mut status = Status::default();
+            status.joints[3].position = q;
+            status.joints.iter_mut().for_each(|joint| joint.velocity = 0.01);
+            status
+        };
+        stands(&at(0.5), &at(0.5005)).unwrap();
+        for (begin, now) in [(0.5, 0.5025), (0.5025, 0.5)] {
+            let error = stands(&at(begin), &at(now)).unwrap_err();
+            assert!(error.to_string().starts_with("joint 4 moves slowly"), "{error}");
+        }
+        let executing = Status { trajectory: TrajectoryState::Execute.into(), ..at(0.5) };
+        assert_eq!(stands(&executing, &executing).unwrap_err().diagnosis().kind, ErrorKind::Refused);
+        // An arm may be at rest while it is guided by hand or paused.
+        stands(&at(0.5), &Status { trajectory: TrajectoryState::Pause.into(), ..at(0.5) }).unwrap();
+    }
+}

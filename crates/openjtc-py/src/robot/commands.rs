@@ -1,0 +1,168 @@
+//! Motion without a trajectory (jogging, teaching), and stopping the arm.
+
+use std::time::Duration;
+
+use jtc_core::JOINTS;
+use jtc_host::error::facts_of_status;
+use jtc_host::port::Standstill;
+use jtc_host::port::halt::{End, Halt};
+use jtc_host::{Error, LinkError, Port as _, PortError, StateError, labels};
+use jtc_wire::{ControllerState, TrajectoryState, fixed};
+
+use super::shared::Asked;
+use super::worker::lock;
+use super::worker_state::WorkerState;
+use crate::error::Failure;
+
+/// Longest wait from a Stop to standstill. The arm needs 0.5 s, or 1 s if it brakes with full torque (J-33).
+const STANDSTILL: Duration = Duration::from_secs(5);
+/// Time after the last sample of a recording after which teaching is considered ended.
+const TAUGHT_NO_MORE: Duration = Duration::from_secs(1);
+
+/// Returns the error for a caller whose action was ended by a Stop.
+pub fn stopped(what: &str) -> Failure {
+    Failure::fault(
+        "stopped",
+        format!("{what}: the arm was stopped"),
+        "find out who stopped it, and why; what is asked for from now on is done",
+    )
+}
+
+impl WorkerState {
+    /// Stops the arm and waits for standstill. An arm that is already at rest is not an error. Also ends teaching, even if another
+    /// program has switched it on, because the caller wants the arm to be held.
+    pub fn stop(&mut self) -> Result<(), Failure> {
+        self.session.port_mut().take_over();
+        // The Stop is sent before any query, because it may reach the controller even on a line that returns no bytes.
+        let stopped = match self.session.stop() {
+            // The controller refuses the Stop if no motion is in progress.
+            Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
+            done => done,
+        };
+        let held = self.hold();
+        stopped?;
+        let (end, mut standstill) = (self.session.now() + STANDSTILL, Standstill::after(Halt::Stop));
+        while !standstill.is_reached() {
+            let status = self.session.next_status()?;
+            standstill.see(self.session.now(), &status);
+            if self.session.now() >= end {
+                let end = End::of(&status, &standstill);
+                let next = end.next_step();
+                return Err(Failure::fault("still-moving", end.moving.unwrap_or_default(), next));
+            }
+            if status.state == ControllerState::Teaching {
+                self.session.end_teaching()?;
+            }
+        }
+        self.shared.set_moves(false);
+        held
+    }
+
+    /// Like [`Self::stop`], but only for motion and teaching of this connection.
+    pub fn rest(&mut self) -> Result<(), Failure> {
+        if self.shared.moves() { self.stop() } else { self.hold() }
+    }
+
+    /// Ends the teaching of this connection.
+    pub fn hold(&mut self) -> Result<(), Failure> {
+        if self.teaching {
+            self.session.teach(false)?;
+            self.teaching = false;
+        }
+        Ok(())
+    }
+
+    /// Sends a last Stop after a panic, without waiting for an answer.
+    pub fn abandon(&mut self) {
+        let port = self.session.port_mut();
+        let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
+        let due = [self.shared.moves(), self.teaching];
+        for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
+            // An error is ignored, because no caller is left to report it to.
+            let _ = port.write_all(frame);
+        }
+    }
+
+    /// Notes the end of the motion of this connection, if the last status shows it.
+    pub fn look(&mut self) {
+        if !self.shared.moves() || !self.session.port().is_shown() {
+            return;
+        }
+        let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
+        if self.session.last().is_some_and(|status| !status.trajectory.is_in(&goes_on)) {
+            self.shared.set_moves(false);
+        }
+    }
+
+    /// Jogs at these velocities (rad/s) for this time, then waits for rest. Returns the position at rest (rad).
+    pub fn jog(
+        &mut self,
+        velocity: &[f64; JOINTS],
+        time: Duration,
+        asked: &Asked,
+    ) -> Result<[f64; JOINTS], Failure> {
+        self.same_arm()?;
+        self.session.ask_to_move()?;
+        self.session.settle_for_jog_until(|| asked.is_halted())?;
+        let end = self.session.now() + time;
+        let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
+        // However the jog has ended, the arm is brought to rest at once, without waiting for the controller's jog
+        // timeout.
+        let rested = self.session.jog_to_rest();
+        if let Ok(Some(_)) = rested {
+            self.shared.set_moves(false);
+        }
+        match jogged {
+            Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) | Ok(()) if asked.is_halted() => {
+                rested?;
+                return Err(stopped("jogging ended early"));
+            }
+            // A held stop is the reason why a jog was refused.
+            Err(_) if matches!(rested, Err(Error::State(StateError::HeldStop { .. }))) => {}
+            jogged => jogged?,
+        }
+        let still = || Failure::fault("still-moving", "the arm still moves", "press the emergency stop");
+        Ok(rested?.ok_or_else(still)?.positions())
+    }
+
+    /// Starts teaching: the arm can be led by hand.
+    pub fn teach(&mut self, asked: &Asked) -> Result<(), Failure> {
+        self.same_arm()?;
+        self.session.ask_to_move()?;
+        let before = self.teaching;
+        // The flag is set before the attempt, so that the end of the connection ends teaching in any case.
+        self.teaching = true;
+        let begun = self.session.teach_until(|| asked.is_halted());
+        if let Err(Error::Link(
+            LinkError::Refused { .. } | LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }),
+        )) = &begun
+        {
+            self.teaching = before;
+        }
+        Ok(begun?)
+    }
+
+    /// Records the positions of the hand-led arm for this time, or until a Stop.
+    pub fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
+        let start = self.session.now();
+        let mut last = start;
+        while !asked.is_halted() && self.session.now() - start < time {
+            let status = self.session.next_status()?;
+            if status.is_faulty() {
+                let failure =
+                    Failure::fault("run-fault", labels::errors_line(&status), labels::next_step(&status));
+                return Err(failure.with(facts_of_status(&status)));
+            }
+            let now = self.session.now();
+            if status.state == ControllerState::Teaching {
+                last = now;
+                lock(&self.shared.taught).push(((now - start).as_secs_f64(), status.positions()));
+            } else if now - last > TAUGHT_NO_MORE && !asked.is_halted() {
+                let message =
+                    format!("the arm is not taught any more: the controller is in {}", status.state);
+                return Err(Failure::fault("not-teaching", message, "`robot.teach()` begins it again"));
+            }
+        }
+        Ok(())
+    }
+}

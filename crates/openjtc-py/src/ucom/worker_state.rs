@@ -1,0 +1,140 @@
+//! Session in its thread, which executes the requests from Python.
+
+use std::cell::RefCell;
+use std::ops::{Deref, DerefMut};
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use ucom::Profile;
+use ucom_host::files::{Inventory, SignalTable};
+use ucom_host::session::{Cache, CleanupList, Driver, FlashRecords, Held, Link, Session, SessionError};
+
+use super::operator::Hand;
+use super::shared::Shared;
+use super::simulated::Simulated;
+
+/// Longest duration of a turn. A wait for the bus itself is shorter.
+const TURN: Duration = Duration::from_millis(25);
+
+/// Longest wait for the first outputs of a board, which come every few milliseconds, µs.
+const FIRST_US: u64 = 500_000;
+
+/// Configuration of a session.
+pub struct Config {
+    /// Profile of how boards interpret the protocol.
+    pub profile: Profile,
+    /// Meaning of the words of inputs, outputs and parameters.
+    pub signals: SignalTable,
+    /// Cache of signal names.
+    pub cache: Cache,
+    /// Inventory of the chain, and its file.
+    pub inventory: Option<Inventory>,
+    pub inventory_file: Option<PathBuf>,
+    /// Time without a call after which the session stops boards that it has started; `None`: the boards continue to
+    /// run.
+    pub deadline: Option<Duration>,
+    /// Simulated chain that ends with the session.
+    pub simulated: Option<Arc<Simulated>>,
+}
+
+/// Session with its inventory and records.
+pub struct WorkerState {
+    pub session: Session,
+    pub inventory: Option<Inventory>,
+    pub inventory_file: Option<PathBuf>,
+    /// Records of images that updates wrote to boards.
+    pub records: FlashRecords,
+    pub shared: Arc<Shared>,
+    deadline: Option<Duration>,
+    /// Declared after the session, so that the simulated chain is dropped after the bus is closed.
+    _simulated: Option<Arc<Simulated>>,
+}
+
+impl Deref for WorkerState {
+    type Target = Session;
+
+    fn deref(&self) -> &Session {
+        &self.session
+    }
+}
+
+impl DerefMut for WorkerState {
+    fn deref_mut(&mut self) -> &mut Session {
+        &mut self.session
+    }
+}
+
+impl WorkerState {
+    /// Opens a session on this link.
+    pub fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
+        let Config { profile, signals, cache, inventory, inventory_file, deadline, simulated } = config;
+        let held: Rc<RefCell<Held>> = Rc::default();
+        let hand = Hand::new(shared.clone(), Rc::clone(&held));
+        let driver = Driver::new(profile, link, Box::new(hand), CleanupList::default());
+        // The cache is kept in memory, so that heartbeats and stops of this thread never wait for a disk.
+        let session = Session { driver, cache: cache.in_memory(), signals, held };
+        let records = FlashRecords::new(inventory_file.clone());
+        Self { session, inventory, inventory_file, records, shared, deadline, _simulated: simulated }
+    }
+
+    /// Runs requests until the bus is lost or the session ends.
+    pub fn serve(&mut self) -> Result<(), SessionError> {
+        let shared = self.shared.clone();
+        while !shared.has_ended() {
+            self.turn()?;
+            while !shared.has_ended() && shared.take(self) {
+                self.turn()?;
+                self.session.rest(false);
+            }
+            self.keep_deadline();
+            self.session.rest(false);
+        }
+        Ok(())
+    }
+
+    /// Stops the boards if the program makes no call within the deadline. Heartbeats show only that this computer works, not that
+    /// the commanding program works.
+    fn keep_deadline(&mut self) {
+        if let Some(deadline) = self.deadline
+            && self.shared.silence() >= deadline
+            && !self.started().is_empty()
+        {
+            let not_stopped = self.leave();
+            let time_s = self.driver.now_us() as f64 * 1e-6;
+            self.shared.deadline(time_s, deadline, &not_stopped);
+            self.shared.asked();
+        }
+    }
+
+    /// Runs the bus for one turn.
+    fn turn(&mut self) -> Result<(), SessionError> {
+        self.session.turn(TURN)?;
+        if self.shared.queue.stop_waits() {
+            return Ok(());
+        }
+        let notices = self.session.look();
+        let held = self.held.borrow();
+        notices.iter().for_each(|notice| Hand::noticed(&self.shared, &held, notice, None));
+        Ok(())
+    }
+
+    /// Sends all frames of a request before the caller receives the result.
+    pub fn settle(&mut self) {
+        // The next turn reports a lost bus.
+        let _ = self.driver.turn(Duration::ZERO);
+        self.shared.queue.done();
+    }
+
+    /// Waits at most 0.5 s for the first outputs of boards that were just started, so that their values are known.
+    pub fn first_outputs(&mut self, boards: &[u8]) -> Result<(), SessionError> {
+        let end_us = self.driver.now_us() + FIRST_US;
+        let missing =
+            |state: &Self| boards.iter().any(|board| !state.held.borrow().snapshots.contains_key(board));
+        while missing(self) && self.driver.now_us() < end_us && !self.driver.stop_asked() {
+            self.turn()?;
+        }
+        Ok(())
+    }
+}

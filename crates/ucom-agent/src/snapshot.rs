@@ -1,0 +1,64 @@
+//! Snapshot of the bus for all clients, with the last known state of each board.
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use ucom::Profile;
+use ucom_host::master::doctor::Controller;
+use ucom_host::master::io::{ParValue, Snapshot};
+use ucom_host::master::{Boards, Statistics};
+use ucom_host::session::Known;
+
+/// Known values of a board.
+#[derive(Clone)]
+pub(crate) struct Values {
+    /// Names, types, scales and units.
+    pub known: Arc<Known>,
+    /// Last received outputs.
+    pub outputs: Option<Snapshot>,
+    /// Inputs as last set or read.
+    pub inputs: Vec<Option<u16>>,
+    /// Parameters as last written by this agent.
+    pub parameters: Vec<ParValue>,
+}
+
+/// Bus and boards at one time.
+#[derive(Clone)]
+pub(crate) struct BusSnapshot {
+    /// Time of the snapshot by the session's clock, in µs. The next field is the time by the agent's clock.
+    pub now_us: u64,
+    pub at: Instant,
+    pub profile: Profile,
+    pub boards: Boards,
+    pub statistics: Statistics,
+    pub controller: Option<Controller>,
+    /// `true` if the agent sends heartbeats.
+    pub is_master: bool,
+    /// Time when another PC last sent a frame on the bus, in µs.
+    pub competing_us: Option<u64>,
+    /// Texts about numbers that two boards share.
+    pub shared: Vec<String>,
+    pub values: BTreeMap<u8, Values>,
+}
+
+impl BusSnapshot {
+    pub(crate) fn new(profile: Profile) -> Self {
+        Self {
+            now_us: 0,
+            at: Instant::now(),
+            profile,
+            boards: Boards::default(),
+            statistics: Statistics::default(),
+            controller: None,
+            is_master: false,
+            competing_us: None,
+            shared: Vec::new(),
+            values: BTreeMap::new(),
+        }
+    }
+
+    /// Returns the present time of the session, in µs.
+    pub(crate) fn clock_us(&self) -> u64 {
+        self.now_us + self.at.elapsed().as_micros() as u64
+    }
+}

@@ -1,0 +1,155 @@
+//! Runs programs in parallel; most of them wait and use little processor time.
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{Read as _, Seek as _};
+use std::num::NonZero;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use anyhow::{Result, ensure};
+
+use crate::shell::Scratch;
+use crate::tally::{Outcome, Tally};
+
+/// Output and result of a program.
+pub struct Ended {
+    /// On both of its outputs.
+    pub output: String,
+    /// With exit code 0.
+    pub passed: bool,
+    /// Duration.
+    pub seconds: f64,
+}
+
+/// Result of a program that ran at the same time as others.
+pub trait Ran {
+    /// Returns the output and the end of the program if the program ran.
+    fn ended(&self) -> Option<&Ended>;
+
+    /// Returns the output if the program failed.
+    fn failure(&self) -> Option<&str> {
+        self.ended().filter(|ended| !ended.passed).map(|ended| &*ended.output)
+    }
+
+    /// Returns `true` if the program ran and passed.
+    fn passed(&self) -> bool {
+        self.ended().is_some_and(|ended| ended.passed)
+    }
+}
+
+impl Ran for Result<Ended> {
+    fn ended(&self) -> Option<&Ended> {
+        self.as_ref().ok()
+    }
+}
+
+impl Ran for Result<Option<Ended>> {
+    fn ended(&self) -> Option<&Ended> {
+        self.as_ref().ok()?.as_ref()
+    }
+}
+
+/// Function that runs a program with this file for its output; `None`: the program cannot run.
+type Run<'a> = Box<dyn Fn(&Path) -> Result<Option<Ended>> + Send + Sync + 'a>;
+
+/// Check that runs at the same time as others, as a step of its own.
+pub struct Check<'a> {
+    /// Title of the step.
+    pub title: String,
+    /// Runs the check.
+    pub run: Run<'a>,
+    /// Returns the outcome of the step.
+    pub outcome: fn(&Ended) -> Result<Outcome>,
+    /// Reason why the check cannot run, if so.
+    pub missing: String,
+}
+
+/// Returns the outcome of a check that counts as one test.
+pub fn whole(ended: &Ended) -> Result<Outcome> {
+    ensure!(ended.passed, "it ended with an error");
+    Ok(Outcome::Passed)
+}
+
+/// Runs the checks whose steps are wanted, each as a step. The longest should come first.
+pub fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
+    checks.retain(|check| tally.wants(&check.title));
+    let ran = run_all(
+        checks,
+        |check, log| (check.run)(log),
+        |check, ended| {
+            tally.step(&check.title, || match ended? {
+                None => Ok(Outcome::Skipped(check.missing)),
+                Some(ended) => {
+                    println!("{}\n({:.1} s, in parallel)", ended.output.trim_end(), ended.seconds);
+                    (check.outcome)(&ended)
+                }
+            });
+        },
+    );
+    match ran {
+        Ok(passed_alone) => tally.passed_alone(passed_alone),
+        Err(error) => tally.step("checks in parallel", || Err(error)),
+    }
+}
+
+/// Calls `run` with each of `items`, with one more at once than there are processors; `log` is a file for the output. Calls `ended` with
+/// each result.
+///
+/// Tests with simulated arms and browsers watch clocks, and a busy computer can make them fail. So a program that failed runs again
+/// when all others have ended. Then its second result counts. Returns how many of `items` passed only then.
+pub fn run_all<T: Send, R: Ran + Send>(
+    items: Vec<T>,
+    run: impl Fn(&T, &Path) -> R + Sync,
+    ended: impl FnMut(T, R) + Send,
+) -> Result<u64> {
+    let scratch = Scratch::new("parallel")?;
+    let at_once = std::thread::available_parallelism().map_or(1, NonZero::get) + 1;
+    let (waiting, ended) = (Mutex::new(VecDeque::from(items)), Mutex::new(ended));
+    let failed = Mutex::new(Vec::new());
+    let worker = |number: usize| {
+        let log = scratch.path().join(number.to_string());
+        loop {
+            let next = waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+            let Some(item) = next else { return };
+            let came = run(&item, &log);
+            if let Some(output) = came.failure() {
+                println!("\n{}\n-- it failed and will run again, alone", output.trim());
+                failed.lock().unwrap_or_else(PoisonError::into_inner).push(item);
+            } else {
+                ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..at_once).map(|number| scope.spawn(move || worker(number))).collect();
+        workers.into_iter().for_each(|worker| {
+            worker.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
+        });
+    });
+    let log = scratch.path().join("alone");
+    let mut passed_alone = 0;
+    for item in failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        let came = run(&item, &log);
+        println!("\n-- the result of the second run:");
+        passed_alone += u64::from(came.passed());
+        ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
+    }
+    Ok(passed_alone)
+}
+
+/// Runs a command whose output goes to `log`.
+pub fn run(command: &mut Command, log: &Path) -> Result<Ended> {
+    let start = Instant::now();
+    let mut file = File::options().create(true).truncate(true).read(true).write(true).open(log)?;
+    let status = command.stdin(Stdio::null()).stdout(file.try_clone()?).stderr(file.try_clone()?).status()?;
+    let mut output = Vec::new();
+    file.rewind()?;
+    file.read_to_end(&mut output)?;
+    let mut output = String::from_utf8_lossy(&output).into_owned();
+    if !status.success() {
+        output.push_str(&format!("\n{status}"));
+    }
+    Ok(Ended { output, passed: status.success(), seconds: start.elapsed().as_secs_f64() })
+}

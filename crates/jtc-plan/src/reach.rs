@@ -1,19 +1,15 @@
-//! Time-optimal path parameterisation by reachability analysis (Pham and Pham 2018), as implemented in `copp`.
-use copp::constraints::Constraints;
-use copp::solver::topp2_ra::{ReachSet2OptionsBuilder, Topp2ProblemBuilder, topp2_ra};
-use nalgebra::DMatrixView;
+//! Time-optimal path parameterisation by reachability analysis (Pham and Pham 2018).
 
 use crate::cells::{Cell, End, Room};
-use crate::path::PathPoint;
 use crate::{ArmDynamics, JOINTS, Limits};
 
 /// Number of rows per point: acceleration and torque of each joint in both directions.
 const ROWS: usize = 4 * JOINTS;
 
-/// Tolerance of squared speeds, relative to the highest.
-const TOLERANCE: f64 = 1e-12;
+/// Share of a limit that is less than the rounding of the others.
+const NEGLIGIBLE: f64 = 1e-12;
 
-/// Limits of one place, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
+/// Limits at one place, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
 struct Rows {
     by_speed: [f64; ROWS],
     by_acceleration: [f64; ROWS],
@@ -22,6 +18,8 @@ struct Rows {
 
 /// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest along the cells. Squared speeds
 /// are at most `caps`; accelerations and torques are at most `shares` of their limits.
+///
+/// The parameter's acceleration s̈ is constant from each place to the next one, so ṡ² is linear between them.
 pub(crate) fn fastest(
     cells: &[Cell],
     caps: &[f64],
@@ -36,76 +34,120 @@ pub(crate) fn fastest(
         let (left, right) = (caps[i.saturating_sub(1)], caps[i.min(count - 2)]);
         left.min(right).clamp(1e-18, 1e18)
     };
-    let caps_of_places: Vec<f64> = (0..count).map(cap).collect();
-    // The unit of time is chosen such that the highest speed is 1, because copp's tolerances are absolute.
-    let unit = caps_of_places.iter().copied().fold(0.0, f64::max);
-    let in_units: Vec<f64> = caps_of_places.iter().map(|cap| cap / unit).collect();
-    let mut constraints = Constraints::with_capacity(JOINTS, count);
-    let failed = |e: copp::diag::ConstraintError| e.to_string();
-    constraints.with_s(places.as_slice()).map_err(failed)?;
-    constraints.with_constraint_1order(in_units.as_slice(), 0).map_err(failed)?;
-    // A place belongs to the cell after it. If its derivatives differ there, it also belongs to the cell before it.
-    let share = |i: usize| shares[i.saturating_sub(1)].min(shares[i.min(count - 2)]);
-    let end = |i: usize| cells.get(i).map_or(&cells[count - 2].ends[1], |cell| &cell.ends[0]);
-    let rows = |end: &End, i: usize| Rows::new(end, share(i), caps_of_places[i], limits, arm).in_units(unit);
-    let after: Vec<Rows> = (0..count).map(|i| rows(end(i), i)).collect();
-    append(&mut constraints, &after, 0)?;
-    for i in 1..count - 1 {
-        let left = &cells[i - 1].ends[1];
-        if differ(&left.point, &end(i).point) {
-            append(&mut constraints, &[rows(left, i)], i)?;
-        }
-    }
-    let problem = Topp2ProblemBuilder::with_constraint(&constraints, (0, count - 1), (0.0, 0.0))
-        .build()
-        .map_err(|e| e.to_string())?;
-    let options = ReachSet2OptionsBuilder::new()
-        .a_cmp_abs_tol(TOLERANCE)
-        .a_cmp_rel_tol(TOLERANCE)
-        .lp_feas_tol(TOLERANCE)
-        .build()
-        .map_err(|e| e.to_string())?;
-    let squares = topp2_ra(&problem, &options).map_err(|e| e.to_string())?;
-    if squares[1..count - 1].iter().any(|a| !(*a > 0.0 && a.is_finite())) {
+    let step = |(i, cell): (usize, &Cell)| {
+        let rows = |end: usize| Rows::new(&cell.ends[end], shares[i], cap(i + end), limits, arm);
+        Step::new([rows(0), rows(1)], cap(i), cell.to - cell.from)
+    };
+    let steps: Vec<Step> = cells.iter().enumerate().map(step).collect();
+    let squares = along_the_steps(&steps);
+    if squares[1..count - 1].iter().any(|square| !(*square > 0.0 && square.is_finite())) {
         return Err("the speed along the path is 0 where it does not stop".into());
     }
-    Ok(places.into_iter().zip(squares.into_iter().map(|square| square * unit)).collect())
+    Ok(places.into_iter().zip(squares).collect())
 }
 
-/// Returns `true` if the derivatives of the path differ between two points.
-fn differ(a: &PathPoint, b: &PathPoint) -> bool {
-    let far = |a: f64, b: f64| (a - b).abs() > 1e-9 * (1.0 + a.abs() + b.abs());
-    (0..JOINTS).any(|j| far(a.first[j], b.first[j]) || far(a.second[j], b.second[j]))
+/// Returns the largest squared speeds at the ends of the steps, from rest to rest.
+fn along_the_steps(steps: &[Step]) -> Vec<f64> {
+    // Backward: the largest squared speed at each place from which the rest of the path can be followed. Each smaller one is possible,
+    // too, because rest is possible everywhere and the limits are linear in ṡ² and s̈.
+    let mut highest = vec![0.0; steps.len() + 1];
+    for (i, step) in steps.iter().enumerate().rev() {
+        highest[i] = step.highest(highest[i + 1]);
+    }
+    // Forward: the largest acceleration at each place.
+    let mut squares = vec![0.0; steps.len() + 1];
+    for (i, step) in steps.iter().enumerate() {
+        let next = squares[i] + 2.0 * step.length * step.most(squares[i]).0;
+        squares[i + 1] = next.clamp(0.0, highest[i + 1]);
+    }
+    squares
 }
 
-/// Adds the rows of the points from index `first` on.
-fn append(constraints: &mut Constraints, rows: &[Rows], first: usize) -> Result<(), String> {
-    let flat = |part: fn(&Rows) -> &[f64; ROWS]| -> Vec<f64> { rows.iter().flat_map(|r| *part(r)).collect() };
-    let (a, b, c) = (flat(|r| &r.by_speed), flat(|r| &r.by_acceleration), flat(|r| &r.limit));
-    let matrix = |values| DMatrixView::from_slice(values, ROWS, rows.len());
-    constraints
-        .with_constraint_2order(&matrix(&a), &matrix(&b), &matrix(&c), first, false)
-        .map(|_| ())
-        .map_err(|e| e.to_string())
+/// Bound of s̈ that is linear in ṡ²: at + by·ṡ².
+#[derive(Clone, Copy)]
+struct Line {
+    at: f64,
+    by: f64,
+}
+
+/// Limits of ṡ² and s̈ on the way from a place to the next one.
+struct Step {
+    /// Length of the step, in the unit of the parameter.
+    length: f64,
+    /// Largest ṡ² at the place.
+    cap: f64,
+    /// Upper bounds of s̈.
+    upper: Vec<Line>,
+    /// Lower bounds of s̈.
+    lower: Vec<Line>,
+}
+
+impl Step {
+    /// Makes the step between two places with these rows. At the second place ṡ² is larger by 2·length·s̈.
+    fn new(rows: [Rows; 2], mut cap: f64, length: f64) -> Self {
+        let (mut upper, mut lower) = (Vec::new(), Vec::new());
+        for (rows, added) in rows.iter().zip([0.0, 2.0 * length]) {
+            for row in 0..ROWS {
+                let (by_speed, limit) = (rows.by_speed[row], rows.limit[row]);
+                let by_acceleration = rows.by_acceleration[row] + added * by_speed;
+                if !limit.is_finite() {
+                    continue;
+                }
+                // A share of s̈ that is lost in rounding: the row limits ṡ² alone.
+                if by_acceleration.abs() * cap <= NEGLIGIBLE * length * limit {
+                    cap = if by_speed > 0.0 { cap.min(limit / by_speed) } else { cap };
+                    continue;
+                }
+                let bounds = if by_acceleration > 0.0 { &mut upper } else { &mut lower };
+                bounds.push(Line { at: limit / by_acceleration, by: -by_speed / by_acceleration });
+            }
+        }
+        Self { length, cap, upper, lower }
+    }
+
+    /// Returns the largest s̈ at this ṡ², and its bound. With an infinite s̈, no bound exists.
+    fn most(&self, square: f64) -> (f64, Line) {
+        let none = (f64::INFINITY, Line { at: f64::INFINITY, by: 0.0 });
+        self.upper
+            .iter()
+            .map(|line| (line.at + line.by * square, *line))
+            .fold(none, |a, b| if b.0 < a.0 { b } else { a })
+    }
+
+    /// Returns the smallest s̈ at this ṡ², and its bound.
+    fn least(&self, square: f64) -> (f64, Line) {
+        let none = (f64::NEG_INFINITY, Line { at: f64::NEG_INFINITY, by: 0.0 });
+        self.lower
+            .iter()
+            .map(|line| (line.at + line.by * square, *line))
+            .fold(none, |a, b| if b.0 > a.0 { b } else { a })
+    }
+
+    /// Returns the largest ṡ² from which a possible s̈ leads to at most `next` and at least 0 at the next place.
+    ///
+    /// The difference of the largest and the smallest s̈ is a concave function of ṡ², and not negative at 0. So Newton's method from the cap
+    /// downwards ends at its zero after at most one iteration per pair of bounds.
+    fn highest(&self, next: f64) -> f64 {
+        let slope = -0.5 / self.length;
+        let (to_next, to_rest) = (Line { at: -slope * next, by: slope }, Line { at: 0.0, by: slope });
+        let mut square = self.cap;
+        for _ in 0..self.upper.len() + self.lower.len() {
+            let at = |line: Line| (line.at + line.by * square, line);
+            let (most, least) = (self.most(square), self.least(square));
+            let most = if at(to_next).0 < most.0 { at(to_next) } else { most };
+            let least = if at(to_rest).0 > least.0 { at(to_rest) } else { least };
+            if most.0 >= least.0 {
+                break;
+            }
+            let crossing = (most.1.at - least.1.at) / (least.1.by - most.1.by);
+            // Rounding must not lead upwards.
+            square = crossing.clamp(0.0, square);
+        }
+        square
+    }
 }
 
 impl Rows {
-    /// Returns the rows with the parameter's squared speeds and accelerations in this unit, scaled to about 1.
-    fn in_units(mut self, unit: f64) -> Self {
-        for row in 0..ROWS {
-            let size =
-                self.by_speed[row].abs().max(self.by_acceleration[row].abs()).max(self.limit[row] / unit);
-            if size.is_finite() && size > 0.0 {
-                self.by_speed[row] /= size;
-                self.by_acceleration[row] /= size;
-                self.limit[row] /= size * unit;
-            } else {
-                self.limit[row] /= unit;
-            }
-        }
-        self
-    }
-
     fn new(end: &End, share: f64, cap: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> Self {
         let mut rows =
             Self { by_speed: [0.0; ROWS], by_acceleration: [0.0; ROWS], limit: [f64::INFINITY; ROWS] };

@@ -40,11 +40,15 @@ pub enum Refused {
 /// a lock meanwhile that the function needs.
 pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 
+/// For [`Request::after`]: no Stop refuses the request.
+pub const NEVER_LATE: u64 = u64::MAX;
+
 /// Request to the owner of a device `D`, with a tag of the front end.
 pub struct Request<D, T> {
     /// Kind of the request.
     pub kind: Kind,
-    /// Number of the last Stop before the request: see [`Queue::stops`]. This number does not matter for questions.
+    /// Number of the last Stop before the request: see [`Queue::stops`]. [`NEVER_LATE`]: no Stop refuses the request. This number does not
+    /// matter for questions.
     pub after: u64,
     /// Data of the front end about the request.
     pub tag: T,
@@ -110,13 +114,14 @@ impl<D, T: Clone> Queue<D, T> {
         self.overtake(tag, act, true)
     }
 
+    /// Like [`Queue::stop`], for a Stop that needs no turn, for example because another program has stopped the device.
+    pub fn count_stop(&self) -> u64 {
+        self.lock().count_stop()
+    }
+
     fn overtake(&self, tag: T, act: Act<D>, alike: bool) -> u64 {
         let mut state = self.lock();
-        state.stops += 1;
-        if let Some(current) = &mut state.current {
-            current.cancelled |= current.is_cancelled_by_stop;
-        }
-        let number = state.stops;
+        let number = state.count_stop();
         if state.closed {
             drop(state);
             act(Err(Refused::Closed));
@@ -223,6 +228,15 @@ impl<D, T: Clone> Queue<D, T> {
 }
 
 impl<D, T> State<D, T> {
+    /// Counts a Stop, and cancels the current request. Returns the number of the Stop.
+    fn count_stop(&mut self) -> u64 {
+        self.stops += 1;
+        if let Some(current) = &mut self.current {
+            current.cancelled |= current.is_cancelled_by_stop;
+        }
+        self.stops
+    }
+
     fn tags(&self) -> impl Iterator<Item = &T> {
         let current = self.current.iter().map(|current| &current.tag);
         current.chain(self.waiting.iter().map(|request| &request.tag))

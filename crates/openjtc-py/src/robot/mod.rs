@@ -169,12 +169,13 @@ impl Link {
 
     /// Returns the number of Stops. The next Stop discards every earlier request.
     fn asked(&self) -> u64 {
-        self.worker.shared.halts()
+        // In a forked process the number does not matter, because each request is refused.
+        self.worker.now().unwrap_or_default()
     }
 
     /// Discards all earlier requests and stops the motion of this connection, without waiting.
     fn halt(&self) {
-        self.worker.shared.halt();
+        self.worker.halt();
     }
 
     /// Like `halt`, but also waits until the motion of this connection is at rest.
@@ -187,8 +188,7 @@ impl Link {
         if self.worker.is_closed() {
             return Ok(());
         }
-        self.worker.shared.halt();
-        let rested = self.worker.call_always(py, WorkerState::rest);
+        let rested = self.worker.end_motion(py);
         self.worker.end(py).and(rested)
     }
 
@@ -238,8 +238,7 @@ impl Link {
 
     /// Stops the arm on its path, even if another program moves it, and waits for standstill. Discards all earlier requests.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        self.worker.shared.stop();
-        self.worker.call_always(py, WorkerState::stop)
+        self.worker.stop(py)
     }
 
     fn speed(&self, py: Python<'_>) -> PyResult<f64> {

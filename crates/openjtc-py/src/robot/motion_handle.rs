@@ -33,7 +33,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Passes the motion to the connection's thread. `asked`: number of halts at the time of the request.
+    /// Passes the motion to the connection's thread. `asked`: number of Stops at the time of the request.
     pub fn begin(link: &Bound<'_, Link>, order: Order, asked: u64) -> Result<Self, Failure> {
         let worker = &link.get().worker;
         let progress = Arc::clone(&order.progress);

@@ -50,9 +50,9 @@ macro_rules! each_line {
 pub struct AnyPort {
     line: Line,
     shared: Arc<Shared>,
-    /// Number of halts at the time when the current job was requested.
+    /// Number of Stops at the time when the current request was made.
     at: u64,
-    /// Number of halts, and number of Stops, that were handled.
+    /// Numbers of Stops that were handled: see [`Shared::stops`].
     done: (u64, u64),
     /// Known Stops and Pauses of other programs.
     foreign: Halts,
@@ -84,14 +84,14 @@ impl AnyPort {
         matches!(self.line, Line::Simulated(_))
     }
 
-    /// Begins a job that was requested after `at` halts.
+    /// Begins a request that was made after `at` Stops.
     pub fn begin(&mut self, at: u64) {
         self.at = at;
     }
 
-    /// Marks all halts as handled. The caller itself writes the Stop.
+    /// Marks all Stops as handled. The caller itself writes the frame.
     pub fn take_over(&mut self) {
-        self.done = (self.shared.halts(), self.shared.stops());
+        self.done = self.shared.stops();
     }
 
     /// Returns the remaining time within which the record of the last Stop may still arrive. The record must not be taken for the answer
@@ -127,15 +127,15 @@ impl AnyPort {
     fn withheld(&mut self, frame: &[u8], moved: bool) {
         self.take_foreign_halts();
         let stays_paused = moved && frame == fixed::EXECUTE;
-        if !stays_paused && self.shared.halts() == self.at {
+        if !stays_paused && self.shared.queue.stops() == self.at {
             self.shared.halt();
         }
     }
 
-    /// Writes a Stop if a caller has requested it, or after a halt while this connection moves the arm.
+    /// Writes a Stop after each one that must stop every motion, and after others while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
-        let now = (self.shared.halts(), self.shared.stops());
+        let now = self.shared.stops();
         if now == self.done {
             return Ok(());
         }
@@ -153,19 +153,19 @@ impl AnyPort {
         Ok(())
     }
 
-    /// Refuses a frame that moves the arm or starts teaching, if there was a halt after its request.
+    /// Refuses a frame that moves the arm or starts teaching, if there was a Stop after its request.
     fn pass(&mut self, frame: &[u8]) -> Result<(), PortError> {
         let moves = frame == fixed::EXECUTE || is_jog(frame);
         if !moves && frame != fixed::TEACHING_MODE_ENABLE {
             return Ok(());
         }
-        // `moves` is set before the check, so that a halt between the two finds a motion to stop.
+        // `moves` is set before the check, so that a Stop between the two finds a motion.
         let moved_before = self.shared.moves();
         if moves {
             self.shared.set_moves(true);
             self.begun = (self.now(), self.shared.seen());
         }
-        if self.shared.halts() == self.at {
+        if self.shared.queue.stops() == self.at {
             return Ok(());
         }
         self.shared.set_moves(moved_before);
@@ -252,7 +252,7 @@ impl Port for AnyPort {
     /// job.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
-        if self.shared.halts() != self.at {
+        if self.shared.queue.stops() != self.at {
             return Err(PortError::Halted { by: None });
         }
         let known = self.foreign.all;
@@ -261,7 +261,7 @@ impl Port for AnyPort {
 
     fn ask_to_resume(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
-        if self.shared.halts() != self.at {
+        if self.shared.queue.stops() != self.at {
             return Err(PortError::Halted { by: None });
         }
         each_line!(mut port, self => port.ask_to_resume())

@@ -207,7 +207,9 @@ impl Link {
     fn doctor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = self.call(py, |state, asked| {
             let mut seen = state.session.examine_until(LOOK, || asked.is_halted())?;
-            asked.check()?;
+            if asked.is_halted() {
+                return Err(jtc_host::Error::Cancelled.into());
+            }
             // Held stops and encoder jumps only occur while drives have torque.
             if seen.status.as_ref().is_some_and(labels::has_torque) {
                 seen.reactions = state.session.reactions();

@@ -5,12 +5,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex};
 
+use host_kit::owner::Queue;
 use jtc_core::JOINTS;
 use jtc_host::session::Flow;
 use jtc_sim::World;
 use jtc_wire::Status;
 
 use super::worker::lock;
+use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Disturbance of a simulated arm.
@@ -36,14 +38,16 @@ pub struct Progress {
 /// State that the thread of a connection shares with the waiting callers.
 #[derive(Default)]
 pub struct Shared {
-    /// Number of halts; each halt cancels all earlier requests.
-    halts: AtomicU64,
-    /// Number of halts that also stop the arm if another program moves it.
-    stops: AtomicU64,
+    /// Requests to the thread, and the number of Stops.
+    pub queue: Queue<WorkerState, ()>,
+    /// Number of Stops that also stop the arm if another program moves it.
+    stops_of_all: AtomicU64,
     /// Number of requested runs that are not over.
     pending: AtomicUsize,
     /// `true` if this connection has started a motion whose end the controller has not reported yet.
     moves: AtomicBool,
+    /// `true` if the thread must end.
+    ended: AtomicBool,
     /// `true` if the thread has ended by itself.
     gone: AtomicBool,
     /// Number of statuses.
@@ -60,23 +64,31 @@ pub struct Shared {
 }
 
 impl Shared {
-    /// Cancels all earlier requests and stops the motion of this connection.
+    /// Cancels all earlier requests. The port stops the motion of this connection.
     pub fn halt(&self) {
-        self.halts.fetch_add(1, Ordering::SeqCst);
+        self.queue.count_stop();
+        self.queue.refuse_late();
     }
 
-    /// Like [`Self::halt`], but also stops the arm if another program moves it.
-    pub fn stop(&self) {
-        self.stops.fetch_add(1, Ordering::SeqCst);
-        self.halt();
+    /// Announces a Stop that also stops the arm if another program moves it. The Stop itself must follow.
+    pub fn will_stop_all(&self) {
+        self.stops_of_all.fetch_add(1, Ordering::SeqCst);
     }
 
-    pub fn halts(&self) -> u64 {
-        self.halts.load(Ordering::SeqCst)
+    /// Returns the number of Stops, and the number of those that also stop the arm if another program moves it.
+    pub fn stops(&self) -> (u64, u64) {
+        let all = self.queue.stops();
+        (all, self.stops_of_all.load(Ordering::SeqCst))
     }
 
-    pub fn stops(&self) -> u64 {
-        self.stops.load(Ordering::SeqCst)
+    /// Returns `true` if the thread must end.
+    pub fn has_ended(&self) -> bool {
+        self.ended.load(Ordering::SeqCst)
+    }
+
+    /// Lets the thread end after its current request.
+    pub fn end(&self) {
+        self.ended.store(true, Ordering::SeqCst);
     }
 
     pub fn moves(&self) -> bool {
@@ -139,7 +151,7 @@ impl Drop for Pending {
     }
 }
 
-/// A job's own view of the halts.
+/// A request's own view of the Stops.
 #[derive(Clone)]
 pub struct Asked {
     shared: Arc<Shared>,
@@ -149,26 +161,21 @@ pub struct Asked {
 impl Asked {
     /// Returns the view for a request that is made now.
     pub fn now(shared: &Arc<Shared>) -> Self {
-        Self::after(shared, shared.halts())
+        Self::after(shared, shared.queue.stops())
     }
 
-    /// Returns the view for a request that was made after `at` halts.
+    /// Returns the view for a request that was made after `at` Stops.
     pub fn after(shared: &Arc<Shared>, at: u64) -> Self {
         Self { shared: Arc::clone(shared), at }
     }
 
-    /// Returns the number of halts at the time of the request.
+    /// Returns the number of Stops at the time of the request.
     pub fn at(&self) -> u64 {
         self.at
     }
 
-    /// Returns `true` if there was a halt since the request.
+    /// Returns `true` if there was a Stop since the request.
     pub fn is_halted(&self) -> bool {
-        self.shared.halts() != self.at
-    }
-
-    /// Returns an error if there was a halt since the request.
-    pub fn check(&self) -> Result<(), Failure> {
-        if self.is_halted() { Err(jtc_host::Error::Cancelled.into()) } else { Ok(()) }
+        self.shared.queue.stops() != self.at
     }
 }

@@ -1,15 +1,16 @@
 //! Thread that runs the session with a controller, and the calls that Python threads make to it.
 //!
-//! The thread owns the session. Python threads send jobs to it and wait without the interpreter's lock. During the wait they check for
-//! Ctrl-C, which stops the arm before the exception is raised.
+//! The thread owns the session. Python threads put requests into its queue and wait without the interpreter's lock. During the wait they
+//! check for Ctrl-C, which stops the arm before the exception is raised.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use host_kit::ErrorKind;
+use host_kit::owner::{Act, Kind, NEVER_LATE, Refused, Request};
 use jtc_sim::World;
 use pyo3::prelude::*;
 
@@ -21,8 +22,6 @@ use crate::error::Failure;
 const LOOK: Duration = Duration::from_millis(50);
 /// Longest wait for standstill after a Stop; a second Ctrl-C ends the wait.
 const STANDSTILL: Duration = Duration::from_secs(15);
-
-type Job = Box<dyn FnOnce(&mut WorkerState) + Send>;
 
 /// Locks a mutex, even after a panic, because the protected data is consistent after each statement.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -45,7 +44,6 @@ pub struct Worker {
     process: u32,
     /// Name of the port.
     pub port: String,
-    jobs: Mutex<Option<Sender<Job>>>,
     pub shared: Arc<Shared>,
     thread: Mutex<Option<JoinHandle<()>>>,
 }
@@ -61,7 +59,6 @@ impl Worker {
     pub fn begin(py: Python<'_>, target: Target) -> PyResult<Self> {
         let shared = Arc::<Shared>::default();
         let simulated = matches!(target.way, Way::Simulated(_));
-        let (jobs, waiting) = channel::<Job>();
         let (opened, is_open) = channel::<Result<String, Failure>>();
         let own = Arc::clone(&shared);
         let asked = Asked::now(&shared);
@@ -69,7 +66,7 @@ impl Worker {
             Err(failure) => drop(opened.send(Err(failure))),
             Ok(mut state) => {
                 let _ = opened.send(Ok(state.port_name()));
-                serve(&mut state, waiting);
+                serve(&mut state);
             }
         };
         let thread = std::thread::Builder::new().name("openjtc".into()).spawn(body)?;
@@ -77,7 +74,6 @@ impl Worker {
             simulated,
             process: std::process::id(),
             port: String::new(),
-            jobs: Mutex::new(Some(jobs)),
             shared,
             thread: Mutex::new(Some(thread)),
         };
@@ -85,58 +81,106 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Sends a job that was requested after `at` halts, and returns the channel for its result. A halt before the job begins discards the
-    /// job.
+    /// Puts a request that was made after `at` Stops, and returns the channel for its result. A later Stop refuses the request if it has
+    /// not begun.
     pub fn ask<T: Send + 'static>(
         &self,
         at: u64,
         job: impl FnOnce(&mut WorkerState, &Asked) -> Result<T, Failure> + Send + 'static,
     ) -> Result<Receiver<Result<T, Failure>>, Failure> {
         let asked = Asked::after(&self.shared, at);
-        self.hand_over(move |state| {
-            asked.check()?;
+        self.put(at, move |state| {
             state.begin(&asked)?;
             job(state, &asked)
         })
     }
 
-    /// Like [`Self::ask`], for jobs that a Stop does not cancel: jobs that bring the arm to rest or only read.
-    pub fn ask_always<T: Send + 'static>(
+    /// Like [`Self::ask`], for requests that a Stop does not cancel, because they only read or end teaching.
+    fn ask_always<T: Send + 'static>(
         &self,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> Result<Receiver<Result<T, Failure>>, Failure> {
-        self.hand_over(job)
+        self.put(NEVER_LATE, job)
     }
 
-    fn hand_over<T: Send + 'static>(
+    fn put<T: Send + 'static>(
         &self,
+        after: u64,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> Result<Receiver<Result<T, Failure>>, Failure> {
-        let (done, came) = channel();
-        let job: Job = Box::new(move |state| {
-            let result = job(state);
-            // The caller may have stopped waiting.
-            let _ = done.send(result);
-        });
-        if self.is_foreign() {
-            return Err(closed().next("the process that opened it has it: connect in this one, too"));
-        }
-        let jobs = lock(&self.jobs);
-        jobs.as_ref().ok_or_else(closed)?.send(job).map_err(|_| closed())?;
+        self.is_here()?;
+        let (act, came) = act(job);
+        self.shared.queue.put(Request { kind: Kind::Command, after, tag: (), act });
+        self.wake();
         Ok(came)
     }
 
-    /// Sends a job and waits for its result.
+    /// Requests a Stop. `job` has its turn before all other requests.
+    fn overtake<T: Send + 'static>(
+        &self,
+        job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
+    ) -> Result<Receiver<Result<T, Failure>>, Failure> {
+        self.is_here()?;
+        let (act, came) = act(job);
+        self.shared.queue.stop((), act);
+        self.shared.queue.refuse_late();
+        self.wake();
+        Ok(came)
+    }
+
+    /// Ends the wait of the thread for a request.
+    fn wake(&self) {
+        if let Some(thread) = &*lock(&self.thread) {
+            thread.thread().unpark();
+        }
+    }
+
+    /// Checks that the thread belongs to this process, not to its parent before a fork. In a forked process the locks may be held for ever.
+    fn is_here(&self) -> Result<(), Failure> {
+        if self.is_foreign() {
+            return Err(closed().next("the process that opened it has it: connect in this one, too"));
+        }
+        Ok(())
+    }
+
+    /// Returns the number of Stops so far. The next Stop refuses every earlier request.
+    pub fn now(&self) -> Result<u64, Failure> {
+        self.is_here()?;
+        Ok(self.shared.queue.stops())
+    }
+
+    /// Cancels all earlier requests and stops the motion of this connection, without waiting.
+    pub fn halt(&self) {
+        if !self.is_foreign() {
+            self.shared.halt();
+        }
+    }
+
+    /// Stops the arm, even if another program moves it, and waits for standstill. Cancels all earlier requests.
+    pub fn stop(&self, py: Python<'_>) -> PyResult<()> {
+        self.is_here()?;
+        self.shared.will_stop_all();
+        let came = self.overtake(WorkerState::stop)?;
+        Ok(self.wait(py, came)??)
+    }
+
+    /// Stops the motion and the teaching of this connection, and waits for standstill. Cancels all earlier requests.
+    pub fn end_motion(&self, py: Python<'_>) -> PyResult<()> {
+        let came = self.overtake(WorkerState::rest)?;
+        Ok(self.wait(py, came)??)
+    }
+
+    /// Puts a request and waits for its result.
     pub fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
         job: impl FnOnce(&mut WorkerState, &Asked) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
-        let came = self.ask(self.shared.halts(), job)?;
+        let came = self.ask(self.now()?, job)?;
         Ok(self.wait(py, came)??)
     }
 
-    /// Like [`Self::call`], for jobs that a Stop does not cancel.
+    /// Like [`Self::call`], for requests that a Stop does not cancel.
     pub fn call_always<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -203,8 +247,7 @@ impl Worker {
 
     /// Stops the motion of this connection and waits for standstill. A signal ends the wait. Cancels all earlier requests.
     pub fn rest(&self, py: Python<'_>) {
-        self.shared.halt();
-        let Ok(came) = self.ask_always(WorkerState::rest).map(Mutex::new) else { return };
+        let Ok(came) = self.overtake(WorkerState::rest).map(Mutex::new) else { return };
         let end = Instant::now() + STANDSTILL;
         while Instant::now() < end {
             let result = py.detach(|| lock(&came).recv_timeout(LOOK));
@@ -227,11 +270,14 @@ impl Worker {
         Ok(())
     }
 
-    /// Takes no further jobs and waits until the thread has ended the connection. A signal ends the wait.
+    /// Takes no further requests and waits until the thread has ended the connection. A signal ends the wait.
     pub fn end(&self, py: Python<'_>) -> PyResult<()> {
-        lock(&self.jobs).take();
-        let thread = lock(&self.thread).take();
-        let Some(thread) = thread.filter(|_| !self.is_foreign()) else { return Ok(()) };
+        if self.is_foreign() {
+            return Ok(());
+        }
+        self.shared.end();
+        self.wake();
+        let Some(thread) = lock(&self.thread).take() else { return Ok(()) };
         while !thread.is_finished() {
             py.detach(|| std::thread::sleep(Duration::from_millis(2)));
             py.check_signals()?;
@@ -246,50 +292,63 @@ impl Worker {
         self.process != std::process::id()
     }
 
-    /// Returns `true` if the connection takes no more jobs.
+    /// Returns `true` if the connection takes no more requests.
     pub fn is_closed(&self) -> bool {
-        self.is_foreign() || self.shared.is_gone() || lock(&self.jobs).is_none()
+        self.is_foreign() || self.shared.is_gone() || self.shared.has_ended()
     }
 }
 
 impl Drop for Worker {
     fn drop(&mut self) {
         // Stops a motion that no caller follows any more. The thread ends after the motion.
-        self.shared.halt();
+        self.halt();
+        self.shared.end();
+        if !self.is_foreign() {
+            self.wake();
+        }
     }
 }
 
-/// Runs jobs one after the other. Reads statuses between jobs, so that the last status is always recent. At the end, stops a motion of
-/// this connection.
-fn serve(state: &mut WorkerState, waiting: Receiver<Job>) {
-    loop {
-        let job = if state.time_passes() {
-            match waiting.try_recv() {
-                Ok(job) => Some(job),
-                Err(TryRecvError::Empty) => None,
-                Err(TryRecvError::Disconnected) => break,
-            }
-        } else {
-            match waiting.recv() {
-                Ok(job) => Some(job),
-                Err(_) => break,
-            }
+/// Returns the function of a request for the queue, and the channel for its result.
+fn act<T: Send + 'static>(
+    job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
+) -> (Act<WorkerState>, Receiver<Result<T, Failure>>) {
+    let (done, came) = channel();
+    let act = move |state: Result<&mut WorkerState, Refused>| {
+        let refused = |refused| match refused {
+            Refused::Stopped | Refused::Cancelled => jtc_host::Error::Cancelled.into(),
+            Refused::Closed => closed(),
         };
+        let result = state.map_err(refused).and_then(job);
+        // The caller may have stopped waiting.
+        let _ = done.send(result);
+    };
+    (Box::new(act), came)
+}
+
+/// Does the requests one after the other. Reads statuses between them, so that the last status is always recent. At the end, stops a motion
+/// of this connection.
+fn serve(state: &mut WorkerState) {
+    let shared = Arc::clone(&state.shared);
+    while !shared.has_ended() {
         let done = catch_unwind(AssertUnwindSafe(|| {
-            match job {
-                Some(job) => job(state),
-                None => state.idle(),
+            match shared.queue.take() {
+                Some(turn) => turn.run(state),
+                None if state.time_passes() => state.idle(),
+                None => std::thread::park(),
             }
+            shared.queue.done();
             state.look();
         }));
         if done.is_err() {
             // After a panic the state is unknown, so only a Stop is sent.
-            state.shared.set_gone();
-            drop(waiting);
+            shared.set_gone();
+            shared.queue.close();
             let _ = catch_unwind(AssertUnwindSafe(|| state.abandon()));
             return;
         }
     }
+    shared.queue.close();
     // An error is ignored, because no caller is left to report it to.
     let _ = state.rest();
 }

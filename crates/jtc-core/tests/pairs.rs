@@ -107,7 +107,7 @@ pub const UNDER_WAY: [(&str, Begin); 11] = [
         bench.until("the path", Bench::moves);
         bench
     }),
-    ("holds the path back (J-75)", |mut config| {
+    ("slows the path down (J-75)", |mut config| {
         // The torque is just sufficient for a slow motion.
         let friction = LuGre::avena(1, 1.2).coulomb;
         config.joints[1].torque_max =
@@ -253,7 +253,7 @@ fn end((doing, begin): (&str, Begin), (name, event, releases): Event) -> &'stati
 
 #[test]
 fn j66_whatever_comes_during_a_reaction_ends_in_a_named_state() {
-    let mut table = format!("| what comes |{}\n", UNDER_WAY.map(|(doing, _)| format!(" {doing} |")).concat());
+    let mut table = format!("| event |{}\n", UNDER_WAY.map(|(doing, _)| format!(" {doing} |")).concat());
     table += &format!("|---|{}\n", "---|".repeat(UNDER_WAY.len()));
     for event in EVENTS {
         let ends = UNDER_WAY.map(|under_way| format!(" {} |", end(under_way, event)));

@@ -298,7 +298,7 @@ fn reaction(rig: &Rig) -> String {
         (ControllerState::HoldPos, TrajectoryState::Pause) if t.errors != 0 => "held stop, Pause".into(),
         (ControllerState::HoldPos, _) if t.errors != 0 => "held stop".into(),
         (ControllerState::HoldPos, _) => "HoldPos".into(),
-        (state, _) => format!("{state:?}, it goes on"),
+        (state, _) => format!("{state:?}, the motion continues"),
     };
     format!("{what}; {torque}, {output}")
 }

@@ -167,25 +167,25 @@ enum Back {
 /// Returns the table as Markdown.
 pub fn fault_matrix() -> Result<String, MatrixError> {
     let mut out = format!(
-        "A cell shows which state the controller goes to, in which tick, and why; tick 1 is the first that begins\n\
-         after the fault. In that tick the torque is zero already. Faults without a time last {LASTING_MS} ms;\n\
-         *clearing* means that no error is left, and that the nodes are being cleared. Where nothing happens within\n\
-         {WATCH_MS} ms, the cell shows why:\n\n\
-         - *bridged*: up to four missing or impossible answers running are allowed, the motion is predicted meanwhile\n  \
-           (J-63). The fifth is the error.\n\
-         - *controlled*: the control law makes up for it, no limit is reached.\n\
-         - *latched*: the arm is in Error because of the very same thing, until the host clears it (J-21).\n\
-         - *no torque*: it matters, and is looked at, while there is torque only.\n\
-         - *not asked*: the drive is already in the state that is wanted of it.\n\
-         - *shown*: the gripper stops no arm; it is shown, and brought up again beside it (J-23).\n\
+        "A cell shows the next state of the controller, the number of the tick in which it changes, and the reason. Tick 1 is the first\n\
+         tick that begins after the fault. In the tick of a change to Error the torque is already zero. A fault without a time in its name\n\
+         lasts {LASTING_MS} ms. *clearing* means that no error is left, and that the controller still clears the nodes. If nothing happens\n\
+         within {WATCH_MS} ms, the cell shows the reason:\n\n\
+         - *bridged*: the controller tolerates up to four missing or impossible answers in a row, and predicts the motion\n  \
+           (J-63). The fifth is an error.\n\
+         - *controlled*: the control law compensates for the fault, and no limit is reached.\n\
+         - *latched*: the controller is already in Error because of the same fault, until the host clears it (J-21).\n\
+         - *no torque*: the controller checks for this fault only while there is torque.\n\
+         - *not asked*: the drive is already in the commanded state.\n\
+         - *shown*: the status shows the fault of the gripper. The controller starts the gripper again and does not stop the arm (J-23).\n\
          - *repeated*: the bus hardware repeats the frame within the tick.\n\
-         - *refused*: damaged frames are answered with a record, and change nothing (J-06).\n\
-         - *bounded*: a tick does a bounded part of the host's work, however much there is (J-07).\n\
-         - *no supervision*: a host that falls silent is no error, and nothing ends for it unless `host_timeout_ms` is set (J-59).\n\
-         - *at rest*: host supervision pauses motions and ends teaching; here is neither.\n\
-         - *late ticks*: fewer than ten late or missing ticks within a second are borne (J-12).\n\n\
-         The last column shows what the host has to send, once the cause is gone, until the arm is held again: nothing,\n\
-         ClearCurrentErrors, or all parameters. Start lasts a single tick.\n\n| fault |"
+         - *refused*: the controller answers damaged frames with an error record, and changes nothing (J-06).\n\
+         - *bounded*: a tick does a bounded amount of work for the host (J-07).\n\
+         - *no supervision*: a silent host is not an error. The controller reacts to it only if `host_timeout_ms` is set (J-59).\n\
+         - *at rest*: host supervision pauses motions and ends Teaching. In this state there is no motion and no Teaching.\n\
+         - *late ticks*: the controller tolerates fewer than ten late or missing ticks within a second (J-12).\n\n\
+         The last column shows what the host must send after the cause has ended, so that the arm is held again: nothing,\n\
+         ClearCurrentErrors, or all parameters. The state Start lasts a single tick.\n\n| fault |"
     );
     for state in STATES {
         out += &format!(" {state:?} |");

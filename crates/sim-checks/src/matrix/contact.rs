@@ -44,8 +44,8 @@ impl Meets {
             Self::Push(joint) => format!("joint {} is pushed for {PUSH_MS} ms", joint.number()),
             Self::Wall(joint) => format!("joint {} meets a wall", joint.number()),
             Self::Plane => "the flange meets a wall".to_owned(),
-            Self::Load(mass) => format!("{mass} kg, unknown, are taken up"),
-            Self::Drops(mass) => format!("{mass} kg, unknown, are taken up, and dropped after 1 s"),
+            Self::Load(mass) => format!("an unknown load of {mass} kg is picked up"),
+            Self::Drops(mass) => format!("an unknown load of {mass} kg is picked up, and dropped after 1 s"),
             Self::Friction(factor) => format!("friction times {factor} in all joints"),
             Self::Masses(factor) => format!("masses times {factor}"),
             Self::Cleared(ms) => format!("safety input low for 1 ms, cleared after {ms} ms"),
@@ -150,12 +150,13 @@ struct Outcome {
 /// Returns the table as Markdown.
 pub fn contact_table() -> Result<String, MatrixError> {
     let mut out = format!(
-        "The default arm on drives without brakes. A push is with gravity, and {} % of what the joint can hold beside its load; a wall of\n\
-         {} N·m/rad stands {} rad ahead of the joint on its path, one of {} N/m {} m ahead of the flange. The way of an arm that is held counts from\n\
-         where it was, of one that moves from where it met something, the path to the place where it stops included. The torque is the highest that\n\
-         presses on a joint from outside, and what stays of it after {} s. The energy is what the arm gives to a wall or a hand, and what it takes\n\
-         from them. A joint that is pushed for long yields (J-68). An arm that falls is enabled again when it stands: nothing catches it before.\n\n\
-         | what happens | in | state then | found after | way; other joints | speed | torque; lasting | energy given; taken |\n\
+        "All rows use the default arm on drives without brakes. A push acts in the direction of gravity, with {} % of the torque that the joint\n\
+         can hold in addition to its load. The wall of a joint has {} N·m/rad and is {} rad ahead of the joint on its path. The wall of the flange\n\
+         has {} N/m and is {} m ahead of the flange. The distance counts from the position at the beginning of the event. For a moving arm it\n\
+         includes the path until the arm stops. The torque is the highest external torque on a joint, and the external torque that remains\n\
+         after {} s. The energy is the energy that the arm gives to a wall or a hand, and the energy that it takes from them. A joint that is\n\
+         pushed for a long time yields (J-68). A falling arm is enabled again only when it is at rest: nothing catches it before.\n\n\
+         | event | in | state then | detected after | distance; other joints | speed | torque; remaining | energy given; taken |\n\
          |---|---|---|---|---|---|---|---|\n",
         100.0 * PUSH_SHARE,
         WALL.0,
@@ -226,7 +227,7 @@ impl Outcome {
         let Self { then, found, ended, way, speed, torque, work } = self;
         let found = found.map_or_else(|| "no reaction".to_owned(), |ms| format!("{ms} ms"));
         let (then, ways) = if *ended {
-            ("the motion came to its end".to_owned(), "its path".to_owned())
+            ("the motion was completed".to_owned(), "its path".to_owned())
         } else {
             (then.clone(), format!("{:.3}; {:.3} rad", way[0], way[1]))
         };

@@ -138,7 +138,7 @@ pub(super) const ROWS: [Row; 40] = [
     seen("joint: gate driver fault", fault(FaultKind::HardwareFault { joint: MEANT })),
     seen("joint in fault state, no error bit", Act::Fault(FaultKind::FaultState { joint: MEANT }, 1)),
     seen(
-        "the same, cleared in the tick that finds it",
+        "joint in fault state, cleared in the tick that finds it",
         Act::Cleared(FaultKind::FaultState { joint: MEANT }, 1, 2),
     ),
     seen("joint: safety line", fault(FaultKind::SafetyLine { node: 1 })),
@@ -168,7 +168,7 @@ pub(super) const ROWS: [Row; 40] = [
     seen("bus cut at the controller", fault(FaultKind::NoAcknowledge)),
     seen("controller bus-off", fault(FaultKind::BusOff)),
     seen("controller bus-off for 1 ms", Act::Fault(FaultKind::BusOff, 1)),
-    seen("the same, cleared in the tick that finds it", Act::Cleared(FaultKind::BusOff, 1, 2)),
+    seen("controller bus-off, cleared in the tick that finds it", Act::Cleared(FaultKind::BusOff, 1, 2)),
     borne(
         "every byte from the host lost",
         fault(FaultKind::SerialLost { probability: 1.0 }),
@@ -198,8 +198,8 @@ pub(super) const ROWS: [Row; 40] = [
 pub(super) const STOPS: [(&str, Act); 6] = [
     ("Pause", Act::Frame(&fixed::PAUSE)),
     ("Stop", Act::Frame(&fixed::STOP)),
-    ("Pause directly behind a byte of noise, and one every 6 ms", Act::InNoise(&fixed::PAUSE)),
-    ("Stop directly behind a byte of noise, and one every 6 ms", Act::InNoise(&fixed::STOP)),
-    ("Pause behind 4,000 short frames", Act::Behind(&fixed::PAUSE)),
-    ("Stop behind 4,000 short frames", Act::Behind(&fixed::STOP)),
+    ("Pause directly after a byte of noise, with one more every 6 ms", Act::InNoise(&fixed::PAUSE)),
+    ("Stop directly after a byte of noise, with one more every 6 ms", Act::InNoise(&fixed::STOP)),
+    ("Pause after 4,000 short frames", Act::Behind(&fixed::PAUSE)),
+    ("Stop after 4,000 short frames", Act::Behind(&fixed::STOP)),
 ];

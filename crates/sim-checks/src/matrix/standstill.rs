@@ -25,7 +25,7 @@ pub(super) enum Motion {
 impl core::fmt::Display for Motion {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::GoesOn => f.write_str("the motion goes on"),
+            Self::GoesOn => f.write_str("the motion continues"),
             Self::Stands { ms, distance, speed } => write!(f, "{ms} ms, {distance:.3} rad, {speed:.2} rad/s"),
             Self::Moves => write!(f, "still moves after {} s", LONGEST_MS / 1000),
         }
@@ -35,10 +35,10 @@ impl core::fmt::Display for Motion {
 /// Returns the table as Markdown, with each fault of the matrix in Operate.
 pub fn standstill_table() -> Result<String, MatrixError> {
     let mut out = String::from(
-        "Each fault in the middle of a motion: the state that the controller is in when every joint stands, milliseconds until\n\
-         then, the longest way of a joint and the peak speed. Without brakes an arm without torque falls until it lies on its end\n\
-         stops; what falls trips the over-speed of its drive on the way, an error of a node. A drive that ignores its state\n\
-         command keeps its brake open.\n\n\
+        "Each fault happens in the middle of a motion. A row shows the state of the controller when every joint is at rest, the\n\
+         milliseconds until then, the longest distance that a joint moves, and the peak speed. An arm without brakes and without torque\n\
+         falls until it lies on its end stops. A falling joint causes an over-speed error of its drive, which is an error of a node. A drive\n\
+         that ignores its state command keeps its brake open.\n\n\
          | in Operate | state then | with holding brakes | without brakes |\n|---|---|---|---|\n",
     );
     for row in &ROWS {

@@ -23,11 +23,13 @@ const WITH_PAYLOAD: (f64, f64) = (-0.9, 0.3);
 /// Returns the table as Markdown.
 pub fn stopping_table() -> Result<String, MatrixError> {
     let mut out = format!(
-        "From the last byte of the command. The loaded arm is one whose shoulder (joint {}) is lowered through a place where\n\
-         holding it takes that share of its torque limit, which is lower than the default one for this. Where the torque that is left\n\
-         does not suffice, all of it brakes for a second; a joint that moves then lowers its load (J-70). `jtc traj check` refuses such a path. The\n\
-         payloads are at the centre of the last link of the default arm, lowered at {} rad/s: in the arm model of the controller,\n\
-         or unknown to it. The sag is how far a joint moves in the half second after the brakes have opened.\n\n\
+        "The times count from the last byte of the command. In the rows *at … % of the torque limit*, the shoulder (joint {}) moves down. The\n\
+         torque that holds it at the position of the Stop is that percentage of its limit, which is lower than the default in these rows. If\n\
+         the remaining torque is not sufficient, the joint brakes with all of it for a second. A joint that still moves then lowers its load\n\
+         (J-70). `jtc traj check` refuses such a path.\n\n\
+         In the rows with a payload, the payload is at the centre of the last link of the default arm, which moves down at {} rad/s. The arm\n\
+         model of the controller contains a *known* payload and lacks an *unknown* one. The sag is the distance that a joint moves in the half\n\
+         second after the brakes have opened.\n\n\
          | in Operate | state then | with holding brakes | without brakes |\n|---|---|---|---|\n",
         LOADED + 1,
         WITH_PAYLOAD.1

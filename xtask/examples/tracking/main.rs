@@ -41,7 +41,7 @@ pub struct Condition {
 impl Condition {
     const IDEAL: Self = Self {
         name: "ideal drives",
-        what: "The drives deliver what they are asked for. The existing law asks for 1.3 times what it has computed.",
+        what: "The drives deliver the requested torque. The existing law requests 1.3 times the computed torque.",
         delivers: 1.0,
         gain: 1.0,
         friction: FrictionModel::Smooth { width: 0.01 },
@@ -57,7 +57,7 @@ impl Condition {
         Self::IDEAL,
         Self {
             name: "drives deliver 1/1.3",
-            what: "As real drives seem to; ours has a torque gain of 1.3 (J-61).",
+            what: "The drives deliver 1/1.3 of the requested torque, as real drives seem to do. Our controller has a torque gain of 1.3 (J-61).",
             delivers: 1.0 / 1.3,
             gain: 1.3,
             ..Self::IDEAL
@@ -70,7 +70,7 @@ impl Condition {
         },
         Self {
             name: "LuGre friction",
-            what: "The joints stick, with 1.4 times the Coulomb torque, and slip along a Stribeck curve.",
+            what: "The joints have static friction of 1.4 times the Coulomb torque, and slip along a Stribeck curve.",
             friction: FrictionModel::LuGre(LuGre {
                 stiction_ratio: 1.4,
                 stribeck_speed: 0.01,
@@ -82,28 +82,28 @@ impl Condition {
         },
         Self {
             name: "2 kg unknown at the flange",
-            what: "Neither controller knows of them.",
+            what: "Both controllers lack this load in their models.",
             mass: 2.0,
             judged: false,
             ..Self::IDEAL
         },
         Self {
             name: "1 % of receptions lost",
-            what: "Of Moves and of answers, by each receiver on its own, while the arm moves.",
+            what: "While the arm moves, each receiver loses 1 % of the Moves or answers, independently of the others.",
             lost: 0.01,
             judged: false,
             ..Self::IDEAL
         },
         Self {
             name: "answers 0 or 1 ms late",
-            what: "Drawn anew in each millisecond; none overtakes an older one.",
+            what: "Each millisecond has a new random delay; answers stay in order.",
             jitter_ms: 1,
             judged: false,
             ..Self::IDEAL
         },
         Self {
             name: "answers 0 to 3 ms late",
-            what: "The same.",
+            what: "Each millisecond has a new random delay; answers stay in order.",
             jitter_ms: 3,
             judged: false,
             ..Self::IDEAL
@@ -200,11 +200,11 @@ fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64;
     };
     let variants = [
         ("as above", condition.believing(0.1, 0.2)),
-        ("friction as believed", condition.believing(0.1, 0.0)),
-        ("masses as believed", condition.believing(0.0, 0.2)),
-        ("both as believed", condition.believing(0.0, 0.0)),
+        ("correct friction", condition.believing(0.1, 0.0)),
+        ("correct masses", condition.believing(0.0, 0.2)),
+        ("both correct", condition.believing(0.0, 0.0)),
         (
-            "both, friction compensated as sharply",
+            "both correct, same width of the friction sign",
             Condition { sign_width: sharp, ..condition.believing(0.0, 0.0) },
         ),
     ];

@@ -35,24 +35,31 @@ const HEADER: &str = "| | j1 | j2 | j3 | j4 | j5 | j6 |\n|---|---|---|---|---|--
 const INTRODUCTION: &str = "\
 # Tracking
 
-How well the arm follows its path: the control law of the existing firmware and ours, on the same simulated arm, drives and bus, with the
-same gains, model and friction. `cargo xtask bench tracking` writes this page; everything is in virtual time, so that each run of it gives the
-same figures.
+This page shows how accurately the arm follows its path. It compares the control law of the existing firmware with ours, on the same simulated
+arm, drives and bus, and with the same gains, model and friction. `cargo xtask bench tracking` writes this page. The simulation uses virtual time,
+so each run of the command gives the same figures.
 
-The existing law is written down in `xtask/examples/tracking/existing.rs` after the firmware published in April 2022: inverse dynamics, PID and
-friction, times 1.3; points joined by straight lines; the measured position, two milliseconds old, compared with the present set
-position; a sign of friction that steps. Ours is the controller itself.
+`xtask/examples/tracking/existing.rs` contains the existing law, written after the firmware that was published in April 2022. This law:
 
-- Figures are RMS over the path, medians of ten arms whose masses are drawn within ±10 % and whose friction within ±20 % of what both
-  controllers believe. Gravity is that of the existing firmware, whose arm hangs from above. The friction of the arm changes its sign
-  within 0.01 rad/s (ours compensates it within 0.02), unless a section has another.
-- *Commanded − true*, mrad: the set position of a tick less the true position when the torque of that tick begins to act.
-- *Commanded − measured*, mrad: what each law compares; with ours the set position of the time of the measurement (J-62).
-- *Roughness*, N·m: the change of the torque at the joint from a millisecond to the next.
-- The goal, for ideal drives, drives that deliver 1/1.3 and sharper friction: commanded − true at most the larger of a fifth of
-  the existing firmware's and 0.04 mrad (a step of the encoder is 0.096 mrad, which alone is 0.03 RMS).
-- The *demo path* is that of `jtc demo`. The *recorded path* was recorded with the existing arm (`TrajectoryInt.csv`); the five points that its
-  recording has left out, after points 184, 358, 544, 726 and 906, are filled in.
+- computes inverse dynamics, PID and friction, and multiplies their sum by 1.3;
+- joins the points of a trajectory by straight lines;
+- compares the measured position, which is two milliseconds old, with the present set position;
+- changes the sign of the friction torque in one step.
+
+“Ours” is the controller itself.
+
+The figures have these meanings:
+
+- The figures are RMS values over the path, and medians of ten arms. The masses of these arms differ from the model of both controllers by up to
+  ±10 %, and the friction by up to ±20 %, at random. Gravity has the direction of the existing arm, which hangs from above. The friction of the
+  arm changes its sign within 0.01 rad/s (ours compensates it within 0.02 rad/s), unless a section states another width.
+- *Commanded − true*, mrad: the set position of a tick minus the true position at the time when the torque of that tick begins to act.
+- *Commanded − measured*, mrad: the error that each law uses. Ours uses the set position of the time of the measurement (J-62).
+- *Roughness*, N·m: the change of the torque at the joint from one millisecond to the next.
+- *Goal*: the largest permitted commanded − true for ideal drives, for drives that deliver 1/1.3 and for sharper friction. The goal is a fifth of
+  the value of the existing firmware, but at least 0.04 mrad. (A step of the encoder is 0.096 mrad, which alone causes 0.03 mrad RMS.)
+- The *demo path* is that of `jtc demo`. The *recorded path* was recorded with the existing arm (`TrajectoryInt.csv`). The recording lacks five
+  points, after points 184, 358, 544, 726 and 906; the comparison adds them.
 ";
 
 impl Comparison {
@@ -77,15 +84,16 @@ impl Comparison {
             );
         }
         if !self.condition.judged {
-            return "No goal is set here.".to_owned();
+            return "This condition has no goal.".to_owned();
         }
         let missed = self.missed();
         if missed.is_empty() {
-            return "The goal is met by every joint.".to_owned();
+            return "Every joint meets the goal.".to_owned();
         }
-        let joints =
-            missed.iter().map(|(j, ours, goal)| format!("joint {} ({ours:.3} of {goal:.3} mrad)", j + 1));
-        format!("The goal is missed by {}.", joints.collect::<Vec<_>>().join(", "))
+        let joints = missed
+            .iter()
+            .map(|(j, ours, goal)| format!("joint {} ({ours:.3} mrad, goal {goal:.3} mrad)", j + 1));
+        format!("These joints miss the goal: {}.", joints.collect::<Vec<_>>().join(", "))
     }
 
     fn section(&self, page: &mut String) {
@@ -112,9 +120,9 @@ impl Comparison {
         if !self.bounds.is_empty() {
             let _ = write!(
                 page,
-                "\nWhat bounds it: our commanded − true, mrad, with a controller that knows more of this arm. Friction that is believed wrongly\n\
-                 is a step of torque wherever a joint turns, which only the integral takes back; so is a sign that is smoothed over another\n\
-                 speed than the arm's.\n\n{HEADER}"
+                "\nThe next table shows the limiting error: our commanded − true, mrad, with a controller that has better values of this arm. If the\n\
+                 friction value is wrong, the torque changes by a step when a joint reverses, and only the integral compensates the step. A\n\
+                 friction sign that changes over another speed range than that of the arm has the same effect.\n\n{HEADER}"
             );
             for (name, error) in &self.bounds {
                 row(page, name, error, 3);
@@ -150,8 +158,8 @@ fn reference(page: &mut String, all: &[Comparison]) {
     let here = [ideal.own_error, ideal.true_error, ideal.roughness, weak.own_error];
     let _ = write!(
         page,
-        "\n## The existing law, and the existing firmware\n\nThe firmware's own code, compiled for a PC, was run on this plant before (demo path). The \
-         law as it is written down here does the same:\n\n{HEADER}"
+        "\n## The existing law, and the existing firmware\n\nThe firmware's own code, compiled for a PC, was run on this plant earlier (demo path). Our \
+         implementation of its law gives the same figures:\n\n{HEADER}"
     );
     let mut most = 0.0f64;
     for ((name, reference), here) in REFERENCE.iter().zip(&here) {
@@ -172,7 +180,7 @@ pub fn text(all: &[Comparison]) -> String {
     reference(&mut page, all);
     let _ = writeln!(page, "\n## Comparison");
     if all.iter().all(|comparison| comparison.path != paths::RECORDED) {
-        let _ = writeln!(page, "\nSkipped: the {} is not at hand.", paths::RECORDED);
+        let _ = writeln!(page, "\nSkipped: the {} is not available.", paths::RECORDED);
     }
     for comparison in all {
         comparison.section(&mut page);

@@ -33,19 +33,19 @@ numbered! {
     Command {
         /// No command.
         #[default]
-        None = 0, "nothing: the number is acknowledged, no more";
+        None = 0, "no command: the agent only acknowledges the number";
         /// Start of a stored trajectory.
-        Start = 1, "start the trajectory: a job, checked, uploaded, executed. `result` 1: it has begun";
+        Start = 1, "start a job that checks, uploads and executes the trajectory. `result` 1: the job has begun";
         /// Pause.
         Pause = 2, "pause";
         /// Resume.
-        Resume = 3, "go on after a pause";
+        Resume = 3, "resume after a Pause";
         /// Stop.
         Stop = 4, "stop";
         /// Teaching on.
-        TeachOn = 5, "teaching: the arm is led by hand";
+        TeachOn = 5, "begin Teaching: a person can lead the arm by hand";
         /// Teaching off.
-        TeachOff = 6, "end of teaching";
+        TeachOff = 6, "end Teaching";
         /// Pump on.
         GripperOn = 7, "gripper: pump on";
         /// Pump off.
@@ -53,13 +53,13 @@ numbered! {
         /// Clear.
         Clear = 9, "clear the errors of the controller and of all drives";
         /// Recover.
-        Recover = 10, "recover: lead the controller back to a held arm, a job";
+        Recover = 10, "recover: start a job that brings the controller back to a held arm";
         /// Recover, with the controller's defaults.
-        RecoverWithDefaults = 11, "the same where the controller has not been given its arm: it uses its defaults, the stored arm where there is one";
+        RecoverWithDefaults = 11, "recover a controller that has not received its arm: it uses the stored arm, or its defaults if it has none";
         /// Speed.
-        SetSpeed = 12, "set speed: the motion that goes on, and later ones, at `speed` % of their own";
+        SetSpeed = 12, "set speed: run the present motion and later ones at `speed` % of their own speed";
         /// Release of the lease.
-        Release = 13, "let the lease go";
+        Release = 13, "release the lease";
     }
 }
 
@@ -71,9 +71,9 @@ numbered! {
     Outcome {
         /// No command yet.
         #[default]
-        None = 0, "there was no command yet";
+        None = 0, "no command yet";
         /// Done.
-        Done = 1, "done; of a job: begun";
+        Done = 1, "done; a job has begun";
         /// Wrong sequence number.
         Sequence = 2, "`sequence` is neither `acknowledged` nor one more: nothing was done";
         /// Impossible value.
@@ -81,19 +81,19 @@ numbered! {
         /// Unknown trajectory.
         NoTrajectory = 4, "no trajectory has this number: nothing was done";
         /// Busy.
-        Busy = 5, "a job or another command of this PLC goes on: nothing was done";
+        Busy = 5, "a job or another command of this PLC is running: nothing was done";
         /// Another client holds the lease.
-        Held = 6, "somebody else commands: nothing was done";
+        Held = 6, "another client holds the lease: nothing was done";
         /// Another client stopped or paused the arm.
-        Stopped = 7, "somebody else stopped or paused the arm less than three seconds ago: nothing was done";
+        Stopped = 7, "another client stopped or paused the arm less than three seconds ago: nothing was done";
         /// A coil of a connection is 1.
         Coil = 8, "the coil `stop` or `pause` of a connection is 1: nothing was done";
         /// Wrong state of the arm.
-        NotReady = 9, "the arm is not in a state for this (`state`, `errors`, `ready`, `paused`): nothing was done";
+        NotReady = 9, "the state of the arm does not permit this command (see `state`, `errors`, `ready`, `paused`): nothing was done";
         /// No answer of the controller.
-        NoController = 10, "the controller is not there or did not answer: the arm may be moving";
+        NoController = 10, "the controller is not connected or did not answer: the arm may be moving";
         /// Refused or failed.
-        Failed = 11, "it was refused or failed: `command_error` has why";
+        Failed = 11, "the command was refused or failed: `command_error` has the reason";
     }
 }
 
@@ -103,39 +103,39 @@ pub const OTHER_ERROR: u16 = 255;
 /// Errors by number: their codes in the API, and descriptions. Numbers are never reused.
 #[rustfmt::skip]
 pub const ERRORS: &[(u16, &str, &str)] = &[
-    (1, "stopped", "somebody stopped or paused the arm before this moved it"),
-    (2, "check", "the check refused the trajectory: joint and point are where it is worst"),
-    (3, "approach", "the way to the first point was refused"),
-    (4, "open-path", "it does not end where it begins, and cannot be repeated without `approach`"),
+    (1, "stopped", "a client stopped or paused the arm before this command moved it"),
+    (2, "check", "the check refused the trajectory; `job_error_joint` and `job_error_point` have the worst violation"),
+    (3, "approach", "the approach to the first point was refused"),
+    (4, "open-path", "the trajectory does not end at its first point, so it cannot be repeated without `approach`"),
     (5, "not-ready", "the controller does not hold the arm"),
-    (6, "state-timeout", "the controller did not come to the state that was waited for"),
+    (6, "state-timeout", "the controller did not reach the expected state in time"),
     (7, "device-error", "the controller is in Error"),
     (8, "absent-joints", "joints are set absent"),
     (9, "run-fault", "the controller ended the motion with an error"),
     (10, "held-stop", "the controller stopped the motion because of an error, and holds the arm"),
-    (11, "refused", "the controller refused it"),
+    (11, "refused", "the controller refused the command"),
     (12, "segment-refused", "the controller refused a part of the trajectory"),
-    (13, "upload-failed", "the trajectory did not reach the controller whole"),
+    (13, "upload-failed", "the controller did not receive the whole trajectory"),
     (14, "not-uploaded", "the controller holds another trajectory"),
-    (15, "not-paused", "nothing is paused"),
-    (16, "rest-refused", "what remains of the motion does not pass the check any more"),
-    (17, "link-lost", "the controller fell silent in a motion: the arm may be moving"),
+    (15, "not-paused", "no motion is paused"),
+    (16, "rest-refused", "the remainder of the motion no longer passes the check"),
+    (17, "link-lost", "the controller fell silent during a motion: the arm may be moving"),
     (18, "no-link", "the controller is silent"),
-    (19, "not-confirmed", "the controller did not confirm it"),
-    (20, "not-sent", "the agent did not send it: somebody else commands, or has stopped the arm"),
-    (21, "no-extension", "this controller cannot do that"),
-    (22, "device-limits", "the controller's limits are not known to be those of the arm"),
-    (23, "no-parameters", "the controller has not been given its arm: recover with its defaults"),
-    (24, "incomplete-arm", "the arm lacks something"),
+    (19, "not-confirmed", "the controller did not confirm the command"),
+    (20, "not-sent", "the agent did not send the command: another client holds the lease, or has stopped the arm"),
+    (21, "no-extension", "this controller does not support the command"),
+    (22, "device-limits", "the agent does not know whether the controller's limits are those of the arm"),
+    (23, "no-parameters", "the controller has not received its arm: recover with its defaults (command 11)"),
+    (24, "incomplete-arm", "the arm lacks parameters"),
     (25, "other-arm", "the controller has another arm"),
-    (26, "arm-changed", "the arm of the controller changed meanwhile"),
-    (27, "cancelled", "it was broken off"),
-    (28, "denied", "somebody else commands, or has stopped the arm"),
-    (29, "busy", "something else goes on"),
-    (30, "gone", "the line is gone"),
-    (31, "fault", "the agent has a fault"),
-    (32, "motion-ended", "the motion had ended before this was done"),
-    (33, "encoder-jumped", "an encoder has jumped (`encoder_jumped`): its drive is to be reset first"),
+    (26, "arm-changed", "the arm of the controller has changed in the meantime"),
+    (27, "cancelled", "the job was cancelled"),
+    (28, "denied", "another client holds the lease, or has stopped the arm"),
+    (29, "busy", "another job or command is running"),
+    (30, "gone", "the line to the controller is lost"),
+    (31, "fault", "internal fault of the agent"),
+    (32, "motion-ended", "the motion ended before the command was executed"),
+    (33, "encoder-jumped", "an encoder has jumped (`encoder_jumped`): first reset its drive"),
 ];
 
 /// Returns the number of an error.

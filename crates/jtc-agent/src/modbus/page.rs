@@ -62,13 +62,14 @@ pub fn tables() -> String {
     let coils = COILS.iter().enumerate().map(|(at, (name, meaning))| bits((at, name, meaning)));
     table("Coils (functions 1, 5, 15)", &["address", "name", "meaning"], coils.collect());
     let commands = Command::ALL.iter().map(|one| vec![(*one as u16).to_string(), one.text().into()]);
-    table("Commands", &["`command`", "what it does"], commands.collect());
+    table("Commands", &["`command`", "action"], commands.collect());
     let results = Outcome::ALL.iter().map(|one| vec![(*one as u16).to_string(), one.text().into()]);
-    table("Results", &["`result`", "what became of the command"], results.collect());
+    table("Results", &["`result`", "meaning"], results.collect());
     let errors = ERRORS.iter().map(|(number, code, text)| (*number, format!("`{code}`"), *text));
-    let other = (OTHER_ERROR, String::new(), "another one: the agent's events and its log have it in words");
+    let other =
+        (OTHER_ERROR, String::new(), "another error: the events and the log of the agent have its text");
     let errors = [(0, String::new(), "none")].into_iter().chain(errors).chain([other]);
     let errors = errors.map(|(number, code, text)| vec![number.to_string(), code, text.into()]);
-    table("Errors", &["number", "code in the API", "what it is"], errors.collect());
+    table("Errors", &["number", "code in the API", "meaning"], errors.collect());
     page
 }

@@ -8,9 +8,10 @@ use jtc_core::{Config, JOINTS};
 fn page() -> String {
     let mut page = String::from(
         "# Settings of the controller\n\n\
-         What a host can read and change beside friction, gains and arm model (J-53), with [SetSettings](protocol-jtc.md#11-extensions)\n\
-         or in an arm file. The table is made from the controller's own. All but those that are *live*, and\n\
-         those that say so, belong to the arm: they change in Init or Error only, are stored with it, and count for its hash. Defaults are those of the built-in arm.\n\n\
+         A host can read and change these settings (J-53), with [SetSettings](protocol-jtc.md#11-extensions) or in an arm file. Friction, gains\n\
+         and arm model are not settings. A test writes this page from the table of the controller. The defaults are those of the built-in arm.\n\n\
+         Most settings are a part of the arm. They change only in Init or Error, are stored with the arm, and change its hash. Settings that are\n\
+         *live*, or marked *not a part of the arm*, are not.\n\n\
          | number | name | range | default | meaning |\n|---|---|---|---|---|\n",
     );
     let config = Config::avena();
@@ -28,10 +29,10 @@ fn page() -> String {
         };
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let kind = match (row.of_joint(), live) {
-            (true, Live::Unpowered) => "; one a joint; no part of the arm",
-            (true, _) => "; one a joint",
-            (false, Live::Always) => "; *live*: in every state, also in motion",
-            (false, Live::Standing) => "; *live*: also in HoldPos, Teaching and Pause",
+            (true, Live::Unpowered) => "; one per joint; not a part of the arm",
+            (true, _) => "; one per joint",
+            (false, Live::Always) => "; *live*: changes in every state, also in motion",
+            (false, Live::Standing) => "; *live*: also changes in HoldPos, Teaching and Pause",
             (false, Live::No | Live::Unpowered) => "",
         };
         let _ =

@@ -24,43 +24,44 @@ pub struct Rule {
 
 /// Rules of all numbers that are proposed.
 pub const RULES: [Rule; 11] = [
-    Rule { name: "gravity_m_s2", rule: "9.81 m/s² down, z of the robot description being up" },
+    Rule { name: "gravity_m_s2", rule: "9.81 m/s² downwards; z of the robot description points up" },
     Rule { name: "position_min_rad", rule: "the drives' working area" },
     Rule { name: "position_max_rad", rule: "the drives' working area" },
     Rule {
         name: "velocity_max_rad_s",
-        rule: "the fastest that the drives do before they trip; of a number above 16 rad/s, which no arm reaches, its value in \
-               degrees per second if that is less",
+        rule: "the highest speed at which the drives do not trip; a number above 16 rad/s, which no arm reaches, is taken as degrees per \
+               second if that is less",
     },
     Rule {
         name: "torque_max_nm",
-        rule: "twice what gravity asks of the joint in its worst pose; at least a twentieth of the strongest joint's, and enough for \
-               an acceleration limit of 3 rad/s²",
+        rule: "twice the gravity torque of the joint in its worst pose; at least a twentieth of the limit of the strongest joint, and enough \
+               for an acceleration limit of 3 rad/s²",
     },
     Rule {
         name: "acceleration_max_rad_s2",
-        rule: "a third of the torque that gravity leaves in its worst pose, over the greatest inertia (three times the proposed \
-               rotor inertia); at most 12.56, and at most what makes such a rotor lag by a fifth of position_error_max_rad",
+        rule: "a third of the torque that remains after gravity in the worst pose, divided by the greatest inertia (with three times the \
+               proposed rotor inertia); at most 12.56, and at most the acceleration at which such a rotor lags by a fifth of \
+               position_error_max_rad",
     },
     Rule { name: "position_error_max_rad", rule: "0.09 rad, 5°" },
     Rule {
         name: "rotor_inertia_kg_m2",
-        rule: "torque_max_nm / (200 rad/s²), in the middle of geared drives that are known",
+        rule: "torque_max_nm / (200 rad/s²), the middle of the range of known geared drives",
     },
     Rule {
         name: "teach_damping_nm_s_rad",
-        rule: "torque_max_nm · 0.5 s/rad, at most 100/s times the least inertia over all poses (a fifth of the proposed rotor inertia, other \
-               joints free)",
+        rule: "torque_max_nm · 0.5 s/rad, at most 100/s times the least inertia over all poses (with a fifth of the proposed rotor inertia \
+               and the other joints free)",
     },
     Rule {
         name: "pid",
-        rule: "with J, the least inertia over all poses (a fifth of the proposed rotor inertia, other joints free), and T, delay_ticks \
-               and 3 ms: Kd = 0.7·J/T, less where joints move each other; Kp = 20/s·Kd; Ki = 2/s·Kp, at most a third of Kp·Kd over the \
-               greatest inertia (three times the rotor); the integral holds half of the torque limit",
+        rule: "J is the least inertia over all poses (with a fifth of the proposed rotor inertia and the other joints free), and T is \
+               delay_ticks plus 3 ms. Kd = 0.7·J/T, less if joints move each other; Kp = 20/s·Kd; Ki = 2/s·Kp, at most a third of Kp·Kd \
+               divided by the greatest inertia (with three times the rotor inertia); the integral supplies half of the torque limit",
     },
     Rule {
         name: "friction_polynomial",
-        rule: "friction and damping of the robot description, else 0: no compensation is safe, too much is not",
+        rule: "friction and damping of the robot description, else 0: no compensation is safe, too much compensation is not",
     },
 ];
 

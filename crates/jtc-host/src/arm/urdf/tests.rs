@@ -513,7 +513,7 @@ fn proposals_are_marked_in_the_file_and_found_again() {
     let back = Arm::parse(&file).unwrap();
     assert_eq!(Arm { warnings: arm.warnings.clone(), ..back.clone() }, arm);
     assert!(back.warnings.len() == 1 && back.warnings[0].to_string().contains("`jtc arm check` lists them"));
-    assert!(file.contains("#   pid: with J, the least inertia"), "{file}");
+    assert!(file.contains("#   pid: J is the least inertia"), "{file}");
     assert!(arm.settings_not_given().is_empty() && arm.parameter_set().missing().is_empty());
     assert_eq!(arm.polynomial.unwrap()[0], [0.25, 0.5, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(arm.polynomial.unwrap()[1], [0.0; 6]);

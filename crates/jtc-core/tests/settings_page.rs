@@ -10,8 +10,8 @@ fn page() -> String {
         "# Settings of the controller\n\n\
          A host can read and change these settings (J-53), with [SetSettings](protocol-jtc.md#11-extensions) or in an arm file. Friction, gains\n\
          and arm model are not settings. A test writes this page from the table of the controller. The defaults are those of the built-in arm.\n\n\
-         Most settings are a part of the arm. They change only in Init or Error, are stored with the arm, and change its hash. Settings that are\n\
-         *live*, or marked *not a part of the arm*, are not.\n\n\
+         Most settings are a part of the arm. Such settings change only in Init or Error, are stored with the arm, and change its hash. Settings\n\
+         that are *live*, or marked *not a part of the arm*, are not.\n\n\
          | number | name | range | default | meaning |\n|---|---|---|---|---|\n",
     );
     let config = Config::avena();

@@ -182,7 +182,7 @@ pub fn fault_matrix() -> Result<String, MatrixError> {
          - *refused*: the controller answers damaged frames with an error record, and changes nothing (J-06).\n\
          - *bounded*: a tick does a bounded amount of work for the host (J-07).\n\
          - *no supervision*: a silent host is not an error. The controller reacts to it only if `host_timeout_ms` is set (J-59).\n\
-         - *at rest*: host supervision pauses motions and ends Teaching. In this state there is no motion and no Teaching.\n\
+         - *at rest*: host supervision pauses motions and ends Teaching. In this state neither is in progress.\n\
          - *late ticks*: the controller tolerates fewer than ten late or missing ticks within a second (J-12).\n\n\
          The last column shows what the host must send after the cause has ended, so that the arm is held again: nothing,\n\
          ClearCurrentErrors, or all parameters. The state Start lasts a single tick.\n\n| fault |"

@@ -35,9 +35,9 @@ const HEADER: &str = "| | j1 | j2 | j3 | j4 | j5 | j6 |\n|---|---|---|---|---|--
 const INTRODUCTION: &str = "\
 # Tracking
 
-This page shows how accurately the arm follows its path. It compares the control law of the existing firmware with ours, on the same simulated
-arm, drives and bus, and with the same gains, model and friction. `cargo xtask bench tracking` writes this page. The simulation uses virtual time,
-so each run of the command gives the same figures.
+This page shows how accurately the arm follows its path. The page compares the control law of the existing firmware with ours, on the same
+simulated arm, drives and bus, and with the same gains, model and friction. `cargo xtask bench tracking` writes this page. The simulation uses
+virtual time, so each run of the command gives the same figures.
 
 `xtask/examples/tracking/existing.rs` contains the existing law, written after the firmware that was published in April 2022. This law:
 

@@ -151,11 +151,12 @@ struct Outcome {
 pub fn contact_table() -> Result<String, MatrixError> {
     let mut out = format!(
         "All rows use the default arm on drives without brakes. A push acts in the direction of gravity, with {} % of the torque that the joint\n\
-         can hold in addition to its load. The wall of a joint has {} N·m/rad and is {} rad ahead of the joint on its path. The wall of the flange\n\
-         has {} N/m and is {} m ahead of the flange. The distance counts from the position at the beginning of the event. For a moving arm it\n\
-         includes the path until the arm stops. The torque is the highest external torque on a joint, and the external torque that remains\n\
-         after {} s. The energy is the energy that the arm gives to a wall or a hand, and the energy that it takes from them. A joint that is\n\
-         pushed for a long time yields (J-68). A falling arm is enabled again only when it is at rest: nothing catches it before.\n\n\
+         can hold in addition to its load. The wall of a joint has a stiffness of {} N·m/rad and is {} rad ahead of the joint on its path. The\n\
+         wall of the flange has a stiffness of {} N/m and is {} m ahead of the flange. The distance counts from the position at the\n\
+         beginning of the event. For a moving arm it includes the path until the arm stops. The torque is the highest external torque on a joint,\n\
+         and the external torque that remains after {} s. The energy is the energy that the arm gives to a wall or a hand, and the energy that it\n\
+         takes from them. A joint that is pushed for a long time yields (J-68). A falling arm is enabled again only when it is at rest: nothing\n\
+         catches it before.\n\n\
          | event | in | state then | detected after | distance; other joints | speed | torque; remaining | energy given; taken |\n\
          |---|---|---|---|---|---|---|---|\n",
         100.0 * PUSH_SHARE,

@@ -85,7 +85,7 @@ impl Row {
     pub fn quiet(&self, state: ControllerState) -> Option<String> {
         match state {
             ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => {
-                self.held.map(|why| format!("goes on: {why}"))
+                self.held.map(|why| format!("continues: {why}"))
             }
             _ => self.parked.map(|why| format!("no effect: {why}")),
         }

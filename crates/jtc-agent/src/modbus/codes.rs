@@ -91,7 +91,7 @@ numbered! {
         /// Wrong state of the arm.
         NotReady = 9, "the state of the arm does not permit this command (see `state`, `errors`, `ready`, `paused`): nothing was done";
         /// No answer of the controller.
-        NoController = 10, "the controller is not connected or did not answer: the arm may be moving";
+        NoController = 10, "the controller is silent or did not answer the command: the arm may be moving";
         /// Refused or failed.
         Failed = 11, "the command was refused or failed: `command_error` has the reason";
     }
@@ -104,7 +104,7 @@ pub const OTHER_ERROR: u16 = 255;
 #[rustfmt::skip]
 pub const ERRORS: &[(u16, &str, &str)] = &[
     (1, "stopped", "a client stopped or paused the arm before this command moved it"),
-    (2, "check", "the check refused the trajectory; `job_error_joint` and `job_error_point` have the worst violation"),
+    (2, "check", "the check refused the trajectory; `job_error_joint` and `job_error_point` name the place of the worst violation"),
     (3, "approach", "the approach to the first point was refused"),
     (4, "open-path", "the trajectory does not end at its first point, so it cannot be repeated without `approach`"),
     (5, "not-ready", "the controller does not hold the arm"),

@@ -120,8 +120,8 @@ impl Comparison {
         if !self.bounds.is_empty() {
             let _ = write!(
                 page,
-                "\nThe next table shows the limiting error: our commanded − true, mrad, with a controller that has better values of this arm. If the\n\
-                 friction value is wrong, the torque changes by a step when a joint reverses, and only the integral compensates the step. A\n\
+                "\nThe next table shows what limits the accuracy: our commanded − true, mrad, with a controller that has better values of this arm. If\n\
+                 the friction value is wrong, the torque has an error that steps when a joint reverses, and only the integral compensates this step. A\n\
                  friction sign that changes over another speed range than that of the arm has the same effect.\n\n{HEADER}"
             );
             for (name, error) in &self.bounds {

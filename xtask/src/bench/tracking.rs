@@ -85,7 +85,7 @@ mod tests {
                 missed |= misses;
             }
             assert_eq!(text.contains("Every joint meets the goal."), !missed, "{heading}");
-            assert_eq!(text.contains("The next table shows the limiting error"), missed, "{heading}");
+            assert_eq!(text.contains("The next table shows what limits the accuracy"), missed, "{heading}");
         }
     }
 

@@ -397,7 +397,7 @@ mod tests {
         };
         for (kind, helps) in [
             (StopKind::Push, "remove what pushes"),
-            (StopKind::Overload, "give the payload"),
+            (StopKind::Overload, "set the payload"),
             (StopKind::Unstable, "gains"),
             (StopKind::EncoderJump, "`jtc reset --joints JOINT`"),
             (StopKind::SpeedScale, "velocity_full_scale_rad_s"),

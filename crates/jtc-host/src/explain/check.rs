@@ -6,25 +6,18 @@ use crate::check::ProblemKind;
 const fn missing(bit: u32, name: &'static str, meaning: &'static str) -> Page {
     let texts = [
         meaning,
-        "It was switched on or reset since, or this parameter was not among those that were sent.",
-        "Send the arm's own, or name those of the built-in arm.",
+        "The controller was switched on or reset after the parameters were sent, or this parameter was not \
+         sent.",
+        "Send the parameters of the arm. For the built-in arm use `jtc params use-defaults`.",
         "jtc params push FILE",
     ];
     page(Family::Missing, bit, name, texts)
 }
 
 pub(super) const MISSING: &[Page] = &[
-    missing(
-        0,
-        "missing-friction",
-        "The controller has not been given the friction of the joints; it waits in Init.",
-    ),
-    missing(1, "missing-pid", "The controller has not been given the gains of the joints; it waits in Init."),
-    missing(
-        2,
-        "missing-arm-model",
-        "The controller has not been given masses and frames of the arm; it waits in Init.",
-    ),
+    missing(0, "missing-friction", "The controller has no friction of the joints, and waits in Init."),
+    missing(1, "missing-pid", "The controller has no gains of the joints, and waits in Init."),
+    missing(2, "missing-arm-model", "The controller has no masses and frames of the arm, and waits in Init."),
 ];
 
 /// Declares the pages of the check: kind and name, then meaning, usual cause, remedy, and the next command. The default
@@ -42,87 +35,90 @@ macro_rules! found {
 found! {
     Empty "check-empty":
         "The file has no point.",
-        "An empty file, or only a head.",
-        "Look at what wrote it.";
+        "The file is empty, or has only a header.",
+        "Check the program that wrote the file.";
     TooManyPoints "check-too-many-points":
-        "The trajectory has more points than the controller holds.",
-        "A long motion in short steps.",
-        "Take a longer step, or run it in parts.";
+        "The trajectory has more points than the controller can hold.",
+        "The motion is long, and its steps are short.",
+        "Use a longer step, or run the motion in parts.";
     TooManySegments "check-too-many-segments":
-        "The trajectory would be sent in more segments than there may be.",
-        "A small --points-per-segment.",
-        "Leave --points-per-segment out.";
+        "The trajectory needs more segments than the controller accepts.",
+        "The value of --points-per-segment is too small.",
+        "Leave out --points-per-segment.";
     SegmentPoints "check-segment-points":
-        "A segment would have a number of points that no frame carries.",
-        "A wrong --points-per-segment.",
-        "Leave --points-per-segment out.";
+        "A segment would have a number of points that no frame can carry.",
+        "The value of --points-per-segment is wrong.",
+        "Leave out --points-per-segment.";
     StepTime "check-step-time":
         "The step between points is 0 ms.",
-        "Equal times in the file.",
-        "Give each point a later time than the one before.";
+        "Points in the file have equal times.",
+        "Give each point a later time than the point before it.";
     PositionScale "check-position-scale":
-        "A position is outside what a frame carries.",
-        "Degrees instead of radians, most often.",
-        "Write radians, or use a header with q1_deg.";
+        "A position is outside the range that a frame can carry.",
+        "Most often the positions are in degrees instead of radians.",
+        "Write the positions in radians, or name the columns q1_deg to q6_deg.";
     VelocityScale "check-velocity-scale":
-        "A velocity is outside what a frame carries.",
-        "Degrees instead of radians, or far too fast.",
-        "Write rad/s; slow it down with --speed.";
+        "A velocity is outside the range that a frame can carry.",
+        "The values are in degrees instead of radians, or the motion is far too fast.",
+        "Write the velocities in rad/s, or slow the motion down with --speed.";
     AccelerationScale "check-acceleration-scale":
-        "An acceleration is outside what a frame carries.",
-        "Degrees instead of radians, or a jump in the velocities.",
-        "Write rad/s²; slow it down with --speed.";
+        "An acceleration is outside the range that a frame can carry.",
+        "The values are in degrees instead of radians, or the velocities have a jump.",
+        "Write the accelerations in rad/s², or slow the motion down with --speed.";
     Jump "check-jump":
-        "Two points are so far apart that the arm cannot get from one to the other in a step.",
-        "Pieces put together, missing points, or degrees instead of radians.",
-        "Look at the points that are named; give more points there, or more time.";
+        "Two points are so far apart that the arm cannot move from one to the other in one step.",
+        "The trajectory was joined from parts, points are missing, or the values are in degrees instead of \
+         radians.",
+        "Look at the named points, and add points or time between them.";
     Position "check-position":
         "A position is over its limit.",
         "The path leaves the range of the joint.",
-        "Change the path at the point that is named.";
+        "Change the path at the named point.";
     Velocity "check-velocity":
         "A velocity is over its limit.",
         "The motion is too fast for this joint.",
-        "Slow it down: --speed PCT.";
+        "Slow the motion down with --speed PCT.";
     Acceleration "check-acceleration":
         "An acceleration is over its limit.",
         "The motion changes its speed too quickly.",
-        "Slow it down: --speed PCT.";
+        "Slow the motion down with --speed PCT.";
     Torque "check-torque":
-        "By the arm model the motion needs more torque than the limit.",
-        "Too fast, too heavy a load, or masses that are not the arm's.",
-        "Slow it down with --speed PCT, or name the right arm with --arm FILE.";
+        "According to the arm model, the motion needs more torque than the limit.",
+        "The motion is too fast, the load is too heavy, or the masses do not match the arm.",
+        "Slow the motion down with --speed PCT, or name the right arm with --arm FILE.";
     HoldTorque "check-hold-torque":
-        "Standing still on this path takes nearly all of a joint's torque.",
-        "A stretched pose with a heavy load.",
-        "Change the pose that is named, or take a lighter load.";
+        "At a point of this path, a joint needs nearly all of its torque to hold the arm at rest.",
+        "The arm is stretched and carries a heavy load.",
+        "Change the named pose, or use a lighter load.";
     FrictionVelocity "check-friction-velocity":
         "A velocity is outside the friction table.",
-        "The table was measured for slower motions.",
-        "Slow it down with --speed PCT, or use the friction polynomial.";
+        "The table was measured at lower velocities.",
+        "Slow the motion down with --speed PCT, or use the friction polynomial.";
     NoStop "check-no-stop":
-        "From a place of the path Pause and Stop cannot bring the arm to rest in time with the torque that there is.",
-        "A fast motion downwards, or a heavy load.",
-        "Slow it down: --speed PCT.";
+        "At a point of the path, the available torque is too small to bring the arm to rest in time after a \
+         Pause or Stop.",
+        "The arm moves down fast, or carries a heavy load.",
+        "Slow the motion down with --speed PCT.";
     PositionSpeed "check-position-speed":
-        "Positions move faster than the velocity limit, whatever the given velocities are.",
-        "Times that are too short, or degrees instead of radians.",
-        "Slow it down: --speed PCT.";
+        "The positions change faster than the velocity limit, even if the velocities in the file do not \
+         exceed it.",
+        "The times are too short, or the positions are in degrees instead of radians.",
+        "Slow the motion down with --speed PCT.";
     VelocityMismatch "check-velocity-mismatch":
-        "Positions move at another speed than the given velocities.",
-        "Pieces put together, or velocities in another unit.",
-        "Leave the velocities out: they are derived from the positions.";
+        "The speed at which the positions change differs from the velocities in the file.",
+        "The trajectory was joined from parts, or the velocities are in another unit.",
+        "Leave out the velocities: the check derives them from the positions.";
     NotAtRest "check-not-at-rest":
-        "The first or the last point is not at rest.",
-        "A part was cut out of a longer motion.",
-        "Begin and end with velocity 0.";
+        "The arm is not at rest at the first or the last point.",
+        "The trajectory was cut from a longer motion.",
+        "Begin and end the trajectory with velocity 0.";
     StartPose "check-start-pose":
         "The arm is not at the first point of the trajectory.",
-        "It was moved, or the last motion ended elsewhere.",
-        "Look whether the way is free, then let it move to the first point.",
+        "The arm was moved, or the last motion ended at another position.",
+        "Check that the path is free, then move the arm to the first point.",
         "jtc traj run FILE --approach";
     AccelerationMismatch "check-acceleration-mismatch":
-        "Velocities change otherwise than by the given accelerations.",
-        "Pieces put together, or accelerations in another unit.",
-        "Leave the accelerations out: they are derived from the velocities.";
+        "The velocities do not change as the accelerations in the file require.",
+        "The trajectory was joined from parts, or the accelerations are in another unit.",
+        "Leave out the accelerations: the check derives them from the velocities.";
 }

@@ -5,84 +5,87 @@ use super::entries;
 entries! {
     Data {
         0 "data-idle":
-            "No data to judge.",
-            "The status carries no record, or its frame arrived damaged.",
-            "Nothing.",
+            "The status has no result for data.",
+            "The status has no record of a frame, or the recorded frame arrived damaged.",
+            "No action is needed.",
             "jtc status";
         1 "data-no-error":
-            "The data were taken.",
-            "A good frame.",
-            "Nothing.",
+            "The controller accepted the data.",
+            "The frame is valid.",
+            "No action is needed.",
             "jtc status";
         2 "too-many-points":
-            "More points than the controller holds (12,000 in all, 1,500 in a segment).",
-            "Trajectory too long for its step.",
-            "Use a longer step: the controller interpolates each millisecond.",
+            "The trajectory has more points than the controller can hold (12,000 in total, 1,500 in a \
+             segment).",
+            "The trajectory is too long for its step time.",
+            "Use a longer step: the controller interpolates between the points each millisecond.",
             "jtc traj check FILE";
         3 "too-many-segments":
-            "More than 100 segments.",
-            "Segments too short for this trajectory.",
-            "Leave --points-per-segment away.",
+            "The trajectory has more than 100 segments.",
+            "The segments are too short for this trajectory.",
+            "Leave out --points-per-segment.",
             "jtc traj run FILE";
         4 "incorrect-segment-order":
             "A segment is repeated, skipped or from another trajectory.",
             "A segment before it was lost, or two programs send at once.",
-            "The upload sends again by itself; make sure that only one program sends.",
+            "Make sure that only one program sends. The upload sends a lost segment again by itself.",
             "jtc doctor";
         5 "incorrect-step-time":
             "The step time is 0 or differs from the first segment.",
-            "File or program that sends it.",
+            "The file or the program that sends the trajectory has an error.",
             "Check the file.",
             "jtc traj check FILE";
         6 "incorrect-value":
-            "A number that cannot be, or would throw or drop the arm: NaN, negative mass or gain, bounds exchanged, axis not \
-             increasing, unknown command, gains, masses or friction beyond the bounds of these drives, a model whose weight the \
-             torque limits cannot hold; or a trajectory that leaves a limit: when it is uploaded or, if it came from an existing host, \
-             when it is executed.",
-            "File or program that sends it.",
-            "The push names the number, `jtc traj check` the place of a trajectory.",
+            "A value is invalid or unsafe for the arm. Invalid values are, for example, NaN, a negative mass \
+             or gain, exchanged bounds, an axis that does not increase, and an unknown command. Gains, masses \
+             or friction may exceed the bounds of these drives, or the torque limits may not hold the weight \
+             of the model. A trajectory may exceed a limit: the controller checks this during the upload or, \
+             for an existing host, before the motion.",
+            "The file or the program that sends the value has an error.",
+            "Correct the value. `jtc params push` names it; for a trajectory, `jtc traj check` names the \
+             point.",
             "jtc params push FILE";
         7 "not-allowed":
-            "This is not possible in the present state.",
-            "For example a trajectory outside HoldPos, or teaching while moving.",
-            "Look at the state; stop the motion or recover first.",
+            "The controller does not allow this request in its present state.",
+            "For example, a host sent a trajectory outside HoldPos, or requested teaching during a motion.",
+            "Look at the state. Stop the motion, or recover, first.",
             "jtc status";
         8 "start-position-mismatch":
-            "A joint is farther from the first point than allowed (0.02 rad).",
+            "A joint is farther from the first point than the tolerance of 0.02 rad.",
             "The arm was moved, or the trajectory begins elsewhere.",
-            "Let it be moved there first.",
+            "Move the arm to the first point.",
             "jtc traj run FILE --approach";
     }
     Frame {
         0 "frame-idle":
             "No frame was received.",
-            "The status carries no record.",
-            "Nothing.",
+            "The status has no record of a frame.",
+            "No action is needed.",
             "jtc status";
         1 "frame-no-error":
-            "The frame arrived whole.",
-            "A good frame.",
-            "Nothing.",
+            "The frame arrived complete and undamaged.",
+            "The frame is valid.",
+            "No action is needed.",
             "jtc status";
         2 "incorrect-header":
-            "Bytes that begin no frame, or an impossible length.",
-            "Noise, wrong rate, or a program that speaks something else.",
-            "Check rate, cable and earth.",
+            "The bytes do not begin a valid frame, or its length is impossible.",
+            "Noise, a wrong baud rate, or a program that uses another protocol.",
+            "Check the baud rate, the cable and the earth connection.",
             "jtc doctor";
         3 "incorrect-frame-type":
-            "A frame type, or a length for its type, that there is not.",
+            "The frame type is unknown, or the length is invalid for this type.",
             "Noise, or a program for another firmware.",
-            "Check what sends it.",
+            "Check the program that sends the frame.",
             "jtc decode";
         4 "incorrect-crc":
-            "The check sum is wrong.",
-            "Bits lost on the line.",
-            "Check cable and earth; a lower rate helps.",
+            "The checksum of the frame is wrong.",
+            "Bits were lost on the line.",
+            "Check the cable and the earth connection. A lower baud rate helps.",
             "jtc doctor";
         5 "discontinuous-frame":
-            "A gap of 5 ms or more within a frame.",
+            "The frame has a gap of 5 ms or more.",
             "The sending computer paused, or bytes were lost.",
-            "Nothing if it is rare: frames are sent again.",
+            "No action is needed if this error is rare: the host sends the frame again.",
             "jtc doctor";
     }
 }

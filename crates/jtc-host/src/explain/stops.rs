@@ -22,10 +22,13 @@ pub(super) const HELD_STOP: &[Page] = &[page(
     0,
     "held-stop",
     [
-        "The controller has brought the arm to rest and holds it. Nothing is executed until the errors are cleared.",
-        "A push, an obstacle, a load that the arm model lacks, or another of the causes that `jtc explain stop:` lists; `jtc status` shows \
-         it. With the number 0 the controller does not tell it.",
-        "Remove the cause, wait until the arm stands, then clear the errors. A paused motion can go on from where it stands.",
+        "The controller has brought the arm to rest and holds it. No motion is executed until the errors are \
+         cleared.",
+        "A push, an obstacle, a load that the arm model lacks, or another cause. `jtc status` shows the \
+         cause, and `jtc explain stop:` lists all causes. With the number 0 the controller does not report \
+         the cause.",
+        "Remove the cause, wait until the arm is at rest, then clear the errors. You can then resume a \
+         paused motion from the present position.",
         "jtc status",
     ],
 )];
@@ -36,16 +39,17 @@ pub(super) const CAUSES: &[Page] = &KINDS;
 stops! {
     Overload "held-stop-overload":
         "A joint needed more torque than its limit for too long.",
-        "A load that is heavier than the payload that was given, a motion that is too fast for it, or an arm model that is not this arm.",
-        "Give the payload if the arm carries one, and check that the arm model is that of this arm.",
+        "A load that is heavier than the payload that was set, a motion that is too fast for the load, or an \
+         arm model that does not match the arm.",
+        "Set the payload if the arm carries one, and check that the arm model matches the arm.",
         "jtc payload set";
     Push "held-stop-push":
-        "Something pushed a joint: the controller held a torque against it that the model does not explain.",
-        "A person, an obstacle, a hose or cable that pulls, or a load that was not given as payload.",
-        "Remove what pushes the joint, or give the payload if the arm carries one.";
+        "Something pushed a joint: the controller held it with a torque that the model does not explain.",
+        "A person, an obstacle, a hose or cable that pulls, or a load that was not set as payload.",
+        "Remove what pushes the joint, or set the payload if the arm carries one.";
     PositionError "held-stop-position-error":
-        "A joint was too far from where it was commanded to be.",
-        "An obstacle, gains that are too low, wrong friction, or a drive that gives no torque.",
+        "A joint was too far from its commanded position.",
+        "An obstacle, gains that are too low, wrong friction, or a drive without torque.",
         "Look for an obstacle, and compare gains and friction with those of the arm.";
     Position "held-stop-position":
         "A commanded position was beyond its limit.",
@@ -54,7 +58,7 @@ stops! {
         "jtc traj check FILE";
     Velocity "held-stop-velocity":
         "A commanded velocity was beyond its limit.",
-        "The trajectory is too fast, also between its points.",
+        "The trajectory is too fast at its points or between them.",
         "Run the trajectory slower, within the velocity limits.",
         "jtc traj check FILE";
     Acceleration "held-stop-acceleration":
@@ -64,40 +68,42 @@ stops! {
         "jtc traj check FILE";
     FrictionTable "held-stop-friction-table":
         "The friction table has no value for a commanded velocity at this temperature.",
-        "The bearing is colder or warmer, or the joint faster, than the table reaches.",
-        "Use the friction polynomial, or a table with wider axes.",
+        "The temperature of the bearing or the speed of the joint is outside the table.",
+        "Use the friction polynomial, or a table with a wider range.",
         "jtc params use-defaults";
     Unstable "held-stop-unstable":
-        "A joint swung more and more, or its torque went from limit to limit: its gains make the position controller unstable. This \
-         joint has softer gains now, without Ki.",
+        "The oscillation of a joint grew, or its torque alternated between its limits: its gains make the \
+         position controller unstable. The joint now has softer gains, without Ki.",
         "Gains that are too high for the inertia of this joint, or a rotor inertia that is wrong in the arm file.",
         "Lower the gains of this joint, or correct its rotor inertia.",
         "jtc arm check FILE";
     EncoderJump "encoder-jumped":
-        "The position of a joint's encoder jumped. The controller goes on with the right position, and executes no trajectory until the drive \
-         was reset.",
-        "A loose or faulty encoder, its cable, or a strong disturbance beside it.",
+        "The position of a joint's encoder jumped. The controller continues with the correct position, and \
+         executes no trajectory until the drive is reset.",
+        "A loose or faulty encoder, a faulty encoder cable, or a strong disturbance near the encoder.",
         "Support the arm, disable it, compare the joint with its marks, reset its drive, then recover.",
         "jtc disable";
     SpeedScale "held-stop-speed-scale":
-        "The position and the speed that a drive reports differ by a factor.",
-        "The setting `velocity_full_scale_rad_s` is not that of the drives.",
+        "The speed that a drive reports and the change of its position differ by a factor.",
+        "The setting `velocity_full_scale_rad_s` does not match the drives.",
         "Set `velocity_full_scale_rad_s` in the arm file to the full scale of the drives' velocity.",
         "jtc arm push FILE";
     Approach "held-stop-approach":
-        "When the drives were enabled, the arm was too far from the path, or had too little torque left to approach it; the motion was given up.",
+        "When the drives were enabled, the arm was too far from the path, or had too little torque left to \
+         approach it. The controller cancelled the motion.",
         "The arm sank or was moved between the command and the enabling of its drives, or a load uses most of its torque.",
         "Bring the arm nearer to the start of the motion, or approach it more slowly.",
         "jtc traj run FILE --approach";
     Gains "held-stop-gains":
-        "A joint did not bear gains that were given while the arm was held, or the arm was released while they were on trial. The gains before are \
-         in use again.",
-        "Gains that are too high, too low or not damped, a push within 2 s of giving them, or a load that the model lacks.",
-        "Compare the gains with the arm before they are given again.",
+        "New gains failed their trial at a joint of the held arm, or the arm was released during the trial. \
+         The previous gains are in use again.",
+        "Gains that are too high, too low or not damped, a push within 2 s after they were sent, or a load \
+         that the model lacks.",
+        "Compare the gains with the arm before you send them again.",
         "jtc arm check FILE";
     Shove "held-stop-shove":
-        "Something pushed a joint: it moved away from where it was commanded to be, faster than anything but a push explains; or it was led too fast \
-         in Teaching, where nothing is commanded.",
+        "A joint moved away from its commanded position so fast that only a push explains the motion. Or a \
+         person led a joint too fast in Teaching.",
         "A person, an obstacle that moves, a hose or cable that pulls, or a load that was taken up or dropped.",
-        "Remove what moved the joint; give the payload if the arm has taken one up.";
+        "Remove what moved the joint; set the payload if the arm has taken up a load.";
 }

@@ -53,7 +53,9 @@ macro_rules! error_codes {
             pub const fn reaction(self) -> &'static str {
                 match self {
                     $(Self::$code => $reaction,)+
-                    Self::Unknown(_) => "Send the image again; after three attempts the hardware is at fault.",
+                    Self::Unknown(_) => {
+                        "Send the image again. After three failed attempts the hardware is faulty."
+                    }
                 }
             }
         }
@@ -63,28 +65,28 @@ macro_rules! error_codes {
 error_codes! {
     /// 1: the image does not have the checksum of its header.
     Checksum = 1, "DSP_ERROR_CHECKSUM":
-        "The image arrived or was written with another checksum than its header names.",
-        "Send the image again; three attempts in all.";
+        "The checksum of the received or written image differs from the checksum in its header.",
+        "Send the image again. Stop after three attempts.";
     /// 2: memory area disabled or protected.
     MemProtected = 2, "DSP_ERROR_MEM_PROTECTED":
         "Programming is not enabled, the image lies outside the application area, or it is for another board.",
-        "Check board and image: repeating does not help.";
+        "Check board and image. Sending the image again does not help.";
     /// 3: erasing, writing or verifying flash failed.
     Flash = 3, "DSP_ERROR_FLASH":
         "The board could not erase, write or verify its flash memory.",
-        "Send the image again; after three attempts the hardware is at fault.";
+        "Send the image again. After three failed attempts the hardware is faulty.";
     /// 4: program data arrived while the block buffer was in use.
     Overrun = 4, "DSP_ERROR_OVERRUN":
-        "Program data came while the board was still busy with the block before.",
+        "Program data arrived while the board was still busy with the previous block.",
         "Send the image again with a larger prog.frame_gap_us.";
     /// 5: invalid data header, or an offset at or beyond the end of the buffer.
     Data = 5, "DSP_ERROR_DATA":
-        "The header of the image is invalid; or controller inputs or parameters were sent beyond the last one.",
-        "In an update: the image's header is wrong. Else: compare the profile's dimensions and endian.";
+        "The header of the image is invalid, or controller inputs or parameters were sent beyond the last one.",
+        "In an update, check the image header. Otherwise compare dimensions and endian of the profile.";
     /// 6: frames could not be sent.
     CanTransmit = 6, "DSP_ERROR_CAN_TRANSMIT":
         "The board could not send its frames for a while.",
-        "Look at cable, termination and bus load.";
+        "Check cable, termination and bus load.";
     /// 7: a message was too short or had a wrong length.
     CanReceive = 7, "DSP_ERROR_CAN_RECEIVE":
         "A message was too short or had a wrong length.",
@@ -95,12 +97,12 @@ error_codes! {
         "Send the image again with a larger prog.frame_gap_us.";
     /// 9: the previous PC_INIT was not acknowledged yet.
     Reinit = 9, "DSP_ERROR_REINIT":
-        "A number was given while the acknowledgement of the one before had not left the board.",
-        "Wait 100 ms, ask with PC_INFO, go on.";
+        "The board received a number before it had sent the acknowledgement of the previous number.",
+        "Wait 100 ms, send PC_INFO, then continue.";
     /// 10: a cycle was interrupted, came in the wrong order or differed from the first cycle.
     ExloadCycle = 10, "DSP_ERROR_EXLOAD_CYCLE":
-        "The transfer paused too long, came out of turn, or the second cycle differed from the first.",
-        "Send the image again; three attempts in all.";
+        "The transfer paused too long, was out of order, or the second cycle differed from the first.",
+        "Send the image again. Stop after three attempts.";
     /// 11: no valid application to start.
     AutostartForbidden = 11, "DSP_ERROR_AUTOSTART_FORBIDDEN":
         "There is no valid application to start.",

@@ -65,17 +65,17 @@ fn poses(desk: &Desk) {
     let mut page = Page::new(PAGE, "poses");
     page.case("An arm file to begin with", "jtc example arm", &exact(desk, "jtc example arm"));
     for (title, command) in [
-        ("Here is home", "jtc pose save home --arm my-arm.toml"),
-        ("To another place", "jtc move --to 20,15,-30,0,25,0 --deg --speed 20"),
-        ("That is where something is picked up", "jtc pose save pick --arm my-arm.toml"),
-        ("What the file has of it", "tail -n 3 my-arm.toml"),
-        ("Home again", "jtc move --to home --arm my-arm.toml --speed 50"),
-        ("All poses", "jtc --json pose list --arm my-arm.toml"),
+        ("Save the home pose", "jtc pose save home --arm my-arm.toml"),
+        ("Move to another position", "jtc move --to 20,15,-30,0,25,0 --deg --speed 20"),
+        ("Save the pick pose", "jtc pose save pick --arm my-arm.toml"),
+        ("The poses in the file", "tail -n 3 my-arm.toml"),
+        ("Move home", "jtc move --to home --arm my-arm.toml --speed 50"),
+        ("List all poses", "jtc --json pose list --arm my-arm.toml"),
     ] {
         page.case(title, command, &done(desk, command));
     }
     let slip = "jtc move --to hoem --arm my-arm.toml";
-    page.case("A slip of the hand", slip, &desk.run(slip).blurred());
+    page.case("A mistyped name", slip, &desk.run(slip).blurred());
     page.finish();
 }
 
@@ -83,12 +83,15 @@ fn plan(desk: &Desk) {
     let mut page = Page::new(PAGE, "plan");
     for (title, command) in [
         (
-            "Two poses are a motion",
+            "A motion between two poses",
             "printf 'pose\\nhome\\npick\\nhome\\n' > poses.csv; jtc plan poses.csv -o there-and-back.csv --arm my-arm.toml",
         ),
-        ("More waypoints, to try", "jtc example cycle"),
-        ("The file", "cat cycle-waypoints.csv"),
-        ("Their motion", "jtc plan cycle-waypoints.csv -o cycle.csv --blend 0.05 --report plan.html"),
+        ("An example with more waypoints", "jtc example cycle"),
+        ("The waypoint file", "cat cycle-waypoints.csv"),
+        (
+            "The motion through the waypoints",
+            "jtc plan cycle-waypoints.csv -o cycle.csv --blend 0.05 --report plan.html",
+        ),
         ("The check that every run makes", "jtc traj check cycle.csv"),
     ] {
         // The output of the first plan depends on measured poses.
@@ -105,14 +108,14 @@ fn lines(desk: &Desk) {
             "Two poses of the flange",
             "printf 'x,y,z,roll,pitch,yaw\\n0.6,-0.3,0.4,0,0,0\\n0.6,0.3,0.4,0,0,0\\n' > poses-of-flange.csv; jtc plan poses-of-flange.csv -o across.csv",
         ),
-        ("On the line", "jtc plan poses-of-flange.csv -o line.csv --line"),
+        ("On a straight line", "jtc plan poses-of-flange.csv -o line.csv --line"),
     ] {
         page.case(title, command, &exact(desk, command));
     }
     let moves = [
-        ("To its beginning", "jtc move --to-flange 0.6,-0.3,0.4,0,0,0"),
-        ("The same without a file", "jtc move --to-flange 0.6,0.3,0.4,0,0,0 --line"),
-        ("Back to where the other motions begin", "jtc move --to home --arm my-arm.toml"),
+        ("Move to the first pose", "jtc move --to-flange 0.6,-0.3,0.4,0,0,0"),
+        ("A straight line without a file", "jtc move --to-flange 0.6,0.3,0.4,0,0,0 --line"),
+        ("Move back to the home pose", "jtc move --to home --arm my-arm.toml"),
     ];
     for (title, command) in moves {
         page.case(title, command, &done(desk, command));
@@ -123,12 +126,12 @@ fn lines(desk: &Desk) {
 fn runs(desk: &Desk) {
     let mut page = Page::new(PAGE, "run");
     for (title, command) in [
-        ("Three times", "jtc traj run cycle.csv --repeat 3 --record run.mcap"),
+        ("Run the cycle three times", "jtc traj run cycle.csv --repeat 3 --record run.mcap"),
         (
-            "The pose of the plan above",
+            "Run the motion between two poses twice",
             "jtc traj run there-and-back.csv --arm my-arm.toml --repeat 2 --approach",
         ),
-        ("What a recording is of", "jtc traj replay run.mcap"),
+        ("Run the motion of a recording", "jtc traj replay run.mcap"),
     ] {
         page.case(title, command, &done(desk, command));
     }
@@ -147,7 +150,7 @@ fn broken_off() {
         done(&desk, command);
     }
     let run = "jtc traj run cycle.csv --speed 40 --record broken.mcap";
-    page.case_of_a_moment("Ctrl-C in the middle of it", run, || {
+    page.case_of_a_moment("Ctrl-C during a run", run, || {
         let run = format!("{run} --overwrite");
         done(&desk, "jtc move --to 0,0,0,0,0,0 --speed 100");
         let in_motion = |jtc: &std::process::Child, _: &Sim| {
@@ -157,7 +160,7 @@ fn broken_off() {
         desk.moving(&run, in_motion).blurred()
     });
     let on = "jtc traj continue broken.mcap";
-    page.case("And on", on, &done(&desk, on));
+    page.case("Continue the run", on, &done(&desk, on));
     page.finish();
 }
 
@@ -171,9 +174,12 @@ fn taught() {
     let lead = desk.dir().join("lead.csv");
     desk.write_line(&format!("hand {}", lead.display()));
     for (title, command) in [
-        ("Led for some seconds", "jtc teach record taught.csv --waypoints --tolerance 0.02 --duration 8"),
-        ("Its motion", "jtc plan taught.csv -o taught-motion.csv --blend 0.02 --speed 50"),
-        ("Run", "jtc traj run taught-motion.csv --approach"),
+        (
+            "Lead the arm for some seconds",
+            "jtc teach record taught.csv --waypoints --tolerance 0.02 --duration 8",
+        ),
+        ("Plan the taught motion", "jtc plan taught.csv -o taught-motion.csv --blend 0.02 --speed 50"),
+        ("Run the taught motion", "jtc traj run taught-motion.csv --approach"),
     ] {
         page.case(title, command, &done(&desk, command));
     }

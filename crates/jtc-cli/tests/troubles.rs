@@ -31,13 +31,13 @@ fn the_page_of_troubles_says_what_jtc_prints() {
 fn trajectory_files(page: &mut Page, desk: &Desk) {
     page.group("jtc: files");
     for (title, command) in [
-        ("A file that is not there", "jtc traj check nothing.csv"),
+        ("A file that does not exist", "jtc traj check nothing.csv"),
         ("Degrees instead of radians", "jtc traj check degrees.csv"),
         ("Decimal commas", "jtc traj check commas.csv"),
         ("No header", "jtc traj check no-header.csv"),
-        ("A column too few", "jtc traj check column.csv"),
-        ("Too fast", "jtc traj check fast.csv"),
-        ("Outside the limits of a joint", "jtc traj check outside.csv"),
+        ("A missing column", "jtc traj check column.csv"),
+        ("A trajectory that is too fast", "jtc traj check fast.csv"),
+        ("A position outside the limits of a joint", "jtc traj check outside.csv"),
         ("Two points that are far apart", "jtc traj check step.csv"),
         ("A fault file that counts joints from 0", "jtc sim --serial /tmp/jtc --faults old-faults.toml"),
     ] {
@@ -49,12 +49,12 @@ fn arms(page: &mut Page, desk: &Desk) {
     page.group("jtc: the arm");
     for (title, command) in [
         ("A URDF with seven axes", "jtc arm import seven.urdf -o arm.toml"),
-        ("A URDF whose joints turn without end", "jtc arm import continuous.urdf -o arm.toml"),
+        ("A URDF with continuous joints", "jtc arm import continuous.urdf -o arm.toml"),
         ("A URDF with a gripper that moves", "jtc arm import gripper.urdf -o arm.toml"),
-        ("A URDF with a word in the place of a number", "jtc arm import word.urdf -o arm.toml"),
-        ("An arm file that no controller takes", "jtc arm check wrong.toml"),
+        ("A URDF with a word instead of a number", "jtc arm import word.urdf -o arm.toml"),
+        ("An arm file that every controller refuses", "jtc arm check wrong.toml"),
         ("An arm that its drives cannot hold", "jtc arm check weak.toml"),
-        ("An arm file of an older form", "jtc params show old.toml"),
+        ("An arm file of an older format", "jtc params show old.toml"),
         ("A trajectory instead of an arm file", "jtc traj check motion.csv --arm motion.csv"),
     ] {
         page.case(title, command, &desk.run(command));
@@ -63,7 +63,7 @@ fn arms(page: &mut Page, desk: &Desk) {
 
 fn link(page: &mut Page, desk: &Desk) {
     page.group("jtc: the link");
-    page.case("A port that is not there", "jtc status", &desk.run("jtc status"));
+    page.case("A port that does not exist", "jtc status", &desk.run("jtc status"));
     page.case(
         "A file instead of a port",
         "jtc status --port motion.csv",
@@ -72,26 +72,30 @@ fn link(page: &mut Page, desk: &Desk) {
     let silent = with_files(Desk::at(Line::new("")));
     page.case("Nothing answers", "jtc status", &silent.run("jtc status").blurred());
     let noisy = with_files(Desk::at(Line::new("a rate that is not ours makes noise\n")));
-    page.case("Another rate, or another device", "jtc status", &noisy.run("jtc status").blurred());
+    page.case("Another baud rate, or another device", "jtc status", &noisy.run("jtc status").blurred());
     let sim = with_files(Desk::simulated(&["--speed", "max", "--no-throttle"]));
-    page.case("No parameters yet", "jtc traj run motion.csv", &sim.run("jtc traj run motion.csv"));
+    page.case(
+        "A controller without parameters",
+        "jtc traj run motion.csv",
+        &sim.run("jtc traj run motion.csv"),
+    );
     let push = "jtc params push slower.toml";
     page.case("An arm whose limits the controller does not have", push, &sim.run(push));
     assert_eq!(sim.run("jtc recover --defaults").code, 0, "it waits until all drives are enabled");
     let other = "jtc traj run motion.csv --arm slower.toml";
-    page.case("A run for another arm than the controller has", other, &sim.run(other));
+    page.case("A run for an arm that the controller does not have", other, &sim.run(other));
     page.case(
         "Settings while the arm is held",
         "jtc arm push slower.toml",
         &sim.run("jtc arm push slower.toml"),
     );
-    page.case("No joint is jogged that fast", "jtc jog 1 5", &sim.run("jtc jog 1 5"));
+    page.case("A jog that is too fast", "jtc jog 1 5", &sim.run("jtc jog 1 5"));
     let second = "jtc sim --serial /tmp/jtc";
-    page.case("A second simulator at the same place", second, &sim.run(second));
-    page.case("Stop, and nothing moves", "jtc stop", &sim.run("jtc stop"));
-    page.case("Resume, and nothing is paused", "jtc traj resume", &sim.run("jtc traj resume"));
+    page.case("A second simulator at the same path", second, &sim.run(second));
+    page.case("A Stop when nothing moves", "jtc stop", &sim.run("jtc stop"));
+    page.case("A resume when nothing is paused", "jtc traj resume", &sim.run("jtc traj resume"));
     let busy = sim.hold_port();
-    page.case("Another program has the port", "jtc status", &sim.run("jtc status"));
+    page.case("Another program has opened the port", "jtc status", &sim.run("jtc status"));
     drop(busy);
 }
 
@@ -105,7 +109,7 @@ fn moving(page: &mut Page) {
     let run = "jtc traj run motion.csv";
     let elsewhere = "jtc traj run elsewhere.csv";
     page.case(
-        "The arm is not where the motion begins",
+        "The arm is not at the start of the motion",
         elsewhere,
         &ready(&["--speed", "max"]).run(elsewhere),
     );
@@ -120,7 +124,7 @@ fn moving(page: &mut Page) {
     for (title, fault) in [
         ("A drive reports a fault", "kind = \"motor-fault\"\njoint = 3\nbits = 2"),
         ("A drive falls silent", "kind = \"node-silent\"\njoint = 2\nfor_s = 0.05"),
-        ("Somebody pushes the arm", "kind = \"push\"\njoint = 3\ntorque_nm = 110\nfor_s = 0.5"),
+        ("A person pushes the arm", "kind = \"push\"\njoint = 3\ntorque_nm = 110\nfor_s = 0.5"),
     ] {
         let desk = Desk::new();
         let file = desk.dir().join("fault.toml");
@@ -141,8 +145,8 @@ fn moving(page: &mut Page) {
     for unit in ["s", "min", "h", "days"] {
         doctor.text = doctor.text.replace(&format!("… {unit} ago"), "… s ago");
     }
-    page.case("What is wrong after it", "jtc doctor", &doctor);
-    page.case("The way back", "jtc recover", &pushed.run("jtc recover"));
+    page.case("The diagnosis after the push", "jtc doctor", &doctor);
+    page.case("The recovery after the push", "jtc recover", &pushed.run("jtc recover"));
 }
 
 fn outputs(page: &mut Page) {
@@ -151,16 +155,16 @@ fn outputs(page: &mut Page) {
     assert_eq!(desk.run("jtc recover --defaults").code, 0);
     desk.run("touch old.csv; ln -s /dev/full full.csv");
     for (title, command) in [
-        ("The recording is there already", "jtc traj run motion.csv --record old.csv"),
-        ("A recording of no known form", "jtc traj run motion.csv --record run.txt"),
+        ("The recording exists already", "jtc traj run motion.csv --record old.csv"),
+        ("A recording of an unknown format", "jtc traj run motion.csv --record run.txt"),
         ("The disk is full", "jtc traj run motion.csv --record full.csv --overwrite"),
-        ("The result has no place", "jtc status > /dev/full"),
-        ("A word that is no command", "jtc traj chek motion.csv"),
-        ("The same for a program", "jtc --json traj chek motion.csv 2> /dev/null"),
-        ("A file that is not there, for a program", "jtc --json traj check nothing.csv 2> /dev/null"),
+        ("The result cannot be written", "jtc status > /dev/full"),
+        ("An unknown command", "jtc traj chek motion.csv"),
+        ("An unknown command, as JSON", "jtc --json traj chek motion.csv 2> /dev/null"),
+        ("A file that does not exist, as JSON", "jtc --json traj check nothing.csv 2> /dev/null"),
     ] {
         page.case(title, command, &desk.run(command));
     }
     let shown = "jtc help files | head -1";
-    page.case("A reader that has gone", shown, &desk.run(shown));
+    page.case("The reader of the output has ended", shown, &desk.run(shown));
 }

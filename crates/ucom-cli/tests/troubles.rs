@@ -110,12 +110,12 @@ fn bus(page: &mut Page) {
     let command = "env -u UCOM_BUS ucom scan";
     page.case("No bus is named", command, &empty.types(command));
     page.case("No board is on the bus", "ucom init", &empty.types("ucom init"));
-    page.case("Nobody answers", "ucom scan", &empty.types("ucom scan"));
+    page.case("No board answers", "ucom scan", &empty.types("ucom scan"));
     let command = "ucom sim --listen localhost:29536";
     page.case("A second simulator at the same address", command, &empty.types(command));
     empty.signal("-KILL");
     std::thread::sleep(Duration::from_millis(300));
-    page.case("The bus is not there", "ucom scan", &empty.types("ucom scan"));
+    page.case("The bus is not available", "ucom scan", &empty.types("ucom scan"));
 }
 
 fn boards(page: &mut Page) {
@@ -130,10 +130,14 @@ fn boards(page: &mut Page) {
     page.case("Boards with another byte order", "ucom init", &other.types("ucom init"));
     let mut sim = numbered(&["--boards", "2"]);
     page.case("The application is not started", "ucom ci 1 1=5", &sim.types("ucom ci 1 1=5"));
-    page.case("A number without a name", "ucom ci 1 5", &sim.types("ucom ci 1 5"));
+    page.case("A value without a name", "ucom ci 1 5", &sim.types("ucom ci 1 5"));
     sim.fault("same-number board=2");
-    page.case("Two boards have one number", "ucom scan", &of_a_moment(sim.types("ucom scan")));
-    page.case("The same, asked why", "ucom doctor", &of_a_moment(sim.types("ucom doctor")));
+    page.case("Two boards with the same number", "ucom scan", &of_a_moment(sim.types("ucom scan")));
+    page.case(
+        "The diagnosis of two boards with the same number",
+        "ucom doctor",
+        &of_a_moment(sim.types("ucom doctor")),
+    );
 }
 
 fn firmware(page: &mut Page) {
@@ -194,9 +198,9 @@ fn outputs(page: &mut Page) {
     page.group("ucom: terminal and outputs");
     let sim = numbered(&["--boards", "1"]);
     for (title, command) in [
-        ("The result has no place", "ucom scan > /dev/full"),
-        ("A word that is no command", "ucom scann"),
-        ("The same for a program", "ucom --json scann 2> /dev/null"),
+        ("The result cannot be written", "ucom scan > /dev/full"),
+        ("An unknown command", "ucom scann"),
+        ("An unknown command, as JSON", "ucom --json scann 2> /dev/null"),
     ] {
         page.case(title, command, &sim.types(command));
     }

@@ -126,14 +126,14 @@ const WORDS: [Fixed; 38] = [
         OUTCOME,
         &["up-to-date"],
         "The board has the same Program ID and date, and the inventory shows that this image was written to \
-         this address. Nothing was sent.",
+         this address. The command sent nothing.",
         "no action is needed",
     ),
     (
         OUTCOME,
         &["program-up-to-date"],
         "The board has the same Program ID, but its content, load address and other memories are not known. \
-         Nothing was sent.",
+         The command sent nothing.",
         "ucom update --rewrite writes the image, --unverified accepts the board",
     ),
     (

@@ -43,7 +43,7 @@ class Reach(gym.Env):
 
 if __name__ == "__main__":
     check_env(Reach(), skip_render_check=True)
-    print("the environment is as Gymnasium wants it")
+    print("the environment passes the check of Gymnasium")
     environment, model = Reach(), Dynamics(Arm.avena())
     kp, kd = np.array([150, 150, 100, 30, 30, 15.0]), np.array([60, 60, 40, 8, 8, 4.0])
     for seed in range(3):

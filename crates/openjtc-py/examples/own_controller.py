@@ -15,14 +15,14 @@ from openjtc.sim import Plant, Simulator
 
 SEED = 7
 SECONDS = 4.0
-WAY = np.array([0.8, 0.5, -0.7, 0.4, 0.6, -0.9])
+OFFSET = np.array([0.8, 0.5, -0.7, 0.4, 0.6, -0.9])
 
 
 def there_and_back(start, u, period):
-    """Returns positions, velocities and accelerations of a smooth path to `start + WAY` and back; `u` is the time divided by `period`."""
+    """Returns positions, velocities and accelerations of a smooth path to `start + OFFSET` and back; `u` is the time divided by `period`."""
     w = 2 * np.pi
     s, ds, dds = (1 - np.cos(w * u)) / 2, w / 2 * np.sin(w * u), w**2 / 2 * np.cos(w * u)
-    return start + np.outer(s, WAY), np.outer(ds, WAY) / period, np.outer(dds, WAY) / period**2
+    return start + np.outer(s, OFFSET), np.outer(ds, OFFSET) / period, np.outer(dds, OFFSET) / period**2
 
 
 def ours(arm, motion, wanted):

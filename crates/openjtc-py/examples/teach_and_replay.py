@@ -1,5 +1,5 @@
-"""Teach by hand and replay: the recorded positions are reduced to waypoints, and a motion through them is planned
-within the limits.
+"""Teach by hand and replay: reduces the recorded positions to waypoints, and plans a motion through them within the
+limits.
 
     python teach_and_replay.py [sim: | /dev/ttyUSB0 | http://HOST:PORT]
 """

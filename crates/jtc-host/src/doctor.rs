@@ -242,7 +242,7 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
             }
             if s.is_held_stop() {
                 let why = "held stop: the arm met something, or its model lacks a load";
-                all.add(Problem, what, why, next!("remove the cause or give the payload, then {}", Clear));
+                all.add(Problem, what, why, next!("remove the cause or set the payload, then {}", Clear));
             } else {
                 all.add(
                     Problem,

@@ -113,7 +113,7 @@ const WORDS: [Fixed; 38] = [
     (
         OUTCOME,
         &["not-started"],
-        "The update of this board did not start.",
+        "The update of this board did not start. Its memory is unchanged.",
         "read the error of this board: it names the cause",
     ),
     (

@@ -78,7 +78,7 @@ fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> St
 /// Returns the next step after a held stop in a motion.
 fn after_held_stop(cause: Option<&StopCause>) -> Next {
     let remedy = match cause.map(|cause| cause.kind) {
-        None => "remove what the arm met, or give its payload".to_owned(),
+        None => "remove what the arm met, or set its payload".to_owned(),
         // No trajectory can continue before the drive is reset.
         Some(StopKind::EncoderJump) => return held_stop::after_encoder_jump(),
         Some(kind) => held_stop::remedy(kind),

@@ -18,8 +18,8 @@ entries! {
         2 "internal-error":
             "The controller has detected an internal error.",
             "A joint is over a limit (bit 4), or the joint bus does not work (bit 5). If neither bit is set, \
-             ten ticks were late within one second, or the board was reset after a watchdog timeout, a hard \
-             fault or a panic. The log of the board shows the place of such a failure.",
+             ten ticks were late or missing within one second, or the board was reset after a watchdog \
+             timeout, a hard fault or a panic. The log of the board shows the place of such a failure.",
             "Look at the more specific bits. After a reset clear the errors, and send the parameters again.",
             "jtc status";
         3 "external-error":
@@ -58,9 +58,11 @@ entries! {
             "Check the trajectory against the arm file.",
             "jtc traj check FILE";
         1 "joint-velocity":
-            "The commanded velocity is over its limit.",
-            "The trajectory is too fast at its points or between them.",
-            "Run the trajectory slower.",
+            "The commanded velocity is over its limit, or the measured speed was over 1.2 times this limit \
+             for 5 ms (settings `overspeed_factor` and `overspeed_ms`).",
+            "The trajectory is too fast at its points or between them. A measured speed that is too high can \
+             also come from a person, gravity or a wrong arm model that moves the joint.",
+            "Run the trajectory slower. If no trajectory ran, first find what moved the joint.",
             "jtc traj run FILE --speed 50";
         2 "joint-acceleration":
             "The commanded acceleration is over its limit.",
@@ -75,10 +77,10 @@ entries! {
             "Look for an obstacle, and check the load and the arm model. `jtc clear` ends a held stop.",
             "jtc traj check FILE --arm ARM";
         4 "joint-position-error":
-            "Commanded and measured position are too far apart. In HoldPos this is a held stop: the \
-             controller holds the arm.",
-            "An obstacle, gains that are too low, wrong friction or a wrong arm model, or a drive without \
-             torque.",
+            "Commanded and measured position are too far apart, or the two encoders of the joint do not \
+             match. In HoldPos this is a held stop: the controller holds the arm.",
+            "An obstacle, gains that are too low, wrong friction or a wrong arm model, a drive without \
+             torque, or a faulty encoder.",
             "Look for an obstacle, and compare model and friction with the arm. `jtc clear` ends a held \
              stop.",
             "jtc status";
@@ -177,9 +179,9 @@ entries! {
             "jtc traj run FILE";
         2 "tes-pause":
             "The motion is paused on the path.",
-            "A host requested Pause, a held stop interrupted the motion, or no host sent frames for the time \
-             `host_timeout_ms`.",
-            "Resume or stop the motion.",
+            "A host requested Pause, a held stop interrupted the motion, or no valid frame arrived for the \
+             time `host_timeout_ms`.",
+            "Resume or stop the motion. After a held stop, first remove its cause and clear the errors.",
             "jtc traj resume";
         3 "tes-execute":
             "The trajectory is being executed.",

@@ -36,11 +36,11 @@ entries! {
             "Check the file.",
             "jtc traj check FILE";
         6 "incorrect-value":
-            "A value is invalid or unsafe for the arm. Invalid values are, for example, NaN, a negative mass \
-             or gain, exchanged bounds, an axis that does not increase, and an unknown command. Gains, masses \
-             or friction may exceed the bounds of these drives, or the torque limits may not hold the weight \
-             of the model. A trajectory may exceed a limit: the controller checks this during the upload or, \
-             for an existing host, before the motion.",
+            "A value is invalid or unsafe for the arm. Invalid values are, for example, NaN, a negative \
+             mass or gain, exchanged bounds, an axis that does not increase, and an unknown command. Unsafe \
+             values are gains, masses or friction beyond the bounds of these drives, a model whose weight \
+             the torque limits cannot hold, and a trajectory that exceeds a limit. The controller checks a \
+             trajectory during the upload or, for a host without extensions, before the motion.",
             "The file or the program that sends the value has an error.",
             "Correct the value. `jtc params push` names it; for a trajectory, `jtc traj check` names the \
              point.",

@@ -234,7 +234,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
         if !board.info.has_application() {
             f.warn(
                 format!("board {n} has no valid application"),
-                "never programmed, or an update was cut off",
+                "never programmed, or an update was interrupted",
                 format!("`ucom update {n} IMAGE`"),
             );
         }

@@ -16,7 +16,7 @@ pub enum Refusals {
     /// The token is missing or does not belong to this agent
     #[response(status = 401)]
     Token(Problem),
-    /// The request comes from a page of another site, uses another host name, or lacks the token or lease that it needs
+    /// The request comes from a page of another site, uses another host name, or lacks the required token or lease
     #[response(status = 403)]
     Elsewhere(Problem),
     /// The request takes longer than allowed

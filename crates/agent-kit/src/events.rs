@@ -35,7 +35,7 @@ pub struct EventsRequest {
     after: u64,
     /// Number of a job: only its events are returned.
     job: Option<u64>,
-    /// Longest wait for the first event if the list is empty, s; 0 to 8.
+    /// Longest wait for an event if the list is empty, s; 0 to 8.
     #[serde(default)]
     #[param(minimum = 0, maximum = 8)]
     wait_s: f64,
@@ -46,7 +46,7 @@ pub struct EventsRequest {
 #[derive(Clone, Debug, Serialize, ToSchema)]
 #[schema(description = "Events.")]
 pub struct EventsObject<E> {
-    /// Number that identifies this run of the agent; another run counts its events from 1.
+    /// Number that identifies this run of the agent. Each run counts its events from 1.
     agent: String,
     /// Events, oldest first.
     events: Vec<E>,

@@ -17,10 +17,10 @@ pub trait Halts {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct KnownHalt {
-    /// Value of `last_halt` in the status that the client used. If another Stop or Pause has been requested since then,
-    /// also by this client, the request moves nothing, however long it was on its way. Missing: the last one when the
-    /// head of this request arrived; the request is also refused within 3 s after a Stop or Pause of another
-    /// client.
+    /// Value of `last_halt` in the status that the client used. If a client, also this one, has requested another Stop
+    /// or Pause since then, the agent refuses this request, even if it was sent earlier. Without this parameter, the
+    /// agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the request
+    /// within 3 s after a Stop or Pause of another client.
     pub asked_after: Option<u64>,
 }
 

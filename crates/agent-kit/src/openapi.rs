@@ -83,7 +83,7 @@ impl Modify for Bearer {
 #[derive(IntoResponses)]
 #[expect(dead_code, reason = "describes responses")]
 enum Denials {
-    /// Refused
+    /// The request is refused
     #[response(status = 409)]
     Denied(Problem),
     /// The request is larger than allowed
@@ -98,7 +98,7 @@ enum Denials {
     /// An error occurred during the request
     #[response(status = 500)]
     Fault(Problem),
-    /// The commanded device is not there
+    /// The device is lost
     #[response(status = 503)]
     Lost(Problem),
 }

@@ -101,7 +101,7 @@ impl Serialize for Problem {
 struct ErrorObject<'a> {
     /// Short name of the error, for programs.
     code: &'a str,
-    /// Message for people: request, place, value and limit.
+    /// Message for people: request, joint, board or point, value and limit.
     message: &'a str,
     /// Number of a board of a chain.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -109,7 +109,7 @@ struct ErrorObject<'a> {
     /// Number of a joint of an arm, 1 to 6 from the base.
     #[serde(skip_serializing_if = "Option::is_none")]
     joint: Option<u8>,
-    /// Index of a point of the trajectory, from 0; in motion the 1 ms point.
+    /// Index of a point of the trajectory, from 0; during a motion, index of the 1 ms point.
     #[serde(skip_serializing_if = "Option::is_none")]
     point: Option<u32>,
     /// Measured or requested value, in the unit of the message.

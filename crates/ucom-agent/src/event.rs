@@ -27,20 +27,20 @@ pub enum ChainEvent {
     Halt {
         /// Name of the client that requested it.
         by: String,
-        /// Number of Stops within a tenth of a second that end with this one; missing: a single Stop.
+        /// Number of Stops within 0.1 s up to this Stop; missing: a single Stop.
         #[serde(skip_serializing_if = "Option::is_none")]
         times: Option<u64>,
     },
     /// Answers of the boards after a Stop.
     Stopped {
-        /// Numbers of boards that have confirmed it.
+        /// Numbers of the boards that have confirmed the Stop.
         boards: Vec<u8>,
-        /// Boards that may still run, each with the reason; includes boards that ran and are silent now.
+        /// Boards that may still run, each with the reason. This includes boards that ran and do not answer now.
         not_stopped: Vec<String>,
     },
     /// Change of a board's heartbeats.
     Heartbeat {
-        /// Number of the board; missing: a board that is not known.
+        /// Number of the board; missing: the agent does not know the board.
         #[serde(skip_serializing_if = "Option::is_none")]
         board: Option<u8>,
         /// Change: `late`, `lost`, `back`, or `rebooted`, after which the board has no number.

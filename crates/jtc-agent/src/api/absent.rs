@@ -19,7 +19,7 @@ use crate::owner::ClientPort;
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AbsentObject {
-    /// Joints, each at most once; empty: all joints are there.
+    /// Joints, each at most once; empty: no joint is absent.
     #[schema(max_items = 6)]
     pub absent: Vec<AbsentJoint>,
 }
@@ -90,7 +90,7 @@ impl AbsentObject {
     get,
     path = "/api/absent",
     operation_id = "get_absent",
-    responses((status = 200, description = "Those that are not there", body = AbsentObject), Refusals, Denials)
+    responses((status = 200, description = "Absent joints", body = AbsentObject), Refusals, Denials)
 )]
 pub(super) async fn absent(State(agent): State<Agent>) -> Result<Json<AbsentObject>, Problem> {
     Ok(Json(agent.ask(Session::absent).await?.into()))
@@ -98,14 +98,14 @@ pub(super) async fn absent(State(agent): State<Agent>) -> Result<Json<AbsentObje
 
 /// Sets these joints absent, and all others present.
 ///
-/// The controller accepts this only without torque. While a joint is absent no motion is executed.
+/// The controller accepts this only without torque. While a joint is absent, the controller does not execute motions.
 #[utoipa::path(
     put,
     path = "/api/absent",
     operation_id = "set_absent",
     params(LeaseKey),
     request_body = AbsentObject,
-    responses((status = 204, description = "The controller expects the others"), Refusals, Denials)
+    responses((status = 204, description = "These joints are absent, and all others are present"), Refusals, Denials)
 )]
 pub(super) async fn set_absent(
     State(agent): State<Agent>,

@@ -20,7 +20,7 @@ use super::runs::JobObject;
 use crate::jobs::{Given, Task, give};
 use crate::owner::ClientPort;
 
-/// Arm in use by the controller.
+/// Arm that the controller uses.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ArmObject {
     /// Name of the arm.
@@ -90,12 +90,12 @@ pub(super) fn in_words(hash: u64) -> String {
     format!("{hash:016x}")
 }
 
-/// Returns the arm in use by the controller, as a file.
+/// Returns the arm that the controller uses, as a file.
 #[utoipa::path(
     get,
     path = "/api/arm",
     operation_id = "get_arm",
-    responses((status = 200, description = "As it was read from the controller", body = ArmObject), Refusals, Denials)
+    responses((status = 200, description = "Arm as read from the controller", body = ArmObject), Refusals, Denials)
 )]
 pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, Problem> {
     let arm = agent.ask(Session::device_arm).await?;
@@ -105,17 +105,17 @@ pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, P
 
 /// Sends a complete arm to the controller, as a job.
 ///
-/// Settings, name, friction, gains and model are sent, read back and compared. If settings differ, the controller must
-/// be in Init or Error (`POST /api/disable`). In Init it starts the position hold as soon as it has the complete arm,
-/// and stays in Init if the arm is stored. An arm with values that a controller would refuse is refused before anything
-/// is sent.
+/// The agent sends settings, name, friction, gains and model, reads them back and compares them. If settings differ, the
+/// controller must be in Init or Error (`POST /api/disable`). In Init, the controller starts the position hold as soon as
+/// it has the complete arm. If the arm is stored, the controller stays in Init. If the arm has values that a controller
+/// would refuse, the agent refuses the arm and sends nothing.
 #[utoipa::path(
     put,
     path = "/api/arm",
     operation_id = "put_arm",
     params(LeaseKey, KnownHalt),
     request_body = ArmRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn put_arm(
     State(agent): State<Agent>,

@@ -114,7 +114,7 @@ impl Agent {
     post,
     path = "/api/resume",
     params(LeaseKey, KnownHalt),
-    responses((status = 204, description = "The motion goes on, or will in a moment"), Refusals, Denials)
+    responses((status = 204, description = "The controller resumes the motion"), Refusals, Denials)
 )]
 pub(super) async fn resume(
     State(agent): State<Agent>,
@@ -151,7 +151,7 @@ fn not_paused(status: &Status) -> Problem {
     operation_id = "set_speed",
     params(LeaseKey),
     request_body = SpeedObject,
-    responses((status = 204, description = "The controller changes to that speed"), Refusals, Denials)
+    responses((status = 204, description = "The controller changes to this speed"), Refusals, Denials)
 )]
 pub(super) async fn speed(
     State(agent): State<Agent>,
@@ -173,13 +173,13 @@ pub(super) async fn speed(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Starts or ends Teaching, in which the arm is led by hand.
+/// Starts or ends Teaching, in which a person moves the arm by hand.
 #[utoipa::path(
     post,
     path = "/api/teach",
     params(LeaseKey, KnownHalt),
     request_body = Switch,
-    responses((status = 204, description = "Teaching has begun, or ended"), Refusals, Denials)
+    responses((status = 204, description = "Teaching has started, or ended"), Refusals, Denials)
 )]
 pub(super) async fn teach(
     State(agent): State<Agent>,
@@ -204,7 +204,7 @@ pub(super) async fn teach(
     path = "/api/gripper",
     params(LeaseKey),
     request_body = Switch,
-    responses((status = 204, description = "It is switched"), Refusals, Denials)
+    responses((status = 204, description = "The pump is switched"), Refusals, Denials)
 )]
 pub(super) async fn gripper(
     State(agent): State<Agent>,
@@ -235,7 +235,7 @@ pub(super) async fn disable(State(agent): State<Agent>, asker: Asker) -> Result<
     path = "/api/payload",
     params(LeaseKey),
     request_body = PayloadObject,
-    responses((status = 204, description = "It comes into the torque over 0.5 s"), Refusals, Denials)
+    responses((status = 204, description = "The controller adds the torque of the payload over 0.5 s"), Refusals, Denials)
 )]
 pub(super) async fn set_payload(
     State(agent): State<Agent>,

@@ -54,14 +54,15 @@ impl From<Finding> for FindingObject {
     }
 }
 
-/// Diagnoses link, joint bus and set-up, which takes two seconds and changes nothing.
+/// Diagnoses link, joint bus and set-up.
 ///
-/// The link is judged by all bytes that the controller has sent. Other rates are not tried, because the line is in use.
+/// The diagnosis takes two seconds and changes nothing. For the link, it evaluates all bytes that the controller sends in
+/// this time. The agent does not try other rates, because the line is in use.
 #[utoipa::path(
     get,
     path = "/api/doctor",
     operation_id = "examine",
-    responses((status = 200, description = "What was found", body = DoctorObject), Refusals, Denials)
+    responses((status = 200, description = "Findings of the diagnosis", body = DoctorObject), Refusals, Denials)
 )]
 pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObject>, Problem> {
     let look = || agent.line.with(|line, now| (now, line.received()));

@@ -58,8 +58,8 @@ pub(super) struct Denials;
 impl IntoResponses for Denials {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
         denials(
-            "Refused: another client commands, something else is going on, a check or the controller forbids it",
-            "The port is gone, or the controller is silent",
+            "The request is refused: another client holds the lease, another request is running, or a check or the controller refuses it",
+            "The port is lost, or the controller does not answer",
         )
     }
 }

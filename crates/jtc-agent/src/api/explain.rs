@@ -29,7 +29,7 @@ impl From<&Page> for PageObject {
     get,
     path = "/api/explain",
     operation_id = "list_codes",
-    responses((status = 200, description = "A page for each code", body = Vec<PageObject>), Refusals)
+    responses((status = 200, description = "Pages, one for each code", body = Vec<PageObject>), Refusals)
 )]
 pub(super) async fn list() -> Json<Vec<PageObject>> {
     Json(pages().map(PageObject::from).collect())
@@ -42,11 +42,11 @@ pub(super) async fn list() -> Json<Vec<PageObject>> {
     operation_id = "explain",
     params((
         "code" = String, Path,
-        description = "Name of a code, or what `jtc explain` takes: the words that a screen shows, a number as `can:0x100`, words of a name"
+        description = "Name of a code; also the words that a screen shows, a number as `can:0x100`, or words of a name, as for `jtc explain`"
     )),
     responses(
-        (status = 200, description = "The page that fits best", body = PageObject),
-        (status = 404, description = "Nothing is known about that", body = Problem),
+        (status = 200, description = "Page that matches best", body = PageObject),
+        (status = 404, description = "No page matches", body = Problem),
         Refusals
     )
 )]

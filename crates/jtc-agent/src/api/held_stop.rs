@@ -11,7 +11,7 @@ pub struct HeldStopObject {
     pub kind: String,
     /// Number of the kind, as in the Modbus registers.
     pub number: u8,
-    /// Name of the page about it: `GET /api/explain/{code}`.
+    /// Code of the held stop, for `GET /api/explain/{code}`.
     pub code: String,
     /// First joint with the cause, counted from 1; missing: no particular joint.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,17 +44,18 @@ impl From<HeldStop> for HeldStopObject {
 /// Reactions of a controller to disturbances.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct ReactionsObject {
-    /// Last held stop, also if its errors have been cleared since; missing: none since the controller started, or since
-    /// the occurred errors were cleared.
+    /// Last held stop, also after its errors were cleared. Missing if there was none since the start of the controller, or
+    /// since the errors that occurred were cleared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_held_stop: Option<HeldStopObject>,
     /// Joints that yield to a push or lower a load, counted from 1.
     pub yields: Vec<u8>,
-    /// Joints whose encoder has jumped, counted from 1: no trajectory is executed until their drives are reset.
+    /// Joints with an encoder jump, counted from 1. The controller executes no trajectory until the drives of these
+    /// joints are reset.
     pub encoder_jumped: Vec<u8>,
     /// Rate of path time, path seconds per second; 0 if no trajectory is executed.
     pub path_rate: f32,
-    /// Time for which this run was slowed down because a torque was at its limit, s.
+    /// Total time for which the controller slowed this run down because a torque was at its limit, s.
     pub held_back_s: f64,
 }
 

@@ -23,7 +23,7 @@ const AHEAD: Duration = Duration::from_millis(100);
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JogRequest {
-    /// Joint rates, rad/s, base to wrist. Rates act for 200 ms: send them again in time, and zeros at the end.
+    /// Joint rates, rad/s, base to wrist. Rates act for 200 ms: send them again within this time, and send zeros at the end.
     #[schema(min_items = 6, max_items = 6)]
     pub rates_rad_s: [f64; 6],
 }
@@ -33,10 +33,10 @@ pub struct JogRequest {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct KnownToJog {
-    /// Value of `last_halt` in the status that the client used. If another Stop or Pause has been requested since then,
-    /// also by this client, the request moves nothing, however long it was on its way. Missing: the last one when the
-    /// head of this request arrived; the request is also refused within 3 s after a Stop or Pause of another
-    /// client.
+    /// Value of `last_halt` in the status that the client used. If a client, also this one, has requested another Stop
+    /// or Pause since then, the agent refuses this request, even if it was sent earlier. Without this parameter, the
+    /// agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the request
+    /// within 3 s after a Stop or Pause of another client.
     asked_after: Option<u64>,
     /// Value of `at_ms` in the newest status that the user saw. If this request arrives more than 500 ms later, nothing
     /// moves. Zeros, which end the jog, are always accepted.
@@ -94,7 +94,7 @@ fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<Problem> {
     path = "/api/jog",
     params(LeaseKey, KnownToJog),
     request_body = JogRequest,
-    responses((status = 204, description = "The joints move so for 200 ms"), Refusals, Denials)
+    responses((status = 204, description = "The joints move at these rates for 200 ms"), Refusals, Denials)
 )]
 pub(super) async fn jog(
     State(agent): State<Agent>,

@@ -28,7 +28,7 @@ const FILE: &str = "flight-recorder.mcap";
 /// State of the flight recorder.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LogStatusObject {
-    /// State in words: it records, or the reason why it has stopped.
+    /// State in words: recording, or the reason why the recorder has stopped.
     pub state: String,
     /// Number of blocks of 1 KiB begun since the start of the controller, including overwritten ones.
     pub blocks: u32,
@@ -40,7 +40,7 @@ pub struct LogStatusObject {
 #[expect(dead_code, reason = "describes a body")]
 pub struct LogFile(Vec<u8>);
 
-/// Values of the log per tick: 1000 rows a second, in columns of the same length. A value that is not known is null.
+/// Values of the log in columns of the same length. A row is a tick: 1000 rows per second. An unknown value is null.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LogValues {
     /// Time of each row, s; 0 at the last row.
@@ -103,7 +103,7 @@ impl LogValues {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct LogWindow {
-    /// Duration of the part, s; it ends with the log.
+    /// Duration of the part, s. The part ends at the end of the log.
     #[serde(default = "window_default_s")]
     #[param(minimum = 0.01, maximum = 60)]
     last_s: f64,
@@ -113,12 +113,12 @@ fn window_default_s() -> f64 {
     2.0
 }
 
-/// Returns the state of the flight recorder, which continues.
+/// Returns the state of the flight recorder, without a pause of the recording.
 #[utoipa::path(
     get,
     path = "/api/log/status",
     operation_id = "get_log_status",
-    responses((status = 200, description = "Whether it records", body = LogStatusObject), Refusals, Denials)
+    responses((status = 200, description = "State of the flight recorder", body = LogStatusObject), Refusals, Denials)
 )]
 pub(super) async fn status(State(agent): State<Agent>) -> Result<Json<LogStatusObject>, Problem> {
     let status = agent.ask(|session| Ok(session.log_status()?)).await?;
@@ -127,16 +127,16 @@ pub(super) async fn status(State(agent): State<Agent>) -> Result<Json<LogStatusO
 
 /// Returns the log of the flight recorder as a recording.
 ///
-/// One request at a time.
+/// The agent accepts one request for the log at a time.
 ///
-/// The log has up to 160 kB, which takes some 40 s at 115,200 Bd. The flight recorder pauses meanwhile. The arm may
-/// move.
+/// The log has up to 160 kB. Its transfer takes about 40 s at 115,200 Bd. Meanwhile, the flight recorder pauses, and the
+/// arm may move.
 #[utoipa::path(
     get,
     path = "/api/log",
     operation_id = "get_log",
     responses(
-        (status = 200, description = "A recording in MCAP, for `jtc report`, `jtc log replay` and Foxglove", body = LogFile, content_type = "application/octet-stream"),
+        (status = 200, description = "MCAP recording for `jtc report`, `jtc log replay` and Foxglove", body = LogFile, content_type = "application/octet-stream"),
         Refusals, Denials
     )
 )]
@@ -155,13 +155,13 @@ pub(super) async fn fetch(
 
 /// Returns the last part of the log as numbers at 1 kHz, for a plot.
 ///
-/// The request takes as long as for the complete log. One request at a time.
+/// The request takes as long as for the complete log. The agent accepts one request for the log at a time.
 #[utoipa::path(
     get,
     path = "/api/log/values",
     operation_id = "get_log_values",
     params(LogWindow),
-    responses((status = 200, description = "Columns of the same length", body = LogValues), Refusals, Denials)
+    responses((status = 200, description = "Values of the log, in columns of the same length", body = LogValues), Refusals, Denials)
 )]
 pub(super) async fn values(
     State(agent): State<Agent>,
@@ -229,7 +229,7 @@ fn empty() -> Problem {
     path = "/api/log",
     operation_id = "clear_log",
     params(LeaseKey),
-    responses((status = 204, description = "It records anew"), Refusals, Denials)
+    responses((status = 204, description = "The flight recorder records again"), Refusals, Denials)
 )]
 pub(super) async fn clear(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
     let clear = |session: &mut Session<ClientPort>| -> Result<(), LinkError> { session.clear_log() };

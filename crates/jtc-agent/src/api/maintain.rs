@@ -44,7 +44,7 @@ pub struct ResetRequest {
     /// `true` for all joints and the gripper.
     #[serde(default)]
     pub all: bool,
-    /// `true`: restart also under torque. The arm must be supported, or it may fall.
+    /// `true`: restart also under torque. Support the arm first: it may fall.
     #[serde(default)]
     pub arm_may_fall: bool,
 }
@@ -74,7 +74,7 @@ fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
     operation_id = "clear",
     params(LeaseKey),
     request_body = Option<ClearRequest>,
-    responses((status = 204, description = "They are cleared; those that last come again"), Refusals, Denials)
+    responses((status = 204, description = "The errors are cleared; an error whose cause is still present occurs again"), Refusals, Denials)
 )]
 pub(super) async fn clear(
     State(agent): State<Agent>,
@@ -96,14 +96,14 @@ pub(super) async fn clear(
 
 /// Restarts nodes of the joint bus.
 ///
-/// No joint restarts while the arm moves.
+/// The agent does not restart joints while the arm moves.
 #[utoipa::path(
     post,
     path = "/api/reset",
     operation_id = "reset",
     params(LeaseKey),
     request_body = ResetRequest,
-    responses((status = 204, description = "They start anew, and are brought up again"), Refusals, Denials)
+    responses((status = 204, description = "The nodes restart, and the controller initialises them again"), Refusals, Denials)
 )]
 pub(super) async fn reset(
     State(agent): State<Agent>,
@@ -126,13 +126,13 @@ pub(super) async fn reset(
 
 /// Makes the controller use its stored or built-in friction, gains and model.
 ///
-/// In Init the controller starts the position hold then.
+/// In Init, the controller then starts the position hold.
 #[utoipa::path(
     post,
     path = "/api/arm/defaults",
     operation_id = "use_default_arm",
     params(LeaseKey, KnownHalt),
-    responses((status = 204, description = "It uses them"), Refusals, Denials)
+    responses((status = 204, description = "The controller uses its default parameters"), Refusals, Denials)
 )]
 pub(super) async fn defaults(
     State(agent): State<Agent>,
@@ -148,7 +148,7 @@ pub(super) async fn defaults(
     get,
     path = "/api/speed",
     operation_id = "get_speed",
-    responses((status = 200, description = "100: that of the trajectory; also where the controller knows no other", body = SpeedObject), Refusals, Denials)
+    responses((status = 200, description = "Speed on the path; 100 also if the controller has no speed override", body = SpeedObject), Refusals, Denials)
 )]
 pub(super) async fn speed(State(agent): State<Agent>) -> Result<Json<SpeedObject>, Problem> {
     let speed = agent.ask(|session| Ok(session.speed()?)).await?;

@@ -248,8 +248,9 @@ pub fn description() -> String {
 #[openapi(
     info(
         title = "openjtc agent",
-        description = "Owner of one controller. Reading needs no token on the computer that the agent runs on, and the viewer's or the \
-                       operator's from elsewhere. A Stop or a Pause is taken from everyone who was let in.",
+        description = "Agent that owns the port of one controller. On the computer of the agent, reading needs no token. On other \
+                       computers, reading needs the token of a viewer or of an operator. Every client that can read can \
+                       also request a Stop or a Pause.",
         license(name = "MIT OR Apache-2.0")
     ),
     components(schemas(Problem, EventObject, ArmEvent)),
@@ -317,7 +318,7 @@ fn slow() -> OpenApiRouter<Agent> {
     get,
     path = "/api/status",
     operation_id = "get_status",
-    responses((status = 200, description = "What the controller reports", body = StatusObject), Refusals)
+    responses((status = 200, description = "Last status of the controller, and the lease", body = StatusObject), Refusals)
 )]
 async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>) -> Json<StatusObject> {
     Json(agent.status(&caller))
@@ -329,10 +330,10 @@ async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>
 #[utoipa::path(
     post,
     path = "/api/stop",
-    params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own motion")),
+    params(("Lease-Key" = Option<String>, Header, description = "Key of the client's lease: the hold-off of 3 s after this request then does not apply to the client itself")),
     responses(
-        (status = 200, description = "The Stop is on its way; the state that it leads to is in the status", body = SentObject),
-        (status = 503, description = "The port is gone: nothing was sent", body = Problem),
+        (status = 200, description = "The agent sends the Stop; the status shows the resulting state", body = SentObject),
+        (status = 503, description = "The port is lost; nothing was sent", body = Problem),
         Refusals
     )
 )]
@@ -346,10 +347,10 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
 #[utoipa::path(
     post,
     path = "/api/pause",
-    params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own motion")),
+    params(("Lease-Key" = Option<String>, Header, description = "Key of the client's lease: the hold-off of 3 s after this request then does not apply to the client itself")),
     responses(
-        (status = 200, description = "The Pause is on its way; the state that it leads to is in the status", body = SentObject),
-        (status = 503, description = "The port is gone: nothing was sent", body = Problem),
+        (status = 200, description = "The agent sends the Pause; the status shows the resulting state", body = SentObject),
+        (status = 503, description = "The port is lost; nothing was sent", body = Problem),
         Refusals
     )
 )]

@@ -36,24 +36,25 @@ pub struct ModelObject {
     /// Joints, from the base. Each rotates about the z axis of its frame.
     #[schema(min_items = 6, max_items = 6)]
     pub joints: Vec<ModelJoint>,
-    /// The flange, which does not move, in the frame of joint 6.
+    /// Frame of the flange, fixed in the frame of joint 6.
     pub flange: FrameObject,
     /// Links: the base, then for each joint the link that it moves. Values are in the frame of that joint.
     #[schema(min_items = 7, max_items = 7)]
     pub links: Vec<ModelLink>,
 }
 
-/// Joint: its frame and its limits.
+/// Frame and limits of a joint.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ModelJoint {
     /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
     /// Name of the joint.
     pub name: String,
-    /// Origin of its frame in the frame of the joint before it, at position 0: x, y, z, m.
+    /// Origin of its frame at position 0, in the frame of the joint before it: x, y, z, m.
     #[schema(min_items = 3, max_items = 3)]
     pub origin_xyz_m: [f64; 3],
-    /// Orientation of its frame there: roll, pitch, yaw about fixed axes, as in a URDF, rad.
+    /// Orientation of its frame at position 0, in the frame of the joint before it: roll, pitch, yaw about fixed axes, as
+    /// in a URDF, rad.
     #[schema(min_items = 3, max_items = 3)]
     pub origin_rpy_rad: [f64; 3],
     /// Lowest position, rad.
@@ -134,12 +135,12 @@ impl From<&Identity> for ModelObject {
 
 /// Returns frames, limits and masses of the arm in use.
 ///
-/// The controller is asked when its arm may have changed, and when the last answer is older than 10 s.
+/// The agent asks the controller if its arm may have changed, or if its last answer is older than 10 s.
 #[utoipa::path(
     get,
     path = "/api/arm/model",
     operation_id = "get_arm_model",
-    responses((status = 200, description = "The arm that the controller has, or the agent's", body = ModelObject), Refusals)
+    responses((status = 200, description = "Arm of the controller, or of the agent if the controller has not reported its arm", body = ModelObject), Refusals)
 )]
 pub(super) async fn model(State(agent): State<Agent>) -> Json<ModelObject> {
     Json(ModelObject::from(&agent.identity().await))

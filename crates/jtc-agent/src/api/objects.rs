@@ -18,8 +18,8 @@ pub struct StatusObject {
     pub simulated: bool,
     /// Name of the port.
     pub port: String,
-    /// Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
-    /// even at a steady rate.
+    /// Time of this object since the start of the agent, ms. A client can use this time to detect that statuses arrive
+    /// late, even if they arrive at a steady rate.
     pub at_ms: u64,
     /// Reason why the port was lost; missing while it is available.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,7 +48,7 @@ pub struct StatusObject {
 /// Status of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ControllerObject {
-    /// State, in the words of the protocol.
+    /// State, as named in the protocol.
     pub state: String,
     /// State of the trajectory.
     pub trajectory: String,
@@ -56,22 +56,22 @@ pub struct ControllerObject {
     pub point: u32,
     /// Current errors.
     pub errors: Vec<String>,
-    /// Names of the pages about these errors, in the same order: `GET /api/explain/{code}`.
+    /// Codes of these errors, in the same order, for `GET /api/explain/{code}`.
     pub error_codes: Vec<String>,
-    /// Causes of the errors, the most specific first, each with its joint; includes the errors of its drive.
+    /// Causes of the errors, each with its joint and the errors of its drive. The most specific cause is the first.
     /// `GET /api/explain/{code}` accepts these texts.
     pub causes: Vec<String>,
-    /// Held stop with its cause (J-69); missing without a held stop, or if the controller has not reported the cause yet.
+    /// Held stop with its cause (J-69). Missing without a held stop, and until the controller has reported the cause.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_stop: Option<HeldStopObject>,
-    /// Joints whose encoder had jumped at the last held stop, counted from 1: no trajectory is executed until their
-    /// drives are reset; missing: none.
+    /// Joints with an encoder jump at the last held stop, counted from 1; missing: none. The controller executes no
+    /// trajectory until the drives of these joints are reset.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub encoder_jumped: Vec<u8>,
-    /// Errors since the last clearing.
+    /// Errors that have occurred since they were last cleared.
     pub errors_occurred: Vec<String>,
-    /// Commanded joint positions, rad, from the base; missing if the agent does not know them: no trajectory that was
-    /// sent through the agent is being executed.
+    /// Commanded joint positions, rad, from the base. Missing unless the controller executes a trajectory that was sent
+    /// through the agent.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 6, max_items = 6)]
     pub commanded_rad: Option<[f64; 6]>,
@@ -103,7 +103,7 @@ pub struct JointObject {
     pub temperature_c: Option<u8>,
     /// Errors of this joint that the controller has detected.
     pub errors: Vec<String>,
-    /// Names of the pages about these errors, in the same order.
+    /// Codes of these errors, in the same order, for `GET /api/explain/{code}`.
     pub error_codes: Vec<String>,
 }
 
@@ -114,7 +114,7 @@ pub struct LeaseObject {
     pub holder: String,
     /// Time since the holder took the lease, ms.
     pub age_ms: u64,
-    /// Time until the lease lapses without renewal, ms; missing: it lasts while the client is connected.
+    /// Time until the lease lapses without renewal, ms; missing: the lease lasts while its holder is connected.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_ms: Option<u64>,
     /// Name of the client that waits for the lease.
@@ -169,12 +169,12 @@ impl Found {
     }
 }
 
-/// Command that was handed to the line.
+/// Command that the agent sends to the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct SentObject {
     /// Command: `stop` or `pause`.
     pub sent: String,
-    /// Number of the command: value of `last_halt` until the next one.
+    /// Number of the command; `last_halt` has this value until the next Stop or Pause.
     pub halt: u64,
 }
 

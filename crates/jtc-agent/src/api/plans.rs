@@ -32,22 +32,22 @@ const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=120.0;
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanRequest {
-    /// Waypoints in a format that `jtc plan` accepts: CSV with the columns q1 to q6, or x, y, z with an orientation, or
-    /// pose; or JSON. At most 500.
+    /// Waypoints, 500 at most, as CSV or JSON in a format that `jtc plan` accepts. The columns are q1 to q6, or x, y, z with
+    /// an orientation, or pose.
     pub waypoints: String,
     /// `true` if the angles are in degrees.
     #[serde(default)]
     pub degrees: bool,
-    /// Distance from a waypoint within which its corner may be rounded, rad of the joint that is furthest; 0: the arm
-    /// stops at each waypoint.
+    /// Largest distance from a waypoint for rounding its corner, rad. The joint that is furthest from the waypoint counts.
+    /// 0: the arm stops at each waypoint.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub blend_rad: f64,
-    /// `true`: the flange moves on a straight line on each leg for which the waypoints do not specify the type of path.
+    /// `true`: the flange moves on a straight line on each leg without a type of path in the waypoints.
     #[serde(default)]
     pub line: bool,
-    /// Distance from a waypoint within which the corner between two lines or arcs may be rounded, m; 0: the arm stops
-    /// there.
+    /// Largest distance from a waypoint for rounding the corner between two lines or arcs, m. 0: the arm stops at the
+    /// waypoint.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub blend_m: f64,
@@ -55,7 +55,7 @@ pub struct PlanRequest {
     #[serde(default = "hundred")]
     #[schema(minimum = 1, maximum = 100)]
     pub speed_percent: f64,
-    /// `true`: the acceleration may change within 20 ms instead of 100 ms, which is faster and harder on gears and
+    /// `true`: the acceleration may change within 20 ms instead of 100 ms. The motion is faster, and harder on gears and
     /// load.
     #[serde(default)]
     pub no_jerk_limit: bool,
@@ -70,12 +70,12 @@ pub struct PlanRequest {
     /// Payload of the motion; missing: the payload that the controller uses now.
     #[serde(default)]
     pub payload: Option<PayloadObject>,
-    /// Place to keep the trajectory for `POST /api/runs`.
+    /// Number and name under which the agent keeps the trajectory for `POST /api/runs`.
     #[serde(default)]
     pub keep: Option<KeepRequest>,
 }
 
-/// Place for a planned trajectory.
+/// Number and name of a planned trajectory.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KeepRequest {
@@ -142,8 +142,8 @@ pub struct BoundObject {
     pub to_s: f64,
     /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
-    /// Limit: `velocity`, `acceleration`, `jerk`, `torque`, `stop` (margin to stop in time), `friction` (its table) or
-    /// `given time`.
+    /// Limit: `velocity`, `acceleration`, `jerk`, `torque`, `stop` (distance to stop in time), `friction` (the friction
+    /// table) or `given time`.
     pub limit: String,
 }
 
@@ -154,10 +154,10 @@ impl From<&Bound> for BoundObject {
     }
 }
 
-/// Smallest unused part of a torque limit in a motion, and its place.
+/// Smallest torque margin of a motion, with its joint and time.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct MarginObject {
-    /// Margin, % of the limit.
+    /// Margin: unused part of the torque limit, % of the limit.
     pub percent: f64,
     /// Number of the joint with the smallest margin, 1 to 6 from the base.
     pub joint: u8,
@@ -217,7 +217,7 @@ impl JointPlan {
     path = "/api/plans",
     operation_id = "plan",
     request_body = PlanRequest,
-    responses((status = 200, description = "The trajectory, and what binds it", body = PlanObject), Refusals, Denials)
+    responses((status = 200, description = "Planned trajectory, and its limiting constraints", body = PlanObject), Refusals, Denials)
 )]
 pub(super) async fn plan(
     State(agent): State<Agent>,

@@ -35,7 +35,7 @@ pub struct PoseObject {
     pub positions_rad: [f64; 6],
     /// Place where the pose is kept.
     pub from: PoseFrom,
-    /// Reason why no motion can lead to the pose, in words; missing if a motion is possible.
+    /// Reason why the arm cannot move to the pose, in words; missing if a motion is possible.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warning: Option<String>,
 }
@@ -97,7 +97,7 @@ pub(super) fn pose_error(error: &PoseError) -> Problem {
     get,
     path = "/api/poses",
     operation_id = "list_poses",
-    responses((status = 200, description = "By name", body = Vec<PoseObject>), Refusals)
+    responses((status = 200, description = "Named poses, ordered by name", body = Vec<PoseObject>), Refusals)
 )]
 pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<PoseObject>> {
     let arm = agent.identity().await.arm;
@@ -109,9 +109,9 @@ pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<PoseObject>> {
     put,
     path = "/api/poses/{name}",
     operation_id = "put_pose",
-    params(("name" = String, Path, description = "A letter, then letters, digits, _, - and ., 64 at most")),
+    params(("name" = String, Path, description = "Name of the pose: a letter, then letters, digits and the characters _ - . (64 characters at most)")),
     request_body = Option<PoseRequest>,
-    responses((status = 200, description = "The pose, to a millionth of a radian", body = PoseObject), Refusals, Denials)
+    responses((status = 200, description = "Saved pose, rounded to a millionth of a radian", body = PoseObject), Refusals, Denials)
 )]
 pub(super) async fn put(
     State(agent): State<Agent>,
@@ -157,10 +157,10 @@ const FARTHEST: f64 = 100.0;
     delete,
     path = "/api/poses/{name}",
     operation_id = "delete_pose",
-    params(("name" = String, Path, description = "Its name")),
+    params(("name" = String, Path, description = "Name of the pose")),
     responses(
-        (status = 204, description = "It is gone"),
-        (status = 404, description = "There is none", body = Problem),
+        (status = 204, description = "The pose is deleted"),
+        (status = 404, description = "No saved pose has this name", body = Problem),
         Refusals, Denials
     )
 )]

@@ -15,7 +15,7 @@ use crate::owner::ClientPort;
 /// Identity of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct InfoObject {
-    /// Version of the protocol extensions; 0: the controller has none, and nothing else is known.
+    /// Version of the protocol extensions. 0: the controller has no extensions, and all other values are unknown.
     pub extension: u8,
     /// Version of the firmware.
     pub firmware: String,
@@ -29,7 +29,7 @@ pub struct InfoObject {
     pub hash: String,
     /// Parameters that the controller has not received.
     pub missing: Vec<String>,
-    /// `true` if its defaults are those of a stored arm, not those of the built-in arm.
+    /// `true` if its defaults are the parameters of a stored arm, not of the built-in arm.
     pub defaults_stored: bool,
     /// Number of starts.
     pub boots: u32,
@@ -37,7 +37,7 @@ pub struct InfoObject {
     pub boot_cause: String,
     /// Time since the last start, s.
     pub uptime_s: f64,
-    /// Number of records lost because too many waited.
+    /// Number of response records that were lost because too many records waited.
     pub lost_records: u32,
     /// Reactions to disturbances; missing if the controller does not report them.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,7 +59,7 @@ impl Agent {
     get,
     path = "/api/info",
     operation_id = "get_info",
-    responses((status = 200, description = "What it says of itself", body = InfoObject), Refusals, Denials)
+    responses((status = 200, description = "Identity of the controller", body = InfoObject), Refusals, Denials)
 )]
 pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>, Problem> {
     let info = agent.ask(|session| Ok(session.info()?)).await?.unwrap_or_default();
@@ -85,7 +85,7 @@ pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>,
     get,
     path = "/api/payload",
     operation_id = "get_payload",
-    responses((status = 200, description = "Mass 0: nothing", body = PayloadObject), Refusals, Denials)
+    responses((status = 200, description = "Payload at the flange; mass 0: no payload", body = PayloadObject), Refusals, Denials)
 )]
 pub(super) async fn payload(State(agent): State<Agent>) -> Result<Json<PayloadObject>, Problem> {
     Ok(Json(agent.ask(Session::payload).await?.into()))

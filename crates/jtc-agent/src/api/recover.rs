@@ -25,15 +25,15 @@ use crate::owner::ClientPort;
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecoverRequest {
-    /// `true`: a controller without arm parameters uses its defaults, which are those of the stored arm if there is
-    /// one.
+    /// `true`: a controller without arm parameters uses its defaults. These are the parameters of the stored arm, or of
+    /// the built-in arm if no arm is stored.
     #[serde(default)]
     pub defaults: bool,
-    /// Text of an arm file or a robot description: its friction, gains and model are sent to the controller. Not
-    /// together with `defaults`.
+    /// Text of an arm file or a robot description. The agent sends its friction, gains and model to the controller. Not
+    /// possible together with `defaults`.
     #[serde(default)]
     pub arm: Option<String>,
-    /// `true`: the limits of the controller differ from those of this arm, and are safe for it.
+    /// `true`: the limits of the controller are safe for this arm, although they differ from the limits of the file.
     #[serde(default)]
     pub accept_device_limits: bool,
 }
@@ -66,7 +66,7 @@ impl RecoverRequest {
     operation_id = "recover",
     params(LeaseKey, KnownHalt),
     request_body = RecoverRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin(
     State(agent): State<Agent>,

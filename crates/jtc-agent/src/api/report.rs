@@ -21,17 +21,17 @@ pub struct ReportPage(String);
 
 /// Returns the report of the last motion of a finished job: a page with figures and plots.
 ///
-/// The page is the same as that of `jtc traj run`. Its data are the statuses received during the motion. The reports
-/// of the last 16 jobs are kept, within 64 MB.
+/// The page is like the report of `jtc traj run`. Its data are the statuses received during the motion. The agent keeps
+/// the reports of the last 16 jobs, up to 64 MB in total.
 #[utoipa::path(
     get,
     path = "/api/jobs/{number}/report",
     operation_id = "get_report",
     params(("number" = u64, Path, description = "Number of the job")),
     responses(
-        (status = 200, description = "A page", body = ReportPage, content_type = "text/html"),
-        (status = 404, description = "There is none", body = Problem),
-        (status = 409, description = "The job goes on", body = Problem),
+        (status = 200, description = "Report page", body = ReportPage, content_type = "text/html"),
+        (status = 404, description = "No job has this number, or the job has no report", body = Problem),
+        (status = 409, description = "The job is still running", body = Problem),
         Refusals
     )
 )]

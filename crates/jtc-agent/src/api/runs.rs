@@ -29,11 +29,12 @@ pub struct RunRequest {
     /// Number of the trajectory.
     #[schema(minimum = 1, maximum = 99)]
     pub trajectory: u16,
-    /// Digest of the trajectory that the client saw: the run is refused if the number has another trajectory by now.
+    /// Digest of the trajectory that the client saw. The agent refuses the run if the number now has another trajectory.
     #[serde(default)]
     pub digest: Option<String>,
-    /// `true`: first move the arm to the first point, if it stands elsewhere. The speed is `speed_percent` of the
-    /// limits, at most 50 %; without `speed_percent` 10 %, and 25 % with a simulated controller.
+    /// `true`: if the arm is not at the first point, move it there before the run. The speed of this approach is
+    /// `speed_percent` of the limits, at most 50 %. Without `speed_percent`, the speed is 10 %, and 25 % with a simulated
+    /// controller.
     #[serde(default)]
     pub approach: bool,
     /// Speed, % of the trajectory's own speed; missing: 100.
@@ -44,10 +45,10 @@ pub struct RunRequest {
     #[serde(default = "one")]
     #[schema(minimum = 1, maximum = 1000000)]
     pub repeat: u32,
-    /// Policy for the motion when this client is no longer alive; missing: the policy of its lease.
+    /// Policy for the motion if this client falls silent; missing: the policy of its lease.
     #[serde(default)]
     pub policy: Option<Policy>,
-    /// `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm.
+    /// `true`: accept a controller that cannot report its limits. Its built-in limits must be safe for this arm.
     #[serde(default)]
     pub accept_device_limits: bool,
 }
@@ -77,10 +78,10 @@ pub struct MoveRequest {
     #[serde(default = "margin")]
     #[schema(minimum = 0, maximum = 50)]
     pub margin_percent: f64,
-    /// Policy for the motion when this client is no longer alive; missing: the policy of its lease.
+    /// Policy for the motion if this client falls silent; missing: the policy of its lease.
     #[serde(default)]
     pub policy: Option<Policy>,
-    /// `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm.
+    /// `true`: accept a controller that cannot report its limits. Its built-in limits must be safe for this arm.
     #[serde(default)]
     pub accept_device_limits: bool,
 }
@@ -101,7 +102,7 @@ fn one() -> u32 {
     1
 }
 
-/// Job: a request that takes longer than its answer.
+/// Job: a request that continues after its answer.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct JobObject {
     /// Number of the job.
@@ -117,8 +118,8 @@ pub struct JobObject {
     /// Results of its last motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub result: Option<ResultObject>,
-    /// Address of the report of its last motion, a page; missing if nothing moved, or if later reports have replaced
-    /// it.
+    /// Address of the report page of its last motion. Missing if nothing moved, or if later reports have replaced the
+    /// report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<String>,
     /// Arm parameters that were sent to the controller.
@@ -187,14 +188,14 @@ impl From<Job> for JobObject {
 
 /// Runs a trajectory, as a job.
 ///
-/// The trajectory is checked from the current position, uploaded, executed and monitored.
+/// The agent checks the trajectory from the current position, uploads it, executes it and monitors the motion.
 #[utoipa::path(
     post,
     path = "/api/runs",
     operation_id = "run",
     params(LeaseKey, KnownHalt),
     request_body = RunRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_run(
     State(agent): State<Agent>,
@@ -257,7 +258,7 @@ fn replaced(stored: &Stored) -> Problem {
     operation_id = "move_to",
     params(LeaseKey, KnownHalt),
     request_body = MoveRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn begin_move(
     State(agent): State<Agent>,
@@ -351,7 +352,7 @@ fn begin(
     get,
     path = "/api/jobs",
     operation_id = "list_jobs",
-    responses((status = 200, description = "Those that are remembered", body = Vec<JobObject>), Refusals)
+    responses((status = 200, description = "Kept jobs, oldest first", body = Vec<JobObject>), Refusals)
 )]
 pub(super) async fn jobs(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
     Json(agent.jobs.list().into_iter().map(JobObject::from).collect())
@@ -364,8 +365,8 @@ pub(super) async fn jobs(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
     operation_id = "get_job",
     params(("number" = u64, Path, description = "Number of the job")),
     responses(
-        (status = 200, description = "How it is", body = JobObject),
-        (status = 404, description = "There is none", body = Problem),
+        (status = 200, description = "State and results of the job", body = JobObject),
+        (status = 404, description = "No kept job has this number", body = Problem),
         Refusals
     )
 )]

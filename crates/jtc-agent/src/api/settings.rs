@@ -51,7 +51,7 @@ pub struct SettingObject {
     pub joint: Option<u8>,
     /// Value; switches are 0 or 1.
     pub value: f64,
-    /// Unit; empty if it has none.
+    /// Unit; empty for a setting without a unit.
     pub unit: String,
     /// Lowest value.
     pub low: f64,
@@ -59,9 +59,9 @@ pub struct SettingObject {
     pub high: f64,
     /// `true` if only whole numbers are possible.
     pub whole: bool,
-    /// Condition under which it may be changed.
+    /// Condition under which the setting may be changed.
     pub when: When,
-    /// `true` if it is stored with the arm and included in its hash.
+    /// `true` if the setting is stored with the arm and included in the hash of the arm.
     pub of_arm: bool,
     /// Meaning of the setting.
     pub meaning: String,
@@ -98,7 +98,7 @@ pub struct SettingChange {
     pub value: f64,
 }
 
-/// Settings to change: all of them, or none.
+/// Settings to change. The controller changes all of them, or none.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SettingsRequest {
@@ -201,7 +201,7 @@ fn none(message: String, next: &'static str) -> Problem {
     get,
     path = "/api/settings",
     operation_id = "get_settings",
-    responses((status = 200, description = "Those that this agent knows, in the order of their numbers", body = Vec<SettingObject>), Refusals, Denials)
+    responses((status = 200, description = "Settings that this agent knows, in the order of their numbers", body = Vec<SettingObject>), Refusals, Denials)
 )]
 pub(super) async fn list(State(agent): State<Agent>) -> Result<Json<Vec<SettingObject>>, Problem> {
     let values = agent.ask(|session| Ok(session.settings()?)).await?;
@@ -211,16 +211,16 @@ pub(super) async fn list(State(agent): State<Agent>) -> Result<Json<Vec<SettingO
     Ok(Json(known.collect()))
 }
 
-/// Changes all given settings, or none.
+/// Changes all settings of the request, or none of them.
 ///
-/// Most settings can change only without torque.
+/// The controller accepts most changes only without torque.
 #[utoipa::path(
     put,
     path = "/api/settings",
     operation_id = "set_settings",
     params(LeaseKey),
     request_body = SettingsRequest,
-    responses((status = 204, description = "The controller has them"), Refusals, Denials)
+    responses((status = 204, description = "The controller has the new values"), Refusals, Denials)
 )]
 pub(super) async fn change(
     State(agent): State<Agent>,

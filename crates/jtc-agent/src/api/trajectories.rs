@@ -29,8 +29,8 @@ const POINTS_MAX: usize = 2000;
 pub struct TrajectoryRequest {
     /// Name for people: the first 64 characters.
     pub name: String,
-    /// Text of a file in any format that jtc traj run accepts, except recordings: CSV with a time column and joints,
-    /// JSON, or a ROS JointTrajectory.
+    /// Text of a file in a format that `jtc traj run` accepts: CSV with a time column and joints, JSON, or a ROS
+    /// JointTrajectory. Recordings are not possible.
     pub text: String,
     /// `true` if the angles are in degrees.
     #[serde(default)]
@@ -50,10 +50,10 @@ pub struct TrajectoryObject {
     pub step_ms: u16,
     /// Duration, s.
     pub duration_s: f64,
-    /// Notes about values that were derived or left out when it was read.
+    /// Notes about values that the agent derived or left out when it read the file.
     pub notes: Vec<String>,
-    /// Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
-    /// `POST /api/runs` accepts it.
+    /// Digest of points and step, 16 hexadecimal digits, for `POST /api/runs`. Other points or another step give another
+    /// digest.
     pub digest: String,
 }
 
@@ -88,8 +88,8 @@ pub(super) struct PlaceRequest {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PointsRequest {
-    /// Largest number of points: if the trajectory has more, points are left out evenly, but never the first and the
-    /// last.
+    /// Largest number of points. If the trajectory has more, the answer leaves out points evenly. It always has the first
+    /// and the last point.
     #[serde(default = "some_points")]
     #[param(minimum = 2, maximum = 2000, default = 500)]
     most: usize,
@@ -108,8 +108,8 @@ pub struct PointsObject {
     pub name: String,
     /// Duration, s.
     pub duration_s: f64,
-    /// Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
-    /// `POST /api/runs` accepts it.
+    /// Digest of points and step, 16 hexadecimal digits, for `POST /api/runs`. Other points or another step give another
+    /// digest.
     pub digest: String,
     /// Times of the points, s.
     pub times_s: Vec<f64>,
@@ -160,7 +160,7 @@ pub struct CheckObject {
 /// Problem of a trajectory.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ProblemObject {
-    /// Message with value, limit and place.
+    /// Message with value, limit and point.
     pub message: String,
     /// Number of the joint; missing: the trajectory as a whole.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -206,22 +206,22 @@ impl CheckObject {
     get,
     path = "/api/trajectories",
     operation_id = "list_trajectories",
-    responses((status = 200, description = "All of them, by number", body = Vec<TrajectoryObject>), Refusals)
+    responses((status = 200, description = "Kept trajectories, ordered by number", body = Vec<TrajectoryObject>), Refusals)
 )]
 pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<TrajectoryObject>> {
     Json(agent.jobs.store.list().iter().map(|stored| TrajectoryObject::from(&**stored)).collect())
 }
 
-/// Keeps a trajectory under a number and replaces the one before.
+/// Keeps a trajectory under a number, and replaces a trajectory with the same number.
 ///
 /// A run that has begun continues with its own trajectory.
 #[utoipa::path(
     put,
     path = "/api/trajectories/{number}",
     operation_id = "put_trajectory",
-    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99), PlaceRequest),
+    params(("number" = u16, Path, description = "Number of the trajectory, 1 to 99", minimum = 1, maximum = 99), PlaceRequest),
     request_body = TrajectoryRequest,
-    responses((status = 200, description = "What is kept", body = TrajectoryObject), Refusals, Denials)
+    responses((status = 200, description = "Kept trajectory", body = TrajectoryObject), Refusals, Denials)
 )]
 pub(super) async fn put(
     State(agent): State<Agent>,
@@ -263,10 +263,10 @@ pub(super) fn keep(
     delete,
     path = "/api/trajectories/{number}",
     operation_id = "delete_trajectory",
-    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
+    params(("number" = u16, Path, description = "Number of the trajectory, 1 to 99", minimum = 1, maximum = 99)),
     responses(
-        (status = 204, description = "It is gone"),
-        (status = 404, description = "There is none", body = Problem),
+        (status = 204, description = "The trajectory is deleted"),
+        (status = 404, description = "No trajectory has this number", body = Problem),
         Refusals, Denials
     )
 )]
@@ -291,10 +291,10 @@ pub(super) async fn delete(
     get,
     path = "/api/trajectories/{number}/points",
     operation_id = "get_points",
-    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99), PointsRequest),
+    params(("number" = u16, Path, description = "Number of the trajectory, 1 to 99", minimum = 1, maximum = 99), PointsRequest),
     responses(
-        (status = 200, description = "Times and joint positions", body = PointsObject),
-        (status = 404, description = "There is none", body = Problem),
+        (status = 200, description = "Times and joint positions of the points", body = PointsObject),
+        (status = 404, description = "No trajectory has this number", body = Problem),
         Refusals, Denials
     )
 )]
@@ -323,10 +323,10 @@ fn kept(agent: &Agent, number: u16) -> Result<Arc<Stored>, Problem> {
     get,
     path = "/api/trajectories/{number}/check",
     operation_id = "check_trajectory",
-    params(("number" = u16, Path, description = "1 to 99", minimum = 1, maximum = 99)),
+    params(("number" = u16, Path, description = "Number of the trajectory, 1 to 99", minimum = 1, maximum = 99)),
     responses(
-        (status = 200, description = "What the check found", body = CheckObject),
-        (status = 404, description = "There is none", body = Problem),
+        (status = 200, description = "Result of the check", body = CheckObject),
+        (status = 404, description = "No trajectory has this number", body = Problem),
         Refusals, Denials
     )
 )]

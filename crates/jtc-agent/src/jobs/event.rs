@@ -21,7 +21,7 @@ pub enum ArmEvent {
     },
     /// Change of the controller's state or errors.
     State {
-        /// State, in the words of the protocol.
+        /// State, as named in the protocol.
         state: String,
         /// State of the trajectory.
         trajectory: String,

@@ -34,7 +34,7 @@ pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Proble
     get,
     path = "/api/boards",
     operation_id = "list_boards",
-    responses((status = 200, description = "In the order of their numbers", body = Vec<BoardObject>), Refusals)
+    responses((status = 200, description = "Boards, ordered by number", body = Vec<BoardObject>), Refusals)
 )]
 pub(super) async fn boards(State(agent): State<Agent>) -> Json<Vec<BoardObject>> {
     Json(BoardObject::all(&agent.shared.snapshot()))
@@ -47,8 +47,8 @@ pub(super) async fn boards(State(agent): State<Agent>) -> Json<Vec<BoardObject>>
     operation_id = "get_board",
     params(("number" = u8, Path, description = "Number of the board")),
     responses(
-        (status = 200, description = "The board", body = BoardObject),
-        (status = 404, description = "No board of this number is known", body = Problem),
+        (status = 200, description = "Board as last seen", body = BoardObject),
+        (status = 404, description = "The agent knows no board with this number", body = Problem),
         Refusals
     )
 )]
@@ -63,15 +63,15 @@ pub(super) async fn board(
 
 /// Returns the values of a board by name, with units if the signal table has them.
 ///
-/// If the names of its values are not known, the board is asked for them.
+/// If the agent does not know the names of the values, it asks the board for them.
 #[utoipa::path(
     get,
     path = "/api/boards/{number}/values",
     operation_id = "get_values",
     params(("number" = u8, Path, description = "Number of the board")),
     responses(
-        (status = 200, description = "Its values", body = ValuesObject),
-        (status = 404, description = "No board of this number is known", body = Problem),
+        (status = 200, description = "Values of the board", body = ValuesObject),
+        (status = 404, description = "The agent knows no board with this number", body = Problem),
         Refusals, Denials
     )
 )]

@@ -61,7 +61,7 @@ impl GivenValue {
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputsRequest {
-    /// `true`: enable the outputs, which needs a running control loop.
+    /// `true`: enable the outputs. The control loop of the board must run.
     active: bool,
 }
 
@@ -90,7 +90,8 @@ pub struct StopRequest {
 /// Boards that reported after a reset.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ResetObject {
-    /// Low bytes of the boards' flash numbers. The boards have no numbers now: `POST /api/init` assigns new ones.
+    /// Low bytes of the flash numbers of these boards. The boards now have no board numbers: `POST /api/init` assigns new
+    /// ones.
     reports: Vec<u8>,
 }
 
@@ -186,19 +187,19 @@ impl Agent {
 
 /// Sets a controller input by its name.
 ///
-/// The input is sent at once, and repeated while the board runs.
+/// The agent sends the input at once, and repeats it while the board runs.
 #[utoipa::path(
     put,
     path = "/api/boards/{number}/inputs/{name}",
     operation_id = "set_input",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        ("name" = String, Path, description = "Name of the input, with or without its unit in brackets; or its place"),
+        ("name" = String, Path, description = "Name of the input, with or without its unit in brackets, or index of the input"),
         LeaseKey,
         KnownHalt
     ),
     request_body = ValueRequest,
-    responses((status = 200, description = "What was sent", body = ValueObject), Refusals, Denials)
+    responses((status = 200, description = "Value that the agent has sent", body = ValueObject), Refusals, Denials)
 )]
 pub(super) async fn set_input(
     State(agent): State<Agent>,
@@ -212,19 +213,19 @@ pub(super) async fn set_input(
 
 /// Writes a parameter by its name.
 ///
-/// Boards cannot report their parameters.
+/// The agent cannot read the parameter back, because boards do not report their parameters.
 #[utoipa::path(
     put,
     path = "/api/boards/{number}/parameters/{name}",
     operation_id = "set_parameter",
     params(
         ("number" = u8, Path, description = "Number of the board"),
-        ("name" = String, Path, description = "Name of the parameter, with or without its unit in brackets; or its place"),
+        ("name" = String, Path, description = "Name of the parameter, with or without its unit in brackets, or index of the parameter"),
         LeaseKey,
         KnownHalt
     ),
     request_body = ValueRequest,
-    responses((status = 200, description = "What was sent", body = ValueObject), Refusals, Denials)
+    responses((status = 200, description = "Value that the agent has sent", body = ValueObject), Refusals, Denials)
 )]
 pub(super) async fn set_parameter(
     State(agent): State<Agent>,
@@ -247,7 +248,7 @@ pub(super) async fn set_parameter(
         KnownHalt
     ),
     request_body = OutputsRequest,
-    responses((status = 204, description = "The board has confirmed it"), Refusals, Denials)
+    responses((status = 204, description = "The board has confirmed the command"), Refusals, Denials)
 )]
 pub(super) async fn set_outputs(
     State(agent): State<Agent>,
@@ -267,7 +268,7 @@ pub(super) async fn set_outputs(
     Ok(axum::http::StatusCode::NO_CONTENT)
 }
 
-/// Starts the application of a board, which moves nothing.
+/// Starts the application of a board; nothing moves.
 #[utoipa::path(
     post,
     path = "/api/boards/{number}/start",
@@ -276,7 +277,7 @@ pub(super) async fn set_outputs(
         LeaseKey,
         KnownHalt
     ),
-    responses((status = 200, description = "The application is up", body = AnswerObject), Refusals, Denials)
+    responses((status = 200, description = "The application has started", body = AnswerObject), Refusals, Denials)
 )]
 pub(super) async fn start_board(
     State(agent): State<Agent>,
@@ -297,7 +298,7 @@ pub(super) async fn start_board(
     Ok(Json(agent.command(&asker, ("start", board, Some(after)), act).await?))
 }
 
-/// Stops the control loop of a board, and its application.
+/// Stops the control loop of a board, and by default also its application.
 #[utoipa::path(
     post,
     path = "/api/boards/{number}/stop",
@@ -306,7 +307,7 @@ pub(super) async fn start_board(
         StopRequest,
         LeaseKey
     ),
-    responses((status = 200, description = "The board has confirmed it", body = AnswerObject), Refusals, Denials)
+    responses((status = 200, description = "The board has confirmed the command", body = AnswerObject), Refusals, Denials)
 )]
 pub(super) async fn stop_board(
     State(agent): State<Agent>,
@@ -342,7 +343,7 @@ pub(super) async fn stop_board(
         LeaseKey,
         KnownHalt
     ),
-    responses((status = 200, description = "Who reported", body = ResetObject), Refusals, Denials)
+    responses((status = 200, description = "Boards that reported after the reset", body = ResetObject), Refusals, Denials)
 )]
 pub(super) async fn reset_board(
     State(agent): State<Agent>,

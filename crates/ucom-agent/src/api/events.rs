@@ -27,13 +27,13 @@ type EventsObject = events::EventsObject<EventObject>;
 
 /// Returns the events after a number.
 ///
-/// After a lost connection, continue from the last one.
+/// After a lost connection, continue with the number of the last event that you received.
 #[utoipa::path(
     get,
     path = "/api/events",
     operation_id = "get_events",
     params(EventsRequest),
-    responses((status = 200, description = "Oldest first, 500 at most", body = EventsObject), Refusals)
+    responses((status = 200, description = "Events, oldest first, 500 at most", body = EventsObject), Refusals)
 )]
 pub(super) async fn events(
     State(agent): State<Agent>,

@@ -48,12 +48,12 @@ fn texts(findings: &[impl ToString]) -> Vec<String> {
     findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
 }
 
-/// Scans for boards and changes nothing, as a job.
+/// Scans for boards, as a job, and changes nothing.
 #[utoipa::path(
     post,
     path = "/api/scan",
     params(LeaseKey),
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn scan(
     State(agent): State<Agent>,
@@ -65,13 +65,13 @@ pub(super) async fn scan(
     })
 }
 
-/// Expected board at its place.
+/// Expected board at a position of the chain.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExpectedBoard {
-    /// Place of the board, which becomes its number.
+    /// Position of the board in the chain. The board receives this number.
     board: u8,
-    /// Number of its bootloader, which identifies the board.
+    /// Flash number of the bootloader, which identifies the board.
     flash_number: u16,
 }
 
@@ -79,7 +79,7 @@ pub struct ExpectedBoard {
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InitRequest {
-    /// Expected boards at their places; other boards are an error. Empty: any boards.
+    /// Expected boards at their positions; other boards are an error. Empty: any boards.
     #[serde(default)]
     expected: Vec<ExpectedBoard>,
 }
@@ -90,7 +90,7 @@ pub struct InitRequest {
     path = "/api/init",
     params(LeaseKey, KnownHalt),
     request_body = InitRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn init(
     State(agent): State<Agent>,
@@ -116,12 +116,14 @@ pub(super) async fn init(
     })
 }
 
-/// Diagnoses bus, chain and boards, as a job: listens, and asks if that cannot do harm.
+/// Diagnoses bus, chain and boards, as a job.
+///
+/// The agent listens to the bus. It asks the boards only if this cannot do harm.
 #[utoipa::path(
     post,
     path = "/api/doctor",
     params(LeaseKey),
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn doctor(
     State(agent): State<Agent>,
@@ -137,7 +139,7 @@ pub(super) async fn doctor(
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NamedValue {
-    /// Number of the board; missing: each board to run.
+    /// Number of the board; missing: the value is for each board of the request.
     board: Option<u8>,
     /// Name of the input or parameter.
     name: String,
@@ -172,13 +174,13 @@ fn assignments(values: &[NamedValue]) -> Result<Vec<Assignment>, Problem> {
 
 /// Starts applications and control loops, as a job.
 ///
-/// The job ends when the boards run. Later changes are reported as events.
+/// The job ends when the boards run. Events report later changes.
 #[utoipa::path(
     post,
     path = "/api/run",
     params(LeaseKey, KnownHalt),
     request_body = RunRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn run(
     State(agent): State<Agent>,
@@ -242,7 +244,7 @@ fn start(
     get,
     path = "/api/jobs",
     operation_id = "list_jobs",
-    responses((status = 200, description = "Oldest first", body = Vec<JobObject>), Refusals)
+    responses((status = 200, description = "Kept jobs, oldest first", body = Vec<JobObject>), Refusals)
 )]
 pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
     Json(agent.shared.jobs.list().into_iter().map(JobObject::from).collect())
@@ -255,8 +257,8 @@ pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
     operation_id = "get_job",
     params(("number" = u64, Path, description = "Number of the job")),
     responses(
-        (status = 200, description = "How it is", body = JobObject),
-        (status = 404, description = "It is not remembered", body = Problem),
+        (status = 200, description = "State and results of the job", body = JobObject),
+        (status = 404, description = "No kept job has this number", body = Problem),
         Refusals
     )
 )]
@@ -268,7 +270,9 @@ pub(super) async fn get(
     Ok(Json(job.ok_or_else(|| Problem::nothing("job", number, "/api/jobs"))?.into()))
 }
 
-/// Cancels a job, which still undoes its steps on the boards.
+/// Cancels a job.
+///
+/// Before the job ends, it undoes its steps on the boards.
 #[utoipa::path(
     delete,
     path = "/api/jobs/{number}",
@@ -278,8 +282,8 @@ pub(super) async fn get(
         LeaseKey
     ),
     responses(
-        (status = 204, description = "It will end"),
-        (status = 404, description = "It is not remembered", body = Problem),
+        (status = 204, description = "The job will end"),
+        (status = 404, description = "No kept job has this number", body = Problem),
         Refusals, Denials
     )
 )]

@@ -19,14 +19,14 @@ use crate::event::Policy;
 pub struct LeaseRequest {
     /// Name of the client for people: the first 64 characters.
     name: String,
-    /// Duration of the lease without a request of this client, s.
+    /// Time without a request of this client after which the lease lapses, s.
     #[serde(default = "default_lasts_s")]
     #[schema(minimum = 1, maximum = 60)]
     lasts_s: f64,
     /// Policy for running boards after the lease has lapsed.
     #[serde(default)]
     policy: Policy,
-    /// `true`: if another client holds the lease, ask for it and wait.
+    /// `true`: if another client holds the lease, wait for the lease.
     #[serde(default)]
     ask: bool,
 }
@@ -38,7 +38,7 @@ pub struct LeaseGrant {
     key: String,
     /// `true` if the client holds the lease; otherwise it waits until the holder releases it.
     held: bool,
-    /// Duration of the lease without a request, s.
+    /// Time without a request after which the lease lapses, s.
     lasts_s: f64,
     /// Policy for running boards after the lease has lapsed.
     policy: Policy,
@@ -65,16 +65,16 @@ impl Agent {
     }
 }
 
-/// Takes the lease, which one client holds at a time.
+/// Takes the lease.
 ///
-/// Every command renews it.
+/// One client holds the lease at a time. Every command renews the lease.
 #[utoipa::path(
     post,
     path = "/api/lease",
     operation_id = "take_lease",
     request_body = LeaseRequest,
     responses(
-        (status = 200, description = "This client commands, or waits for it", body = LeaseGrant),
+        (status = 200, description = "The client holds the lease, or waits for it", body = LeaseGrant),
         Refusals, Denials
     )
 )]
@@ -98,14 +98,14 @@ pub(super) async fn take(
     Ok(Json(LeaseGrant { key, held, lasts_s, policy }))
 }
 
-/// Renews the lease, or takes it again if it is free.
+/// Renews the lease, or takes a free lease again.
 #[utoipa::path(
     put,
     path = "/api/lease",
     operation_id = "renew_lease",
     params(LeaseKey),
     responses(
-        (status = 200, description = "Whether this client commands", body = LeaseState),
+        (status = 200, description = "State of the lease", body = LeaseState),
         Refusals, Denials
     )
 )]
@@ -118,15 +118,16 @@ pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Js
     Ok(Json(LeaseState { held, wanted_by }))
 }
 
-/// Releases the lease, which passes to the waiting client if there is one.
+/// Releases the lease; a client that waits for the lease receives it.
 ///
-/// Running boards keep running. Refused while a request of this client that may move boards is running or waiting.
+/// Running boards continue to run. The agent refuses the request while another request of this client that may move
+/// boards is running or waiting.
 #[utoipa::path(
     delete,
     path = "/api/lease",
     operation_id = "release_lease",
     params(LeaseKey),
-    responses((status = 204, description = "It is let go"), Refusals, Denials)
+    responses((status = 204, description = "The client has released the lease"), Refusals, Denials)
 )]
 pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
     asker.caller.operator()?;

@@ -144,8 +144,9 @@ pub fn description() -> String {
 #[openapi(
     info(
         title = "openjtc UCoM agent",
-        description = "Owner of one bus of UCoM boards. Reading needs no token on the computer that the agent runs on, and the viewer's or \
-                       the operator's from elsewhere. A Stop is taken from everyone who was let in.",
+        description = "Agent that owns one bus of UCoM boards. On the computer of the agent, reading needs no token. On other \
+                       computers, reading needs the token of a viewer or of an operator. Every client that can read can \
+                       also request a Stop.",
         license(name = "MIT OR Apache-2.0")
     ),
     components(schemas(Problem, EventObject, ChainEvent)),
@@ -187,8 +188,8 @@ struct Denials;
 impl IntoResponses for Denials {
     fn responses() -> BTreeMap<String, RefOr<openapi::Response>> {
         denials(
-            "Refused: another client commands, something else is going on, a check or a board forbids it, or a board does not answer",
-            "The bus is gone",
+            "The request is refused: another client holds the lease, another request is running, a check or a board refuses it, or a board does not answer",
+            "The bus is lost",
         )
     }
 }
@@ -198,7 +199,7 @@ impl IntoResponses for Denials {
     get,
     path = "/api/status",
     operation_id = "get_status",
-    responses((status = 200, description = "How the bus is", body = StatusObject), Refusals)
+    responses((status = 200, description = "Status of the bus, and the lease", body = StatusObject), Refusals)
 )]
 async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>) -> Json<StatusObject> {
     Json(agent.status(&caller))
@@ -209,9 +210,9 @@ async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>
 struct SentObject {
     /// Command: `stop`.
     sent: String,
-    /// Number of the last event before the Stop; its results are reported as later events.
+    /// Number of the last event before the Stop. Later events report the results of the Stop.
     last_event: u64,
-    /// Number of the Stop: value of `last_halt` until the next one.
+    /// Number of the Stop; `last_halt` has this value until the next Stop.
     halt: u64,
 }
 
@@ -219,15 +220,15 @@ struct SentObject {
 ///
 /// No lease is needed.
 ///
-/// A running update continues, because a board with half-written flash could not work afterwards. All other requests
+/// A running update continues, because a board with partly written flash would not work afterwards. All other requests
 /// end.
 #[utoipa::path(
     post,
     path = "/api/stop",
-    params(("Lease-Key" = Option<String>, Header, description = "Key of a lease, where it is the client's own work")),
+    params(("Lease-Key" = Option<String>, Header, description = "Key of the client's lease: the hold-off of 3 s after this request then does not apply to the client itself")),
     responses(
-        (status = 200, description = "The Stop is on its way; an event names the boards that have confirmed it", body = SentObject),
-        (status = 503, description = "The bus is gone: nothing was sent", body = Problem),
+        (status = 200, description = "The agent sends the Stop; an event names the boards that have confirmed it", body = SentObject),
+        (status = 503, description = "The bus is lost; nothing was sent", body = Problem),
         Refusals
     )
 )]

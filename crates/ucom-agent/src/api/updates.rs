@@ -31,7 +31,7 @@ use crate::owner::{Kind, fault};
 pub struct TargetRequest {
     /// Number of the board.
     board: u8,
-    /// Number that its bootloader must have; missing: any bootloader.
+    /// Flash number that the board must have; missing: any flash number.
     flash_number: Option<u16>,
 }
 
@@ -70,7 +70,7 @@ pub struct UpdateRequest {
     second: Option<String>,
     /// Format of the images; missing: detected from their content. Text and records are never read as raw bytes.
     format: Option<ImageFormat>,
-    /// Unit of their addresses; missing: detected from their records.
+    /// Unit of the addresses in the images; missing: detected from their records.
     addresses: Option<Unit>,
     /// `true`: fill gaps between records with FF.
     #[serde(default)]
@@ -94,8 +94,8 @@ pub struct UpdateRequest {
     /// `true`: update even if the board already shows the program; all checks still apply.
     #[serde(default)]
     rewrite: bool,
-    /// `true`: accept a result that cannot be verified, also of a board that shows the program but whose flash contents
-    /// are not known.
+    /// `true`: accept a result that cannot be verified. This includes a board that already shows the program, but whose
+    /// flash contents are not known.
     #[serde(default)]
     accept_unverified: bool,
 }
@@ -228,15 +228,15 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
     Some(Problem::new(code, message, next).kind(kind).with(facts))
 }
 
-/// Programs boards: the image is checked, transferred twice, and verified by reading back.
+/// Programs boards, as a job.
 ///
-/// One update runs at a time.
+/// The agent checks the image, transfers it twice, and verifies it by reading back. One update runs at a time.
 #[utoipa::path(
     post,
     path = "/api/updates",
     params(LeaseKey, KnownHalt),
     request_body = UpdateRequest,
-    responses((status = 202, description = "The job that does it", body = JobObject), Refusals, Denials)
+    responses((status = 202, description = "Job that was started", body = JobObject), Refusals, Denials)
 )]
 pub(super) async fn update(
     State(agent): State<Agent>,

@@ -11,7 +11,7 @@ use crate::snapshot::BusSnapshot;
 pub struct BoardObject {
     /// Number of the board.
     pub number: u8,
-    /// Number of its bootloader, which identifies the board; missing before its first answer.
+    /// Flash number of the bootloader, which identifies the board; missing before the first answer of the board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_number: Option<u16>,
     /// Description that the board reports.
@@ -107,7 +107,7 @@ impl BoardObject {
 pub struct FoundObject {
     /// Number of the board.
     pub number: u8,
-    /// Number of its bootloader, which identifies the board.
+    /// Flash number of the bootloader, which identifies the board.
     pub flash_number: u16,
     /// Description that the board reports.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -11,8 +11,8 @@ pub struct StatusObject {
     pub simulated: bool,
     /// Name of the bus.
     pub bus: String,
-    /// Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
-    /// even at a steady rate.
+    /// Time of this object since the start of the agent, ms. A client can use this time to detect that statuses arrive
+    /// late, even if they arrive at a steady rate.
     pub at_ms: u64,
     /// Reason why the bus was lost; missing while it is available.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -23,20 +23,20 @@ pub struct StatusObject {
     pub boards: usize,
     /// Load of the bus over the last second, %.
     pub load_percent: f64,
-    /// Number of received frames, without foreign ones.
+    /// Number of received frames, without frames of other protocols.
     pub received: u64,
     /// Number of frames that this agent has sent.
     pub sent: u64,
     /// Number of frames that do not belong to this protocol.
     pub foreign_frames: u64,
-    /// `true` if this agent sends heartbeats: the lease holder has sent a command, or boards that the agent has started
-    /// are not stopped.
+    /// `true` if this agent sends heartbeats. It sends them after a command of the lease holder, and while boards that it
+    /// has started are not stopped.
     pub is_master: bool,
     /// `true` if another PC commands on this bus.
     pub competing_master: bool,
-    /// Numbers that two boards share, in words.
+    /// Board numbers that two boards share, in words.
     pub shared_numbers: Vec<String>,
-    /// Report of the CAN adapter; missing if it reports no state.
+    /// State of the CAN controller; missing if the CAN adapter does not report it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controller: Option<ControllerObject>,
     /// Lease; missing if no client holds it.

@@ -23,9 +23,9 @@ pub struct FindingObject {
     pub severity: String,
     /// Observation.
     pub what: String,
-    /// Probable cause; may be empty.
+    /// Probable cause; empty if no cause is known.
     pub why: String,
-    /// Next step; may be empty.
+    /// Next step; empty if no action is needed.
     pub next: String,
 }
 
@@ -47,14 +47,14 @@ impl From<&Finding> for FindingObject {
 pub struct UpdatedObject {
     /// Number of the board.
     pub board: u8,
-    /// Number of its bootloader, which identifies the board.
+    /// Flash number of the bootloader, which identifies the board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_number: Option<u16>,
     /// Outcome: `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`,
     /// `verified` or `running`.
     pub outcome: String,
-    /// `true` if the board shows Program ID and date of the image, and the records of the agent or its inventory show
-    /// that exactly this image was written to this address, now or before.
+    /// `true` if the board shows Program ID and date of the image, and exactly this image was written to this address, now
+    /// or before. The records of the agent or its inventory show this.
     pub verified: bool,
     /// Program ID read back before the update.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -74,12 +74,12 @@ pub struct UpdatedObject {
 /// Result of an update.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct UpdateObject {
-    /// `true` if only questions were sent.
+    /// `true` if the agent sent only requests that change nothing.
     pub dry_run: bool,
     /// Program ID that the boards must show; missing: not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub program_id: Option<u16>,
-    /// Reason why it is not known.
+    /// Reason why the Program ID is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unverifiable: Option<String>,
     /// Number of bytes of both cycles.

@@ -15,19 +15,19 @@ const OLD_US: u64 = 500_000;
 pub struct ValuesObject {
     /// Number of the board.
     pub board: u8,
-    /// Age of its outputs, s; missing before the first ones.
+    /// Age of its outputs, s; missing before the first outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_s: Option<f64>,
-    /// `true` if the outputs are not current: they are older than half a second, or the board is late or lost, or has
-    /// left its control loop.
+    /// `true` if the outputs are not current: they are older than 0.5 s, or the board is late, lost or not in its control
+    /// loop.
     pub stale: bool,
-    /// Sensor outputs; empty before the first ones.
+    /// Sensor outputs; empty before the first outputs.
     pub outputs: Vec<ValueObject>,
-    /// Controller inputs as last set, or with their initial values. Without a value if this agent has neither set nor
-    /// read them since the application started.
+    /// Controller inputs as last set, or with their initial values. An input has no value if this agent has neither set
+    /// nor read it since the application started.
     pub inputs: Vec<ValueObject>,
-    /// Parameters as last written by this agent. Without a value if it has not written them since the application
-    /// started: boards cannot report their parameters.
+    /// Parameters as last written by this agent. A parameter has no value if this agent has not written it since the
+    /// application started, because boards cannot report their parameters.
     pub parameters: Vec<ValueObject>,
 }
 
@@ -38,8 +38,8 @@ pub struct ValueObject {
     pub name: String,
     /// Index in the buffer.
     pub index: usize,
-    /// Value by the signal table: a number in its unit, `true` or `false`, or a word as text; missing if it is not
-    /// known.
+    /// Value as the signal table defines it: a number in its unit, `true` or `false`, or a word as text. Missing if the
+    /// value is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Value>)]
     pub value: Option<Value>,

@@ -41,15 +41,15 @@ pub use variables::VARIABLES;
     version,
     about = "Simulate, set up, run and monitor a six-axis arm",
     after_help = "Examples:\n  \
-        jtc demo                              run the main job on the built-in simulator\n  \
+        jtc demo                              run a complete example on the built-in simulator\n  \
         jtc sim --serial /tmp/jtc             simulate a controller at a serial port\n  \
         jtc --json status --port /tmp/jtc     print one status for programs\n  \
         jtc traj run motion.csv --approach    check, upload, execute, report\n\n\
-        With --json the result is on stdout. Commands that take some time also send events to stderr: see `jtc \
-        help events`.\n\n\
+        With --json, the command writes its result to stdout. Commands that take some time also write events \
+        to stderr (see `jtc help events`).\n\n\
         You can write --json, --port and --baud before or after the command.\n\n\
-        Environment variables can set the options that name a place, a file or a format: see `jtc COMMAND \
-        --help`.\n\n\
+        Environment variables can set options for ports, addresses, files and formats (see `jtc COMMAND \
+        --help`).\n\n\
         Exit codes:\n  \
         0  done\n  \
         1  the controller reported an error\n  \
@@ -62,7 +62,9 @@ pub use variables::VARIABLES;
     disable_help_subcommand = true
 )]
 pub struct Cli {
-    /// Print JSON instead of text; streams print one object per line
+    /// Print JSON instead of text.
+    ///
+    /// Commands that print a stream print one object per line
     #[arg(long, global = true, env = "JTC_JSON", value_parser = on_off, help_heading = "Common")]
     pub json: bool,
     /// Set the serial port, before the command
@@ -87,10 +89,10 @@ pub struct LinkArgs {
     pub port: Option<String>,
     /// Use this token file of the agent.
     ///
-    /// `jtc serve` creates the file if it does not exist. Default: the token file of an agent on this computer
+    /// `jtc serve` creates the file if the file does not exist. Default: the token file of an agent on this computer
     #[arg(long, env = "JTC_TOKEN_FILE", value_name = "FILE", help_heading = "Link")]
     pub token_file: Option<std::path::PathBuf>,
-    /// Trust an agent at https:// by these certificates, PEM.
+    /// Trust these CA certificates, PEM, for an agent at https://.
     ///
     /// Default: the agent's own certificate if the agent runs on this computer, else the certificates of the system
     #[arg(long, env = "JTC_TLS_CA", value_name = "FILE", help_heading = "Link")]
@@ -112,9 +114,10 @@ pub struct OverwriteArgs {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run the main job on the built-in simulator
+    /// Run a complete example on the built-in simulator
     #[command(
-        after_help = "The job sends the parameters, uploads and executes a trajectory, and writes a report.\n\n\
+        after_help = "The command sends the parameters, uploads and executes a trajectory, and writes a \
+        report.\n\n\
         Examples:\n  \
         jtc demo\n  \
         jtc demo --out /tmp/demo --speed realtime"
@@ -128,33 +131,34 @@ pub enum Command {
         jtc sim --serial /tmp/jtc --faults faults.toml\n  \
         jtc sim --serial /tmp/jtc --record sim.mcap\n  \
         jtc sim --serial /tmp/jtc --support stand --gear-stiffness 20000\n\n\
-        --record writes up to 40 MB per minute as .mcap, or 50 MB as .csv. The file is opened before anything \
-        runs. You can read it while it grows. After the simulator was killed, you can read it up to the last \
-        0.2 s. If the disk is full, the simulator reports it at once, continues, and ends with exit code 5.\n\n\
-        Lines on the standard input are events:\n  \
+        --record writes up to 40 MB per minute as .mcap, or 50 MB as .csv. The simulator opens the file \
+        before it starts. You can read the file while it grows. If the simulator is killed, the file can \
+        lack the last 0.2 s. If the disk is full, the simulator reports this at once, continues, and ends \
+        with exit code 5.\n\n\
+        The simulator accepts these events as lines on stdin:\n  \
         push 3 12 0.5    push joint 3 (counted from 1) with 12 N·m for 0.5 s\n  \
-        hand lead.csv    let a simulated hand lead the arm along a trajectory file, in teaching")]
+        hand lead.csv    in teaching, lead the arm by a simulated hand along a trajectory file")]
     Sim(SimArgs),
-    /// Own the port, and serve it to many clients
+    /// Share the port of a controller among many clients
     #[command(
-        after_help = "Many clients can read at the same time. Only one client at a time commands. Every client can stop \
-            the arm.\n\n\
-            Every other command goes through the agent with --port http://…. A command goes through the agent \
-            without this option if an agent of this user owns its port.\n\n\
-            Reading, stopping and pausing need no token on this computer. Commanding needs the operator's token \
-            of the token file. Only the owner of this file can read it.\n\n\
+        after_help = "Many clients can read at the same time. Only one client at a time can move the arm or \
+            change settings. Every client can stop the arm.\n\n\
+            With --port http://…, every other command uses the agent. Without this option, a command also \
+            uses the agent if an agent of this user has its port.\n\n\
+            On this computer, reading, Stop and Pause need no token. All other requests need the operator's \
+            token from the token file. Only the owner of this file can read it.\n\n\
             Examples:\n  \
             jtc serve --sim\n  \
             jtc serve --port /dev/ttyUSB0\n  \
             jtc status --port http://127.0.0.1:8780\n  \
             curl -X POST http://127.0.0.1:8780/api/stop\n  \
             jtc serve --sim --record recordings --record-limit 500MB\n\n\
-            --record writes each motion to its own file: NAME.part.mcap during the motion, and NAME.mcap after \
-            it. You can read both at any time. A full disk never delays a command. The agent reports the full \
-            disk, and records again when there is space."
+            --record writes each motion to a file of its own. The file is NAME.part.mcap during the motion, \
+            and NAME.mcap afterwards. You can read both files at any time. A full disk never delays a \
+            command. The agent reports the full disk, and records again when the disk has space."
     )]
     Serve(ServeArgs),
-    /// List serial ports, and the reason if one cannot be used
+    /// List serial ports, with the reason if a port cannot be used
     #[command(after_help = "Examples:\n  jtc ports\n  jtc --json ports")]
     Ports,
     /// Diagnose link, bus and setup, and suggest the next command
@@ -163,10 +167,11 @@ pub enum Command {
     /// Show one decoded status
     #[command(after_help = "Examples:\n  jtc status\n  jtc --json status | jq .joints[0].position_rad")]
     Status(LinkArgs),
-    /// Show firmware, arm, missing parameters and last start cause
+    /// Show firmware, arm, missing parameters, cause of last start
     #[command(
-        after_help = "The hash covers everything that decides how the arm moves: model, gains, friction and settings. For \
-            a device without extensions, the command shows only the values of a status.\n\n\
+        after_help = "The hash covers all parameters that decide how the arm moves: model, gains, friction \
+            and settings. For a controller without extensions, the command shows only the values of a \
+            status.\n\n\
             Examples:\n  \
             jtc info\n  \
             jtc --json info | jq -r .hash"
@@ -207,15 +212,16 @@ pub enum Command {
             qx,qy,qz,qw or roll,pitch,yaw  orientation of the flange, rad\n  \
             leg                            line, via or arc: motion to this waypoint\n  \
             t                              time, s, if the file gives times\n\n\
-            The arm stops at each waypoint. --blend rounds a corner if that is faster than a stop. Legs are \
+            The arm stops at each waypoint. --blend rounds a corner if this is faster than a stop. Legs are \
             straight in joint space. With --line, or if the column `leg` requests it, the flange follows \
-            straight lines and arcs. --blend-m rounds the corners of these.\n\n\
-            The motion uses at most 98 % of the limits of velocity and acceleration. Its torque, by the arm \
-            model, stays below the limit less --margin. The jerk limit is the highest acceleration within 100 \
-            ms. The planned trajectory has passed the check of `jtc traj check`.\n\n\
-            The margin is for masses and friction that the model does not know. If gravity and friction leave \
-            less than the margin, the motion uses a quarter of the remaining torque. A note then names the \
-            joint. A margin below 10 % gives a warning.\n\n\
+            straight lines and arcs. --blend-m rounds the corners between lines and arcs.\n\n\
+            The motion uses at most 98 % of the limits of velocity and acceleration. By the arm model, the \
+            torque of each joint stays below its limit minus --margin. The jerk limit lets the acceleration \
+            rise from 0 to its limit in 100 ms. The command checks the planned trajectory like `jtc traj \
+            check`.\n\n\
+            The margin is for masses and friction that the model does not know. If gravity and friction \
+            leave less torque than the margin, the motion uses a quarter of the remaining torque. A note \
+            then names the joint. A margin below 10 % gives a warning.\n\n\
             Examples:\n  \
             jtc plan waypoints.csv -o cycle.csv\n  \
             jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \
@@ -226,8 +232,8 @@ pub enum Command {
     /// Move to joint positions, a named pose or a flange pose
     #[command(
         after_help = "The arm moves from its present position, straight in joint space. With --line the flange follows a \
-            straight line. The limits of velocity, acceleration, jerk and torque are checked before anything is \
-            sent. The command does not look for obstacles.\n\n\
+            straight line. The command checks the limits of velocity, acceleration, jerk and torque before \
+            it sends anything. The command does not check for obstacles.\n\n\
             The command runs and ends like `jtc traj run`. On a terminal, press space to pause and resume, s to \
             stop, + and - to change the speed. Ctrl-C stops on the path. --margin works as in `jtc plan`.\n\n\
             Examples:\n  \
@@ -240,7 +246,7 @@ pub enum Command {
     /// Save, list and remove named positions of the arm file
     #[command(subcommand)]
     Pose(PoseCommand),
-    /// Stop on the path and end the execution
+    /// Stop on the path, and end the motion
     #[command(after_help = motion::STOP_EXAMPLES, aliases = ["halt", "estop", "e-stop", "abort"])]
     Stop(LinkArgs),
     /// Check, upload and execute a trajectory, then report
@@ -269,11 +275,11 @@ pub enum Command {
     /// Switch the vacuum pump of the gripper on or off
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
     Gripper(GripperArgs),
-    /// Take the torque off at rest: the drives go limp
+    /// Switch off the torque of an arm at rest
     #[command(
-        after_help = "The controller returns to Init, and you must send the parameters again. An arm without holding \
-            brakes falls: support it first. On a terminal the command asks before it acts. --yes answers this \
-            question. Without a terminal, the command is refused unless you give --yes.\n\n\
+        after_help = "The controller returns to Init, and you must send the parameters again. An arm without \
+            holding brakes falls: support it first. On a terminal, the command asks before it acts. --yes \
+            answers this question. Without a terminal, the command is refused unless you use --yes.\n\n\
             Examples:\n  \
             jtc disable\n  \
             jtc disable --yes"
@@ -285,13 +291,13 @@ pub enum Command {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Move single joints with keys, or one joint while the command runs
+    /// Jog joints with keys, or one joint while the command runs
     #[command(
         after_help = "On a terminal, the keys 1 to 6 select a joint. Hold the left or right arrow to move it. The up and \
             down arrows change the rate, and q quits.\n\n\
-            The arm begins to stop 0.2 s after the last key, or after the last sign of life of this command. \
-            The arm stands within 0.5 s. Joints stop before the ends of their ranges. You can jog only in \
-            HoldPos, and not while a path is paused.\n\n\
+            The arm begins to stop 0.2 s after the last key press, or 0.2 s after the last message of this \
+            command. The stop takes about 0.5 s. Joints stop before the ends of their ranges. You can jog \
+            only in HoldPos, and not while a motion is paused.\n\n\
             Examples:\n  \
             jtc jog\n  \
             jtc jog 3 0.1                  joint 3 at 0.1 rad/s until Ctrl-C\n  \
@@ -303,22 +309,23 @@ pub enum Command {
         after_help = "The command reports the source of the parameters that each step uses. The recovery does not resume \
             a motion.\n\n\
             If the controller does not hold the arm, --arm FILE sends friction, gains and arm model of that \
-            file. These replace the parameters that the controller has. If the arm is held, the present \
-            parameters stay, and the command reports this.\n\n\
+            file. These replace the parameters of the controller. If the controller holds the arm, its \
+            present parameters stay in use, and the command reports this.\n\n\
             --defaults uses the default parameters of the controller, but only if some are missing. These are the \
-            parameters of the stored arm, or of the built-in arm if none is stored. Without either option, a controller that has all three keeps them. A controller that lacks \
-            one is refused.\n\n\
+            parameters of the stored arm, or of the built-in arm if none is stored. Without --arm and \
+            --defaults, a controller that has friction, gains and model keeps them. If one of them is \
+            missing, the command is refused.\n\n\
             Examples:\n  \
             jtc recover\n  \
             jtc recover --arm my-arm.toml\n  \
             jtc recover --defaults"
     )]
     Recover(RecoverArgs),
-    /// Compute the dynamics of an arm, line by line
+    /// Compute the dynamics of an arm for each line of stdin
     #[command(
-        after_help = "Each line of numbers on stdin gives one line of numbers on stdout. An input line has q1..q6 \
-            qd1..qd6 qdd1..qdd6 (rad, rad/s, rad/s²). For forward, the last six are torques (N·m). For mass, \
-            the line has only q1..q6. Results have 17 significant digits.\n\n\
+        after_help = "Each line of numbers on stdin gives one line of numbers on stdout. An input line has \
+            q1..q6 qd1..qd6 qdd1..qdd6 (rad, rad/s, rad/s²). For forward, the last six numbers are torques \
+            (N·m). For mass, the line has only q1..q6. Results have 17 significant digits.\n\n\
             Examples:\n  \
             echo 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 | jtc dynamics inverse\n  \
             echo 0 0.5 0 0 0 0 | jtc dynamics mass --arm my-arm.urdf"
@@ -413,8 +420,9 @@ mod tests {
     /// docs/commands-jtc.md; `UPDATE_DOCS=1` writes it again.
     #[test]
     fn the_page_of_the_commands_is_made_from_them() {
-        let opening = "Made from the command line's own definition, as `jtc help COMMAND` and the manual pages are. The variable in brackets sets an option \
-                       that is not typed. Messages of commands about faults: [troubles](troubles.md); what a code means: [codes](codes.md).";
+        let opening = "This page is generated from the definition of the command line, like `jtc help COMMAND` and the manual pages. The variable \
+                       in brackets sets an option that you do not type. [Troubles](troubles.md) shows the messages of commands about \
+                       faults, and [codes](codes.md) explains each code.";
         test_kit::page::whole("commands-jtc.md", &cli_kit::reference::markdown::<Cli>(opening));
     }
 

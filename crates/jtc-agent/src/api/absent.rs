@@ -98,7 +98,7 @@ pub(super) async fn absent(State(agent): State<Agent>) -> Result<Json<AbsentObje
 
 /// Sets these joints absent, and all others present.
 ///
-/// The controller accepts this only without torque. While a joint is absent, the controller does not execute motions.
+/// The controller accepts this only without torque. While a joint is absent, the controller does not execute trajectories.
 #[utoipa::path(
     put,
     path = "/api/absent",

@@ -44,7 +44,7 @@ impl From<HeldStop> for HeldStopObject {
 /// Reactions of a controller to disturbances.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct ReactionsObject {
-    /// Last held stop, also after its errors were cleared. Missing if there was none since the start of the controller, or
+    /// Last held stop, also after its errors were cleared. Missing without a held stop since the start of the controller, or
     /// since the errors that occurred were cleared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_held_stop: Option<HeldStopObject>,

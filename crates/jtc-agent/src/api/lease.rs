@@ -31,8 +31,8 @@ pub struct LeaseRequest {
     /// Policy for a motion after the lease has lapsed.
     #[serde(default)]
     pub policy: Policy,
-    /// `true`: if another client holds the lease, wait for the lease. Only one client can wait at a time. It must send
-    /// `PUT /api/lease` repeatedly while it waits.
+    /// `true`: if another client holds the lease, wait for the lease. Only one client can wait at a time. The waiting client
+    /// must repeat `PUT /api/lease`.
     #[serde(default)]
     pub ask: bool,
 }
@@ -89,7 +89,7 @@ impl Agent {
 
 /// Takes the lease.
 ///
-/// One client holds the lease at a time. Every command renews the lease.
+/// Only one client holds the lease at a time. Every command renews the lease.
 #[utoipa::path(
     post,
     path = "/api/lease",

@@ -88,8 +88,8 @@ pub(super) struct PlaceRequest {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PointsRequest {
-    /// Largest number of points. If the trajectory has more, the answer leaves out points evenly. It always has the first
-    /// and the last point.
+    /// Largest number of points. If the trajectory has more, the agent leaves out points evenly, but never the first and
+    /// the last point.
     #[serde(default = "some_points")]
     #[param(minimum = 2, maximum = 2000, default = 500)]
     most: usize,

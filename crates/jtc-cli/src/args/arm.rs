@@ -10,22 +10,25 @@ use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 #[derive(Debug, Subcommand)]
 pub enum ArmCommand {
     /// Make an arm file from a robot description (URDF)
-    #[command(after_help = "The command lists everything that it turned or guessed.\n\n\
-            The arm is a chain of six revolute or continuous joints. If more joints move (a gripper, a seventh \
-            axis, a second arm), select the six with --joints or --tip. The other joints are held at 0.\n\n\
-            A URDF does not contain rotor inertia, gains, acceleration limits and more. The command proposes \
-            starting values by rules. The file contains the rules, and marks the proposed values.\n\n\
+    #[command(after_help = "The command lists all frames that it turned and all values that it guessed.\n\n\
+            The arm must be a chain of six revolute or continuous joints. If more joints move (a gripper, a \
+            seventh axis, a second arm), select the six joints with --joints or --tip. The other joints stay \
+            at position 0.\n\n\
+            A URDF does not contain rotor inertia, gains, acceleration limits and other parameters. The \
+            command computes starting values for them by rules. The arm file contains these rules, and marks \
+            these values as proposed.\n\n\
             Examples:\n  \
             jtc arm import ur5.urdf -o ur5.toml\n  \
             jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
             jtc arm import two-arms.urdf --tip left_tool0 -o left.toml")]
     Import(ImportArgs),
-    /// Check that an arm is physical, complete and usable
+    /// Check that an arm is physically possible and complete
     #[command(
-        after_help = "The check also tests that the drives can hold the arm and that the controller accepts it.\n\n\
-            Exit code 4 means that the controller would refuse the arm, and 0 that it would accept it. Warnings \
-            are possible with exit code 0. Examples are values that are only proposed, and poses in which \
-            gravity is more than a drive can hold.\n\n\
+        after_help = "The command also checks that the drives can hold the arm and that the controller \
+            accepts it.\n\n\
+            Exit code 0 means that the controller would accept the arm. Exit code 4 means that the \
+            controller would refuse it. With exit code 0, the command can still show warnings. Examples are \
+            proposed values, and poses in which gravity is more than a drive can hold.\n\n\
             Examples:\n  \
             jtc arm check ur5.toml\n  \
             jtc --json arm check ur5.toml | jq .findings[].what"
@@ -46,7 +49,7 @@ pub enum ArmCommand {
     Show {
         /// Arm file (TOML) or robot description (URDF).
         ///
-        /// Without a file the command asks the controller
+        /// Without a file, the command asks the controller for its arm
         file: Option<PathBuf>,
         /// Show angles in degrees
         #[arg(long)]
@@ -54,21 +57,24 @@ pub enum ArmCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Send a whole arm to the controller, read back and compare
-    #[command(after_help = "The whole arm is settings, gains, friction, model and name.\n\n\
-            Settings can change only while the controller is in Init or Error. `jtc disable` takes the torque \
-            off.\n\n\
-            --store keeps the arm after a loss of power. The controller is then in Init, and `jtc params \
-            use-defaults` or `jtc recover --defaults` puts the stored arm in use.\n\n\
-            A controller without extensions takes only friction, gains and model. If its own limits, gravity or \
-            rotor inertia differ, nothing is sent unless you give --accept-device-limits.\n\n\
+    /// Send a complete arm to the controller, and verify it
+    #[command(after_help = "The command sends settings, gains, friction, model and name, reads them back, \
+            and compares them with the file.\n\n\
+            Settings can change only while the controller is in Init or Error. `jtc disable` switches off \
+            the torque.\n\n\
+            With --store, the controller keeps the arm after a loss of power. After --store, the controller \
+            is in Init. `jtc params use-defaults` or `jtc recover --defaults` makes it use the stored \
+            arm.\n\n\
+            A controller without extensions accepts only friction, gains and model. If its own limits, \
+            gravity or rotor inertia differ from the file, the command sends nothing unless you use \
+            --accept-device-limits.\n\n\
             Examples:\n  \
             jtc arm push my-arm.toml\n  \
             jtc arm push my-arm.toml --store")]
     Push {
         /// Arm file (TOML) or robot description (URDF)
         file: PathBuf,
-        /// Keep the arm after a loss of power
+        /// Store the arm in non-volatile memory
         #[arg(long)]
         store: bool,
         #[command(flatten)]
@@ -109,10 +115,10 @@ pub struct ImportArgs {
     /// Write this arm file
     #[arg(short, long, env = "JTC_IMPORT_OUT", value_name = "FILE")]
     pub out: PathBuf,
-    /// Select the six joints that move, from base to wrist
+    /// Select the six joints of the arm, from base to wrist
     #[arg(long, value_name = "A,B,C,D,E,F", value_delimiter = ',')]
     pub joints: Option<Vec<String>>,
-    /// Select the link that is the flange
+    /// Select the link to use as the flange
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
     #[command(flatten)]

@@ -10,14 +10,15 @@ use super::LinkArgs;
 pub enum BenchCommand {
     /// Set these joints absent, and all others present
     #[command(
-        after_help = "Name each joint, counted from 1, with the angle that it has in the model. The controller accepts \
-            this only in Init or Error. Take the torque off first with `jtc disable`.\n\n\
-            The controller does not wait for nodes at these joints, and their torque is zero. While a joint is \
-            absent, the controller does not execute motions, and you cannot teach. The other joints are held, \
-            and you can jog them. Their torque is that of the model of the whole arm: push the model of the arm \
-            on the bench.\n\n\
-            A drive that answers at an absent joint is an error. The setting is not stored: after a power cycle \
-            all joints are expected again.\n\n\
+        after_help = "Name each absent joint, counted from 1, with the angle that it has in the model. The \
+            controller accepts this only in Init or Error. Switch off the torque first with `jtc \
+            disable`.\n\n\
+            The controller does not wait for nodes at these joints, and their torque is zero. While a joint \
+            is absent, the controller does not execute trajectories, and you cannot teach. The controller \
+            holds the other joints, and you can jog them. The controller computes their torque from the \
+            model of the whole arm: push a model of the arm that is on the bench.\n\n\
+            A drive that answers at an absent joint is an error. The setting is not stored: after a power \
+            cycle, the controller expects all joints again.\n\n\
             Examples:\n  \
             jtc bench absent 3=0.5 4=0\n  \
             jtc bench absent 2=90 3=-45 --deg"

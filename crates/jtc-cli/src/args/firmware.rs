@@ -11,9 +11,9 @@ use super::LinkArgs;
 pub enum FirmwareCommand {
     /// List installed images and mounted board drives
     #[command(
-        after_help = "The file firmware.json lists the images. The command reads it in the folder that OPENJTC_FIRMWARE \
-            names. Without this variable, the folder is ../share/openjtc/firmware, seen from the directory of this \
-            program, else /usr/share/openjtc/firmware.\n\n\
+        after_help = "The file firmware.json lists the images. The variable OPENJTC_FIRMWARE names the \
+            folder of this file. Without this variable, the folder is ../share/openjtc/firmware, relative to \
+            the directory of this program, else /usr/share/openjtc/firmware.\n\n\
             Examples:\n  \
             jtc firmware list\n  \
             jtc --json firmware list | jq -r .drives[].path"
@@ -21,18 +21,18 @@ pub enum FirmwareCommand {
     List,
     /// Flash a Nucleo board through its ST-LINK drive, and verify
     #[command(after_help = "Flashing resets the board: an arm that it holds falls.\n\n\
-            The command always asks the serial port of the drive's own USB device (known on Linux), and also \
-            --port. If a port cannot be asked, or if a controller reports torque, the command ends with exit \
-            code 4. No option overrides this.\n\n\
-            The command flashes without a question only under three conditions. The board's own port reports no \
-            torque, every joint answers it, and the gripper is off. Otherwise the command asks on a terminal. \
-            --yes answers this question.\n\n\
-            The core supply is known if the board's own port reports exactly the board of the image. Otherwise a board \
-            that exists with both supplies needs --accept-supply.\n\n\
-            Afterwards the command asks over the same port which firmware runs. The firmware reports the CRC-32 \
-            of its own flash, and the command compares it with the image. --baud is the rate before flashing. \
-            Afterwards the rate is that of the image.\n\n\
-            The stored arm can be lost: save it before with `jtc arm pull -o FILE`.\n\n\
+            The command always asks the controller at the serial port of the drive's own USB device (known \
+            on Linux), and also at --port. If a controller cannot be asked or reports torque, the command \
+            ends with exit code 4. No option overrides this.\n\n\
+            The command flashes without a question only under three conditions. The controller at the \
+            board's own port reports no torque, every joint answers this controller, and the gripper is off. \
+            Otherwise the command asks on a terminal. --yes answers this question.\n\n\
+            The command knows the core supply if the board's own port reports exactly the board of the \
+            image. Otherwise a board that exists with both core supplies needs --accept-supply.\n\n\
+            Afterwards the command asks over the same port which firmware runs. The firmware reports the \
+            CRC-32 of its own flash, and the command compares it with the image. --baud is the rate before \
+            flashing. Afterwards the command uses the rate of the image.\n\n\
+            Flashing can delete the stored arm: save it first with `jtc arm pull -o FILE`.\n\n\
             Examples:\n  \
             jtc firmware flash\n  \
             jtc firmware flash --board nucleo-h745zi-q --accept-supply\n  \
@@ -79,8 +79,7 @@ pub struct FlashArgs {
     pub drive: Option<PathBuf>,
     /// Do not ask, and confirm that flashing is safe.
     ///
-    /// You confirm that the arm is supported, that its drives have no power, and that the safety wires are as in the
-    /// image
+    /// You confirm that the arm is supported, that its drives have no power, and that the safety wires match the image
     #[arg(long)]
     pub yes: bool,
     /// Assume the board of the image if the drive does not name one
@@ -88,7 +87,7 @@ pub struct FlashArgs {
     pub assume_board: bool,
     /// Confirm that the solder bridges match the core supply.
     ///
-    /// You confirm that the solder bridges of the board are set to the core supply of the image
+    /// You confirm that the solder bridges of the board match the core supply of the image
     #[arg(long)]
     pub accept_supply: bool,
     /// Flash even if the board already runs this image
@@ -96,10 +95,12 @@ pub struct FlashArgs {
     pub again: bool,
     /// Do not ask the controller afterwards which image it runs.
     ///
-    /// Then the command cannot verify that the image arrived
+    /// The command then cannot verify that the board runs the image
     #[arg(long)]
     pub no_read_back: bool,
-    /// Wait at most this long for the board to run the image, s (1 to 3600)
+    /// Set the longest wait for the image, s (1 to 3600).
+    ///
+    /// The command waits for the board to run the image
     #[arg(long, env = "JTC_WAIT", value_name = "S", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub wait: u64,
     #[command(flatten)]

@@ -11,12 +11,12 @@ use super::{LinkArgs, OverwriteArgs};
 pub enum LogCommand {
     /// Read the flight recorder, and report the first error
     #[command(
-        after_help = "The report shows the first error, the events before it and the events after it.\n\n\
-            The controller records every tick, and stops 0.3 s after the first error. The log survives a reset \
-            and stays until `jtc log clear`. Clearing errors does not clear the log. You can read the log while \
-            the arm moves: recording pauses meanwhile.\n\n\
-            The command runs the ticks through the controller's own program again, with the arm that the \
-            controller has now. If the log is of another arm, name its file with --arm.\n\n\
+        after_help = "The report shows the first error, and the events before and after this error.\n\n\
+            The flight recorder records every tick, and stops 0.3 s after the first error. The log survives \
+            a reset and stays until `jtc log clear`. Clearing errors does not clear the log. You can read \
+            the log while the arm moves, but the recording pauses meanwhile.\n\n\
+            The command replays the ticks with the program of the controller and with its present arm. If \
+            the controller recorded the log with another arm, name the file of that arm with --arm.\n\n\
             -o writes a recording that Foxglove and PlotJuggler can plot. The file also contains the log, for \
             `jtc log replay`.\n\n\
             Examples:\n  \
@@ -30,7 +30,7 @@ pub enum LogCommand {
         /// Write the report page to this .html file
         #[arg(long, env = "JTC_LOG_REPORT", value_name = "FILE.html")]
         report: Option<PathBuf>,
-        /// Use this arm if the log is not of the controller's arm
+        /// Use this arm instead of the present arm of the controller
         #[arg(long, env = "JTC_ARM", value_name = "FILE")]
         arm: Option<PathBuf>,
         #[command(flatten)]
@@ -38,7 +38,7 @@ pub enum LogCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Clear the log, and start to record again
+    /// Clear the log, and restart the flight recorder
     #[command(after_help = "Examples:\n  jtc log clear")]
     Clear {
         #[command(flatten)]
@@ -46,8 +46,8 @@ pub enum LogCommand {
     },
     /// Replay a fetched log, and name the first tick that differs
     #[command(
-        after_help = "The command runs the log through the controller's program. Exit code 4 means that a tick differs, \
-            or that no tick could be replayed.\n\n\
+        after_help = "The command replays the log with the program of the controller, and compares each \
+            tick. Exit code 4 means that a tick differs, or that no tick could be replayed.\n\n\
             Examples:\n  \
             jtc log replay fault.mcap\n  \
             jtc --json log replay fault.mcap | jq .difference"
@@ -55,7 +55,7 @@ pub enum LogCommand {
     Replay {
         /// Recording from `jtc log fetch`
         file: PathBuf,
-        /// Use this arm if the log is not of the arm in the file
+        /// Use this arm instead of the arm in the recording
         #[arg(long, env = "JTC_ARM", value_name = "FILE")]
         arm: Option<PathBuf>,
     },

@@ -74,7 +74,7 @@ pub struct RecoverArgs {
     /// Send friction, gains and arm model of this arm file
     #[arg(long, value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Use the controller's own defaults if parameters are missing
+    /// Use the controller's defaults if parameters are missing
     #[arg(long)]
     pub defaults: bool,
     #[command(flatten)]
@@ -86,7 +86,7 @@ pub struct RecoverArgs {
 pub struct JogArgs {
     /// Joint, counted from 1 (1 to 6).
     ///
-    /// Without a joint, you jog with the keys of the terminal
+    /// Without a joint, you jog with keys on the terminal
     #[arg(value_name = "JOINT", value_parser = clap::value_parser!(u8).range(1..=6), requires = "rate")]
     pub joint: Option<u8>,
     /// Velocity, rad/s

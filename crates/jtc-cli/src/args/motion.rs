@@ -7,24 +7,26 @@ use clap::{Args, Subcommand};
 use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
 /// Help of `jtc run` and `jtc traj run`.
-pub(super) const RUN_EXAMPLES: &str = "The motion runs at 100 % of the file's own speed. An approach runs at --speed, but at no more than half of \
-    the limits. Without --speed, an approach runs at 10 % of the limits, and at 25 % in a simulator.\n\n\
+pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of the speed in the file. The \
+    speed of an approach is --speed percent of the limits, but at most 50 %. Without --speed, the approach \
+    runs at 10 % of the limits, and at 25 % in a simulator.\n\n\
     On a terminal, press space to pause and resume, and s to stop. Press + and - to change the speed if the \
     controller has extensions. Ctrl-C stops on the path, then ends. A second Ctrl-C ends at once.\n\n\
-    The command opens output files before anything moves, and writes a recording while the arm moves. After the \
-    program was killed, you can read the recording up to its last 0.2 s. If the recording cannot be written \
-    before the motion begins, nothing moves. If this happens during the motion (full disk), the command reports \
-    it at once. The motion continues as it was checked, and the command ends with exit code 5.\n\n\
+    The command opens output files before anything moves, and writes a recording while the arm moves. If the \
+    program is killed, the recording can lack the last 0.2 s. If the recording cannot be written before the \
+    motion starts, nothing moves. If writing fails during the motion (full disk), the command reports this \
+    at once. The motion continues unchanged, and the command ends with exit code 5.\n\n\
     Examples:\n  \
     jtc run motion.csv --approach\n  \
     jtc traj run motion.csv --speed 10 --record run.mcap\n  \
     jtc traj run cycle.csv --approach --repeat 10";
 
 /// Help of `jtc stop` and `jtc traj stop`.
-pub(super) const STOP_EXAMPLES: &str = "The Stop reaches the arm also if an agent or another program of this user has the port. Without --port or \
-    JTC_PORT, the Stop goes to every arm whose port these programs have, else to the only port found.\n\n\
-    The command ends with exit code 0 when the arm stands, also if nothing was moving. The command does not \
-    replace the emergency stop.\n\n\
+pub(super) const STOP_EXAMPLES: &str = "The Stop also reaches the arm if an agent or another program of this \
+    user has the port. Without --port or JTC_PORT, the command stops every arm whose port such a program \
+    has. If no such program runs, the command uses the only port found.\n\n\
+    The command ends with exit code 0 when the arm is at rest, also if nothing was moving. The command does \
+    not replace the emergency stop.\n\n\
     Examples:\n  \
     jtc stop\n  \
     jtc traj stop --port /dev/ttyUSB0";
@@ -34,8 +36,8 @@ pub(super) const STOP_EXAMPLES: &str = "The Stop reaches the arm also if an agen
 pub struct CheckArgs {
     /// Use the limits and masses of this arm, TOML or URDF.
     ///
-    /// Default: the built-in arm. Before a motion the arm of the controller takes its place, if the controller has
-    /// extensions
+    /// Default: the built-in arm. Before a motion, the command uses the arm of the controller instead, if the controller
+    /// has extensions
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Set the speed in percent of the file's own (1 to 200).
@@ -45,7 +47,7 @@ pub struct CheckArgs {
     pub speed: Option<f64>,
     /// Read the numbers of the file as degrees.
     ///
-    /// This is for files that do not name their unit. A CSV header names it with q1_deg..q6_deg
+    /// Use this option for files that do not name their unit. A CSV header names degrees with q1_deg..q6_deg
     #[arg(long)]
     pub deg: bool,
 }
@@ -62,9 +64,9 @@ impl CheckArgs {
 pub enum TrajCommand {
     /// Check the limits of a trajectory; nothing is sent
     #[command(
-        after_help = "The check covers the limits at and between points, and the torques by the arm model. The torque \
-            margin is the smallest share of a torque limit that the motion leaves. A margin below 10 % gives a \
-            warning.\n\n\
+        after_help = "The check covers the limits at and between points, and the torques by the arm model. The \
+            torque margin is the smallest share of a torque limit that the motion does not use. A margin \
+            below 10 % gives a warning.\n\n\
             Examples:\n  \
             jtc traj check motion.csv\n  \
             jtc --json traj check motion.yaml --arm my-arm.toml\n  \
@@ -92,7 +94,7 @@ pub enum TrajCommand {
         file: PathBuf,
         /// Read the numbers of the file as degrees.
         ///
-        /// This is for files that do not name their unit
+        /// Use this option for files that do not name their unit
         #[arg(long)]
         deg: bool,
     },
@@ -101,14 +103,15 @@ pub enum TrajCommand {
     Run(RunArgs),
     /// Run the trajectory or the measured path of a recording
     #[command(
-        after_help = "This command works like `jtc traj run`, which also accepts recordings. Here any other file is \
-            refused.\n\n\
-            An MCAP file of `traj run` or `move` contains the whole trajectory. The command runs all of it, \
-            also if the recorded run was interrupted. `jtc traj continue` runs only the remainder. From other \
-            recordings, the command runs the last execution, along the commanded path as far as it is recorded.\n\n\
+        after_help = "This command works like `jtc traj run`, which also accepts recordings. `jtc traj \
+            replay` refuses all other files.\n\n\
+            An MCAP file of `traj run` or `move` contains the whole trajectory. The command runs the whole \
+            trajectory, also if the recorded run was interrupted. `jtc traj continue` runs only the \
+            remainder. From other recordings, the command runs the recorded part of the last execution, \
+            along the commanded path.\n\n\
             --measured uses the positions that were measured every 40 ms, because a motion by hand has no \
-            commanded path. If the measured path exceeds the limits or ends in motion, the command plans it \
-            again, no faster than before. A note reports this.\n\n\
+            commanded path. If the measured path exceeds the limits or ends in motion, the command plans the \
+            path again, at no higher speed. A note reports this.\n\n\
             Examples:\n  \
             jtc traj replay run.mcap --approach\n  \
             jtc traj replay run.csv --speed 50 --record again.mcap\n  \
@@ -119,20 +122,21 @@ pub enum TrajCommand {
         run: RunArgs,
         /// Run the measured path.
         ///
-        /// This is the path of the last motion by hand, or else of the last execution
+        /// The command uses the last motion by hand, or else the last execution
         #[arg(long)]
         measured: bool,
     },
-    /// Continue a run that was interrupted
+    /// Continue an interrupted run
     #[command(
-        after_help = "An error, a stop or a lost link interrupts a run. The recording of the run shows how far the arm \
-            got. An MCAP file also contains the whole trajectory. For a CSV file, name the trajectory with \
-            --trajectory.\n\n\
-            The remainder begins at the last confirmed position. This is the position that the recording shows, \
-            or a later one if the controller shows that it continued by itself. If the arm is at another \
-            position (after an error, or a restart of the controller), an approach moves it there.\n\n\
-            The remainder speeds up from standstill and follows the original path. After a run with --repeat, \
-            the unfinished repetitions follow.\n\n\
+        after_help = "An error, a stop or a lost link interrupts a run. The recording of the run shows the \
+            position that the arm reached. An MCAP file also contains the whole trajectory. For a CSV file, \
+            name the trajectory with --trajectory.\n\n\
+            The remainder begins at the last confirmed position. This is the last position in the recording. \
+            If the motion continued after the end of the recording, this is the later position that the \
+            controller reports. If the arm is at another position (after an error, or a restart of the \
+            controller), an approach moves it there.\n\n\
+            The remainder starts from rest and follows the original path. After the remainder of a run with \
+            --repeat, the command runs the missing repetitions.\n\n\
             Examples:\n  \
             jtc traj run cycle.csv --record run.mcap\n  \
             jtc traj continue run.mcap\n  \
@@ -143,24 +147,24 @@ pub enum TrajCommand {
     #[command(after_help = "Examples:\n  jtc traj pause")]
     Pause(LinkArgs),
     /// Resume a paused motion
-    #[command(after_help = "The command is refused if nothing is paused.\n\n\
-            If settings or payload changed during the pause, the remainder of the motion can be impossible. \
-            --trajectory names the paused trajectory. The command then checks the remainder with the new \
-            settings and payload before anything is sent. Without --trajectory, a note reports what is not \
-            checked.\n\n\
+    #[command(after_help = "The command is refused if no motion is paused.\n\n\
+            If settings or payload changed during the pause, the remainder of the motion can exceed a limit. \
+            Name the paused trajectory with --trajectory. The command then checks the remainder with the new \
+            settings and payload before it sends anything. Without --trajectory, a note reports that the \
+            remainder is not checked.\n\n\
             Examples:\n  \
             jtc traj resume\n  \
             jtc traj resume --trajectory motion.csv\n  \
             jtc traj resume --trajectory run.mcap")]
     Resume(ResumeArgs),
-    /// Stop on the path and end the execution
+    /// Stop on the path, and end the motion
     #[command(after_help = STOP_EXAMPLES)]
     Stop(LinkArgs),
     /// Set or show the speed override on the path, in percent
     #[command(
-        after_help = "The override applies to the present motion and to later motions. The path stays unchanged, and the \
-            motion reaches the new speed along a ramp. The controller needs extensions (see `jtc info`). \
-            Without a number the command shows the present override.\n\n\
+        after_help = "The override applies to the present motion and to later motions. The path stays \
+            unchanged, and the speed changes along a ramp. The controller needs extensions (see `jtc info`). \
+            Without a number, the command shows the present override.\n\n\
             Examples:\n  \
             jtc traj speed 30\n  \
             jtc traj speed"
@@ -206,7 +210,7 @@ pub struct RunArgs {
 pub struct ResumeArgs {
     /// Check the remainder of this trajectory before the motion.
     ///
-    /// Name the trajectory file as it was run, or a recording of the run that contains it (MCAP)
+    /// Name the trajectory file of the run, or an MCAP recording of the run, which contains the trajectory
     #[arg(long, env = "JTC_TRAJECTORY", value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
     #[command(flatten)]
@@ -221,14 +225,14 @@ pub struct ContinueArgs {
     /// Recording of the interrupted run, .mcap or .csv
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// Use this trajectory, as it was run.
+    /// Use this trajectory file of the run.
     ///
     /// Default: the trajectory in the recording
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
-    /// Set the number of runs, including finished ones (1 to 100000).
+    /// Set the total number of runs (1 to 100000).
     ///
-    /// Default: the number in the recording (MCAP)
+    /// The number includes finished runs. Default: the number in the recording (MCAP)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: Option<u32>,
     /// Use the limits and masses of this arm, TOML or URDF.
@@ -243,10 +247,10 @@ pub struct ContinueArgs {
 /// Options of every command that executes a motion.
 #[derive(Args, Clone, Debug)]
 pub struct ExecuteArgs {
-    /// Set what the motion does if this program is lost.
+    /// Set the reaction of the motion to the loss of this program.
     ///
-    /// The motion continues, pauses or stops if this program is killed or loses its agent. This works only through `jtc
-    /// serve`
+    /// The motion continues, pauses or stops if this program is killed or loses its agent. This option needs an agent
+    /// (`jtc serve`)
     #[arg(long, value_name = "POLICY", value_parser = ["continue", "pause", "stop"])]
     pub when_gone: Option<String>,
     #[command(flatten)]
@@ -275,8 +279,8 @@ pub struct RunFiles {
 /// `jtc teach …`
 #[derive(Debug, Subcommand)]
 pub enum TeachCommand {
-    /// Start teaching: you can move the arm by hand
-    #[command(after_help = "The controller applies only gravity compensation.\n\n\
+    /// Start teaching, to move the arm by hand
+    #[command(after_help = "During teaching, the controller only compensates gravity.\n\n\
         Examples:\n  \
         jtc teach on")]
     On(LinkArgs),
@@ -285,12 +289,12 @@ pub enum TeachCommand {
     Off(LinkArgs),
     /// Record a motion by hand as a trajectory, until Ctrl-C
     #[command(
-        after_help = "The command writes the file while you lead the arm. After the program was killed, the file contains \
-            the motion up to then. If the file cannot be written (full disk), the recording ends at once, the \
-            arm is held, and the exit code is 5.\n\n\
-            With --waypoints, the file contains as few positions as possible, for `jtc plan`. The other \
-            positions are within --tolerance of the straight legs between the waypoints. Until the end, the \
-            file contains the motion.\n\n\
+        after_help = "The command writes the file while you lead the arm. If the program is killed, the file \
+            contains the motion up to that time. If the file cannot be written (full disk), the recording \
+            ends at once, the controller holds the arm, and the exit code is 5.\n\n\
+            With --waypoints, the file contains as few positions as possible, for `jtc plan`. All other \
+            recorded positions are within --tolerance of the straight legs between the waypoints. Until the \
+            recording ends, the file contains the complete motion.\n\n\
             Examples:\n  \
             jtc teach record motion.csv\n  \
             jtc teach record motion.csv --duration 20\n  \
@@ -311,8 +315,7 @@ pub enum TeachCommand {
         waypoints: bool,
         /// Set the tolerance of the waypoints, rad (default 0.01).
         ///
-        /// The tolerance limits the distance between the motion and the straight legs, for the joint that is furthest
-        /// away
+        /// This is the largest distance of a joint between the motion and the straight legs
         #[arg(long, value_name = "RAD", requires = "waypoints")]
         tolerance: Option<f64>,
     },

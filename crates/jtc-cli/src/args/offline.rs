@@ -38,7 +38,7 @@ pub enum DynamicsKind {
 /// Options of `jtc explain`.
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
-    /// Name, number or words of the code, as a screen shows them.
+    /// Name, number or words of the code, as shown on the screen.
     ///
     /// `faults` explains the format of fault files. Without a code, the command lists all codes
     pub code: Vec<String>,
@@ -61,7 +61,7 @@ pub struct ExampleArgs {
 /// Options of `jtc help`.
 #[derive(Args, Debug)]
 pub struct HelpArgs {
-    /// Page (files, faults, events), or the words of a command
+    /// Page (files, faults or events), or the words of a command
     pub topic: Vec<String>,
 }
 

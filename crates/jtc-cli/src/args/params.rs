@@ -15,10 +15,11 @@ pub enum ParamsCommand {
             FricPolynomialCoeffs.csv   friction coefficients, one row per joint\n  \
             FricTableJointN.csv        friction tables, six files\n  \
             PidParamJointN.csv         gains, six files\n\n\
-            You can name several files. The command searches the directories that you name. Files of single \
-            joints count only if you name all six.\n\n\
-            No frame carries the limits, gravity and rotor inertia of an arm file. If they differ from the \
-            controller's own, nothing is sent unless you give --accept-device-limits.\n\n\
+            You can name several files. In a directory, the command searches for these files. The command \
+            uses files of single joints only if it has all six of them.\n\n\
+            This command does not send the limits, gravity and rotor inertia of an arm file. If they differ \
+            from the values of the controller, the command sends nothing unless you use \
+            --accept-device-limits.\n\n\
             Examples:\n  \
             jtc params push my-arm.toml\n  \
             jtc params push arm.urdf FricPolynomialCoeffs.csv PidParamJoint*.csv")]
@@ -26,7 +27,7 @@ pub enum ParamsCommand {
         /// Files or directories
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
-        /// Choose the friction to send if the files have both
+        /// Choose the kind of friction if the files have both kinds
         #[arg(long, value_enum, default_value_t = FrictionKind::Polynomial)]
         friction: FrictionKind,
         #[command(flatten)]
@@ -39,8 +40,8 @@ pub enum ParamsCommand {
     UseDefaults(LinkArgs),
     /// Show the parameters of a file or of the built-in arm
     #[command(
-        after_help = "Without a file, the command shows the built-in arm. If a controller is connected, the command also \
-        shows the parameters that it still misses.\n\n\
+        after_help = "Without a file, the command shows the built-in arm. With --port, the command also \
+        shows the parameters that the controller lacks.\n\n\
         Examples:\n  \
         jtc params show\n  \
         jtc params show my-arm.urdf"
@@ -49,7 +50,7 @@ pub enum ParamsCommand {
         /// Files or directories
         #[arg(value_name = "FILE")]
         files: Vec<PathBuf>,
-        /// Ask the controller at this port for missing parameters
+        /// Ask the controller at this port which parameters it lacks
         #[arg(long, env = "JTC_PORT", value_name = "PATH")]
         port: Option<String>,
         /// Set the rate of the port, Bd

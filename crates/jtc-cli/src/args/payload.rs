@@ -10,11 +10,11 @@ use super::LinkArgs;
 pub enum PayloadCommand {
     /// Set the payload
     #[command(
-        after_help = "From now on the controller holds and moves the arm with this payload. The flange is the last frame \
-            of the arm file.\n\n\
-            The torque of the payload enters over half a second, without a step in HoldPos, Teaching and Pause. \
-            A motion that starts meanwhile waits for this. The payload is not stored: after a power cycle the \
-            controller has no payload.\n\n\
+        after_help = "The controller then holds and moves the arm with this payload. The flange is the last \
+            frame of the arm file.\n\n\
+            In HoldPos, Teaching and Pause, the controller adds the torque of the payload over 0.5 s, \
+            without a step. A motion that starts meanwhile waits until the torque is complete. The payload \
+            is not stored: after a power cycle, the controller has no payload.\n\n\
             Examples:\n  \
             jtc payload set --mass 2 --com 0,0,0.08\n  \
             jtc payload set --mass 2 --com 0,0,0.08 --inertia 0.01,0.01,0.004\n  \
@@ -32,7 +32,7 @@ pub enum PayloadCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Show the payload that the controller computes with
+    /// Show the payload that the controller uses
     #[command(after_help = "Examples:\n  jtc payload show\n  jtc --json payload show | jq .mass_kg")]
     Show {
         #[command(flatten)]
@@ -51,7 +51,7 @@ pub struct PayloadArgs {
     pub com: [f64; 3],
     /// Set the inertia about the centre of mass, kg·m².
     ///
-    /// Its axes are those of the flange. The order is Ixx,Iyy,Izz or Ixx,Iyy,Izz,Ixy,Ixz,Iyz. Default: a point mass
+    /// The axes are parallel to the axes of the flange. The order is Ixx,Iyy,Izz or Ixx,Iyy,Izz,Ixy,Ixz,Iyz. Default: a point mass
     #[arg(long, value_name = "IXX,IYY,IZZ[,IXY,IXZ,IYZ]", value_parser = inertia, allow_hyphen_values = true)]
     pub inertia: Option<[f64; 6]>,
 }

@@ -18,18 +18,18 @@ pub struct PlanArgs {
     pub out: PathBuf,
     /// Round corners within this distance, rad (0 to 0.5).
     ///
-    /// The distance is that of the joint that is furthest from the waypoint. With --deg, it is in degrees (0 to 28.6).
-    /// With 0 the arm stops at each waypoint
+    /// The joint that is furthest from the waypoint counts. With --deg, the distance is in degrees (0 to 28.6). With 0, the
+    /// arm stops at each waypoint
     #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
     /// Keep the flange on straight lines.
     ///
-    /// This applies to each leg for which the file does not specify how the arm moves
+    /// This applies to each leg without a type of path in the file
     #[arg(long)]
     pub line: bool,
     /// Round corners of lines and arcs, m (0 to 0.5).
     ///
-    /// This is the distance from the waypoint. With 0 the arm stops there
+    /// The number is the largest distance from the waypoint. With 0, the arm stops at the waypoint
     #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend_m: f64,
     /// Set the speed in percent of the allowed speed (1 to 100)
@@ -39,7 +39,7 @@ pub struct PlanArgs {
     pub margin: MarginArgs,
     /// Let the acceleration change in 20 ms instead of 100 ms.
     ///
-    /// The motion is faster, and harder on gears and load
+    /// The motion is then faster, and puts more stress on gears and load
     #[arg(long)]
     pub no_jerk_limit: bool,
     /// Use limits, masses and poses of this arm, TOML or URDF.
@@ -49,7 +49,7 @@ pub struct PlanArgs {
     pub arm: Option<PathBuf>,
     /// Read the numbers of the file and --blend as degrees.
     ///
-    /// This is for files that do not name their unit
+    /// Use this option for files that do not name their unit
     #[arg(long)]
     pub deg: bool,
     /// Plan with this payload at the flange, kg.
@@ -64,7 +64,7 @@ pub struct PlanArgs {
     pub temperature: f64,
     /// Write a report page to this .html file.
     ///
-    /// The page shows the motion, its limits, and the limit that binds at each time
+    /// The page shows the motion, its limits, and the active limit at each time
     #[arg(long, env = "JTC_PLAN_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
@@ -100,7 +100,7 @@ pub struct MoveArgs {
     pub line: bool,
     /// Read positions, or roll, pitch and yaw, as degrees.
     ///
-    /// This is not for named poses, whose unit is known
+    /// This option does not apply to named poses
     #[arg(long)]
     pub deg: bool,
     /// Set the speed in percent of the allowed speed (1 to 100).
@@ -181,8 +181,8 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 pub enum PoseCommand {
     /// Save the present position in the arm file
     #[command(
-        after_help = "The arm must stand still. The command is refused while a trajectory is executed or a joint is \
-            jogged. The rest of the file stays unchanged, also its comments.\n\n\
+        after_help = "The arm must be at rest. The command is refused during a trajectory or a jog. The \
+            other contents of the file stay unchanged, including comments.\n\n\
             Examples:\n  \
             jtc pose save home --arm my-arm.toml\n  \
             jtc pose save above-table --arm my-arm.toml --overwrite"

@@ -18,8 +18,8 @@ pub struct ServeArgs {
     pub sim: bool,
     /// Use this arm, TOML or URDF (default: the built-in arm).
     ///
-    /// With --sim, the agent simulates this arm. The simulated controller has stored it if the file is complete.
-    /// Without --sim, this is the arm of a controller that cannot report its own
+    /// With --sim, the agent simulates this arm. If the file is complete, the arm is also the stored arm of the simulated
+    /// controller. Without --sim, the agent uses this arm for a controller that cannot report its arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Listen at this address.
@@ -27,16 +27,18 @@ pub struct ServeArgs {
     /// Clients on other computers always need a token
     #[arg(long, env = "JTC_LISTEN", value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8780")]
     pub listen: SocketAddr,
-    /// Accept this host name for the agent, besides its address.
+    /// Accept this host name in addition to the address.
     ///
-    /// Repeat the option, or use commas, for several names
+    /// Requests to the agent may then use this host name. For several names, repeat the option or use commas
     #[arg(long = "name", env = "JTC_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
     /// Allowed origins.
     #[arg(
         long = "allow-origin",
-        help = "Allow pages of this origin read-only access, as https://app.foxglove.dev, or file:// for desktop \
-            applications. Repeat the option, or use commas, for several origins",
+        help = "Allow web pages of this origin read-only access",
+        long_help = "Allow web pages of this origin read-only access.\n\n\
+            Examples are https://app.foxglove.dev, and file:// for desktop applications. For several origins, repeat \
+            the option or use commas",
         env = "JTC_ALLOW_ORIGINS",
         value_name = "ORIGIN",
         value_delimiter = ',',
@@ -45,24 +47,24 @@ pub struct ServeArgs {
     pub allow_origins: Vec<String>,
     /// Print the dashboard link with the operator's token.
     ///
-    /// The link with the token is printed only on a terminal. Without this option it is printed once, when the token is
-    /// made
+    /// The command prints this link only on a terminal. Without this option, it prints the link once, when it creates the
+    /// token
     #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// Append each command to this file.
     ///
-    /// The file shows the client, the command, the time and the result
+    /// A line of the file has the client, the command, the time and the result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
     /// Limit the size of the command log.
     ///
-    /// At half of this size, the log is renamed to FILE.1
+    /// At half of this size, the agent renames the log to FILE.1
     #[arg(long, env = "JTC_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
     pub command_log_limit: u64,
     /// Keep trajectories in this directory.
     ///
-    /// The files have their number in their name, as 7-pick.csv. Without this option, the agent keeps trajectories
-    /// while it runs
+    /// Each file name contains the number of the trajectory, as 7-pick.csv. Without this option, the agent keeps
+    /// trajectories only while it runs
     #[arg(long, env = "JTC_TRAJECTORIES", value_name = "DIR")]
     pub trajectories: Option<PathBuf>,
     /// Use TLS with this certificate chain, PEM
@@ -70,7 +72,7 @@ pub struct ServeArgs {
     pub tls_cert: Option<PathBuf>,
     /// Use this private key of the certificate, PEM.
     ///
-    /// The file must not be readable by every user
+    /// Only the owner and the group may have access to the file
     #[arg(long, env = "JTC_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
     pub tls_key: Option<PathBuf>,
     /// Record each motion of every client to this directory
@@ -78,17 +80,17 @@ pub struct ServeArgs {
     pub record: Option<PathBuf>,
     /// Limit the size of the recordings.
     ///
-    /// The oldest recordings of this directory's agents are removed first
+    /// The agent deletes the oldest recordings first, but only recordings that agents made in this directory
     #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = record_size)]
     pub record_limit: u64,
     /// Let a PLC drive the arm by Modbus TCP at this address.
     ///
-    /// Modbus does not have tokens. By default only this computer can connect
+    /// Modbus has no tokens. By default, only programs on this computer can connect
     #[arg(long, env = "JTC_MODBUS", value_name = "ADDRESS:PORT")]
     pub modbus: Option<SocketAddr>,
     /// Allow Modbus only from this address or network.
     ///
-    /// A network is, for example, 192.168.0.0/24. Repeat the option, or use commas, for several
+    /// An example of a network is 192.168.0.0/24. For several networks, repeat the option or use commas
     #[arg(long, env = "JTC_MODBUS_ALLOW", value_name = "CIDR", value_delimiter = ',', requires = "modbus")]
     pub modbus_allow: Vec<Network>,
     #[command(flatten)]

@@ -21,9 +21,9 @@ pub enum SimSpeed {
 /// Support of a simulated arm while its drives do not hold it.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum SimSupport {
-    /// No support: the arm falls from the start until its drives are enabled, and after an error
+    /// No support: the arm falls while its drives are off
     None,
-    /// A stand until all drives were enabled once; after that the arm falls, as with the known drives
+    /// A stand until all drives were enabled once, then no support
     Stand,
     /// Holding brakes that close at once if a drive is not enabled
     Brakes,
@@ -76,12 +76,12 @@ pub struct SimArgs {
     pub serial: Option<PathBuf>,
     /// Simulate this arm, TOML or URDF (default: the built-in arm).
     ///
-    /// The simulated controller has stored the arm if the file is complete
+    /// If the file is complete, the arm is also the stored arm of the simulated controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Put a payload at the flange that the controller does not know.
+    /// Attach a payload that the controller does not know.
     ///
-    /// The mass is in kg. X,Y,Z is its position in the flange frame, m
+    /// KG is the mass, kg. X,Y,Z is its position in the flange frame, m
     #[arg(long, env = "JTC_SIM_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried)]
     pub payload: Option<jtc_core::Payload>,
     /// Choose the support of the arm while its drives are off
@@ -89,22 +89,22 @@ pub struct SimArgs {
     pub support: SimSupport,
     /// Set the gear stiffness between motor and link, N·m/rad.
     ///
-    /// Give one number for all joints, or one for each. Default: rigid
+    /// Write one number for all joints, or one number for each joint. Default: rigid
     #[arg(long, value_name = "K[,K2,…,K6]", value_parser = gears, allow_hyphen_values = true)]
     pub gear_stiffness: Option<[f64; JOINTS]>,
     /// Set the speed at which the drives trip, rad/s.
     ///
-    /// Give one number for all joints, or one for each. Default: 1.2 times the velocity limit
+    /// Write one number for all joints, or one number for each joint. Default: 1.2 times the velocity limit
     #[arg(long, value_name = "V[,V2,…,V6]", value_parser = over_speed, allow_hyphen_values = true)]
     pub over_speed: Option<[f64; JOINTS]>,
-    /// Keep a stored arm in this file, as the flash of a board does.
+    /// Keep the stored arm in this file, like the flash of a board.
     ///
-    /// The simulator reads the file at the start. `jtc arm push --store` writes it
+    /// The simulator reads the file when it starts. `jtc arm push --store` writes the file
     #[arg(long, env = "JTC_STORE_FILE", value_name = "FILE")]
     pub store: Option<PathBuf>,
     /// Set the rate of the simulated line, Bd (300 to 15000000).
     ///
-    /// The line is as slow as a real one
+    /// The line needs as much time per byte as a real line
     #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200,
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]
     pub baud: u32,
@@ -114,7 +114,9 @@ pub struct SimArgs {
     /// Set the speed of virtual time
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Realtime)]
     pub speed: SimSpeed,
-    /// Set the seed of random numbers; equal seeds give equal bytes
+    /// Set the seed of random numbers.
+    ///
+    /// Equal seeds give equal bytes
     #[arg(long, env = "JTC_SEED", value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Inject the faults of this TOML file.
@@ -122,9 +124,9 @@ pub struct SimArgs {
     /// `jtc explain faults` shows the format
     #[arg(long, env = "JTC_FAULTS", value_name = "FILE")]
     pub faults: Option<PathBuf>,
-    /// Connect the joint bus also to this CAN URL.
+    /// Also connect the joint bus to this CAN URL.
     ///
-    /// For example multicast:239.74.163.2:43113
+    /// An example is multicast:239.74.163.2:43113
     #[arg(long, env = "JTC_BUS", value_name = "URL")]
     pub bus: Option<String>,
     /// Record every millisecond from power-up, .mcap or .csv.

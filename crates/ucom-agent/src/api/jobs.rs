@@ -118,7 +118,7 @@ pub(super) async fn init(
 
 /// Diagnoses bus, chain and boards, as a job.
 ///
-/// The agent listens to the bus. It asks the boards only if this cannot do harm.
+/// The agent listens to the bus, and asks the boards only if this cannot do harm.
 #[utoipa::path(
     post,
     path = "/api/doctor",

@@ -67,7 +67,7 @@ impl Agent {
 
 /// Takes the lease.
 ///
-/// One client holds the lease at a time. Every command renews the lease.
+/// Only one client holds the lease at a time. Every command renews the lease.
 #[utoipa::path(
     post,
     path = "/api/lease",

@@ -230,7 +230,7 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
 
 /// Programs boards, as a job.
 ///
-/// The agent checks the image, transfers it twice, and verifies it by reading back. One update runs at a time.
+/// The agent checks the image, transfers it twice, and verifies it by reading back. Only one update runs at a time.
 #[utoipa::path(
     post,
     path = "/api/updates",

@@ -30,12 +30,13 @@ pub struct UpdateArgs {
     pub image: PathBuf,
     /// Read files of any name as raw bytes.
     ///
-    /// Records are never read as raw bytes, and text only from a .bin file
+    /// The command never reads records as raw bytes, and reads text as raw bytes only from a .bin file
     #[arg(long)]
     pub raw: bool,
     /// Set the unit of the addresses in Intel HEX and S-records.
     ///
-    /// Default: words in S-records and bytes in Intel HEX, unless the records follow each other only in the other unit
+    /// Default: words in S-records and bytes in Intel HEX. The command uses the other unit if the records follow each other
+    /// without gaps only in that unit
     #[arg(long, value_enum, value_name = "UNIT")]
     pub addresses: Option<Addresses>,
     /// Fill gaps between records with FF, the erased state of flash
@@ -46,7 +47,7 @@ pub struct UpdateArgs {
     pub flash_id: Option<u16>,
     /// Write this flash date, or its 16 bits as 0x3AC1.
     ///
-    /// Default: today. A board that shows the program keeps its date
+    /// Default: today. A board that already shows the program keeps its date
     #[arg(long, value_name = "YYYY-MM-DD")]
     pub date: Option<String>,
     /// Check everything, but send nothing that changes a board
@@ -62,7 +63,7 @@ pub struct UpdateArgs {
     pub name_target: bool,
     /// Program the named boards by one broadcast transfer.
     ///
-    /// Without this option the boards are programmed one after the other
+    /// Without this option, the command programs one board after the other
     #[arg(long)]
     pub group: bool,
     /// Send this exloader for RAM.
@@ -82,12 +83,12 @@ pub struct UpdateArgs {
     pub second: Option<PathBuf>,
     /// Require this Program ID at the end.
     ///
-    /// This is for images that do not contain the Program ID
+    /// Use this option for images that do not contain the Program ID
     #[arg(long, value_name = "ID", value_parser = program_id)]
     pub expect_program_id: Option<u16>,
     /// Accept an update that cannot be verified.
     ///
-    /// The exit code is then 0 for `program-up-to-date`, and if the profile leaves nothing to compare
+    /// The exit code is then 0 for `program-up-to-date`, and for a profile that leaves nothing to compare
     #[arg(long)]
     pub unverified: bool,
     /// Write even if the board already shows this program.
@@ -97,7 +98,7 @@ pub struct UpdateArgs {
     pub rewrite: bool,
     /// Read the flash numbers from this inventory of `ucom init`.
     ///
-    /// Updates record there what they wrote
+    /// Each update records the written image in this file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]

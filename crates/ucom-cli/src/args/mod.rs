@@ -24,15 +24,15 @@ pub use variables::VARIABLES;
     version,
     about = "Number, inspect, update, move and simulate UCoM motor boards",
     after_help = "Examples:\n  \
-        ucom sim                                     simulate a head of ten boards, and print its bus\n  \
+        ucom sim                                     simulate a head of ten boards, and print its bus URL\n  \
         export UCOM_BUS=socketcand:127.0.0.1:29536/can0\n  \
         ucom scan                                    list the boards, without changes\n  \
         ucom init                                    reset, number the chain, write an inventory\n  \
         ucom update 3 firmware.hex                   check, program, verify\n  \
         ucom --json info | jq .boards[0].program_id  print a value for programs\n\n\
         Buses are socketcan:can0, slcan:/dev/ttyACM0@1000000, socketcand:HOST:PORT/can0 and multicast:ADDR:PORT.\n\n\
-        Environment variables can set the options that name a place, a file or a format: see `ucom COMMAND \
-        --help`.\n\n\
+        Environment variables can set options for buses, addresses, files and formats (see `ucom COMMAND \
+        --help`).\n\n\
         Exit codes:\n  \
         0  done\n  \
         1  a board reported an error\n  \
@@ -45,7 +45,9 @@ pub use variables::VARIABLES;
     disable_help_subcommand = true
 )]
 pub struct Cli {
-    /// Print JSON instead of text; streams print one object per line
+    /// Print JSON instead of text.
+    ///
+    /// Commands that print a stream print one object per line
     #[arg(long, global = true, env = "UCOM_JSON", value_parser = on_off, help_heading = "Common")]
     pub json: bool,
     #[command(flatten)]
@@ -65,13 +67,13 @@ pub struct LinkArgs {
     pub bus: Option<String>,
     /// Use this profile, TOML.
     ///
-    /// A profile describes how the boards read the protocol. `ucom help profile` shows the format, and `ucom probe`
+    /// A profile describes how the boards interpret the protocol. `ucom help profile` shows the format, and `ucom probe`
     /// writes a profile
     #[arg(long, global = true, env = "UCOM_PROFILE", value_name = "FILE", help_heading = "Common")]
     pub profile: Option<PathBuf>,
     /// Use this signal table, TOML.
     ///
-    /// The table gives the meaning of the words of inputs, outputs and parameters, see `ucom help edges`. Default:
+    /// The table has type, scale and unit of inputs, outputs and parameters (see `ucom help edges`). Default:
     /// ucom-edges.toml, if it exists
     #[arg(long, global = true, env = "UCOM_EDGES", value_name = "FILE", help_heading = "Common")]
     pub edges: Option<PathBuf>,
@@ -80,9 +82,9 @@ pub struct LinkArgs {
 /// Option that overrides the checks of the bus.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ForceArgs {
-    /// Continue even if a check of the bus would refuse.
+    /// Continue even if a check of the bus fails.
     ///
-    /// The checks are for another PC on the bus, a running board, and the bus load
+    /// The command checks for another PC on the bus, for running boards, and for a high bus load
     #[arg(long)]
     pub force: bool,
 }
@@ -98,7 +100,7 @@ pub struct OverwriteArgs {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Simulate a chain of boards on a bus that others can join
+    /// Simulate a chain of boards on a bus for other programs
     #[command(after_help = "Examples:\n  \
             ucom sim\n  \
             ucom sim --boards 5 --flash-ids 0x21,0x42,0x63,0x04,0x7F --listen 127.0.0.1:0\n  \
@@ -107,7 +109,7 @@ pub enum Command {
             files.")]
     Sim(SimArgs),
     /// List the boards on the bus, without changing them
-    #[command(after_help = "The command only asks the boards.\n\n\
+    #[command(after_help = "The command sends only requests that change nothing.\n\n\
         Examples:\n  \
         ucom scan\n  \
         ucom --json scan | jq '.boards | length'")]
@@ -117,7 +119,8 @@ pub enum Command {
         Examples:\n  \
         ucom init\n  \
         ucom init --inventory head.toml\n\n\
-        If the inventory already exists, the command compares it. A board at another position is an error.")]
+        If the inventory already exists, the command compares the boards with it. A board at another \
+        position is an error.")]
     Init(InitArgs),
     /// Show the information that boards report
     #[command(after_help = "Examples:\n  ucom info\n  ucom info 3\n  ucom --json info 1-4")]
@@ -131,11 +134,11 @@ pub enum Command {
         The bits are MSTART ASTART MCARUN EXLRUN INIT PROG OPINIT IPINIT. MCARUN, EXLRUN and IPINIT cannot be \
         set.\n\n\
         --raw sends one PC_SETSTATUS unchanged: new = (old & ~MASK) | VALUE. Value bits outside the mask are \
-        therefore set too. The frame is not repeated, and `all` is one broadcast frame. The command shows the \
-        result that the rules expect next to the actual result. A different result ends with exit code 1. \
-        Running boards need --force.")]
+        therefore set too. The command does not repeat the frame, and `all` is one broadcast frame. The \
+        command shows the expected result and the actual result. If they differ, the exit code is 1. Running \
+        boards need --force.")]
     Status(StatusArgs),
-    /// Reset boards; outputs become safe, numbers are lost
+    /// Reset boards; outputs become safe, and numbers are lost
     #[command(
         after_help = "Examples:\n  ucom reset          all boards; `ucom init` numbers them again\n  ucom reset 2"
     )]
@@ -146,8 +149,12 @@ pub enum Command {
         ucom xreset 2\n  \
         ucom xreset all")]
     Xreset(ActArgs),
-    /// Start the application of boards; nothing moves before `ucom run`
-    #[command(after_help = "Examples:\n  ucom start all\n  ucom start 1,3")]
+    /// Start the application of boards; nothing moves
+    #[command(after_help = "A started application does not move the board. `ucom run --active` moves \
+        boards.\n\n\
+        Examples:\n  \
+        ucom start all\n  \
+        ucom start 1,3")]
     Start(ActArgs),
     /// Stop control and application of boards
     #[command(after_help = "Examples:\n  ucom stop all\n  ucom stop 2 --control-only")]
@@ -164,23 +171,25 @@ pub enum Command {
             ucom update 3 program.hex --data data.hex\n  \
             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
             Image formats are raw binary, Intel HEX and Motorola S-record. The command recognises them by their \
-            content. Records that follow each other without gaps show if their addresses count bytes or words. \
-            --addresses sets this unit. The profile decides if two files are sent: `prog.plan`, see `ucom help profile`.\n\n\
-            `all` means the boards that answer and the boards of the inventory. A missing board is reported.\n\n\
-            A board shows only its Program ID and date, not its load address or other memories. A board is up \
-            to date if the inventory also says that an update wrote the same bytes to the same address. The \
-            date can differ unless --date names it.\n\n\
-            Without such an entry the board is program-up-to-date: nothing is sent, and nothing is verified. \
-            --rewrite writes the image, and --unverified accepts this state. With --data, --exloader or \
-            --second the image is always written.\n\n\
+            content. If the records follow each other without gaps in one unit only, the command knows if \
+            their addresses count bytes or words. --addresses sets this unit. `prog.plan` of the profile \
+            decides if the command sends two files (see `ucom help profile`).\n\n\
+            `all` means the boards that answer and the boards of the inventory. The command reports a \
+            missing board.\n\n\
+            A board shows only its Program ID and date, not its load address or other memories. A board is \
+            up to date only if the inventory also says that an update wrote the same bytes to the same \
+            address. The date may differ unless you use --date.\n\n\
+            Without such an entry, the board is program-up-to-date: the command sends nothing and verifies \
+            nothing. --rewrite writes the image, and --unverified accepts this state. With --data, \
+            --exloader or --second, the command always writes the image.\n\n\
             Exit codes:\n  \
             0  verified, already up to date, or accepted by --unverified\n  \
             1  the board reported an error before anything was erased\n  \
             3  no answer\n  \
             4  refused, program-up-to-date, or cancelled before anything was erased\n  \
             5  failed or cancelled after something was erased, or written but not verified\n\n\
-            An image is written but not verified if the profile leaves nothing to verify. A bus failure gives \
-            exit code 3 before something was erased, and 5 after it.\n\n\
+            An image is written but not verified if the profile leaves nothing to verify. A bus failure \
+            gives exit code 3 before something was erased, and exit code 5 afterwards.\n\n\
             The report has the outcome of each board: not-started, cancelled, up-to-date, program-up-to-date, \
             incomplete, unknown, written, verified or running."
     )]
@@ -190,11 +199,11 @@ pub enum Command {
         Examples:\n  \
         ucom repair 3\n  \
         ucom repair 3 --flash-id 0x63\n\n\
-        The pins of all other boards are low meanwhile, so that no other board can take the number. The board \
-        must have the flash number that you name or that is in the inventory.\n\n\
+        Meanwhile, the command sets the pins of all other boards low, so that no other board can take the \
+        number. The board must have the flash number from --flash-id or from the inventory.\n\n\
         Exit codes:\n  \
         0  done\n  \
-        2  not known which board is meant\n  \
+        2  the flash number of the board is not known\n  \
         3  no answer\n  \
         4  another board is at this position, could take the number, or has taken it")]
     Repair(RepairArgs),
@@ -205,14 +214,16 @@ pub enum Command {
             ucom --json io all\n  \
             ucom io 1 --fresh\n  \
             ucom io all --template ucom-edges.toml\n\n\
-            A template starts a signal table with types, scales and units of all names: see `ucom help edges`.")]
+            A template is a first version of a signal table, with type, scale and unit of each name (see \
+            `ucom help edges`).")]
     Io(IoArgs),
     /// Show initial controller inputs, or set inputs by name
     #[command(after_help = "Examples:\n  \
             ucom ci 1\n  \
             ucom ci 1 set_position=1500\n  \
             ucom ci 1 set_position=1500 --for 3\n\n\
-            With --for the board runs under supervision for this time, and moves. For more, use `ucom run`.")]
+            With --for, the board runs under supervision for this time, and moves. `ucom run` has more \
+            options.")]
     Ci(CiArgs),
     /// Show the names of parameters, or set parameters by name
     #[command(after_help = "Examples:\n  \
@@ -221,9 +232,10 @@ pub enum Command {
             ucom par all --save head.yaml\n  \
             ucom par --apply head.yaml --dry-run\n  \
             ucom par 1-3 --apply head.yaml\n\n\
-            The protocol cannot read parameters back. Values that were just written are marked as assumed. \
-            Values that were written before are only remembered. `ucom help params` shows the format of \
-            parameter files.")]
+            The protocol cannot read parameters back. The command marks values that it has just written as \
+            assumed. The command also shows the value that this tool wrote last, with its \
+            date. `ucom help params` shows the format \
+            of parameter files.")]
     Par(ParArgs),
     /// Show live sensor outputs of running boards
     #[command(after_help = "The command only listens.\n\n\
@@ -239,23 +251,25 @@ pub enum Command {
             ucom run all --params head.yaml --active\n\n\
             The command accepts these lines on stdin: `ci 1 set_position=-500`, `par 1 kp=80`, `active on`, \
             `active off`, `stop`.\n\n\
-            Ctrl-C stops control, then applications, in reverse order. If no board remains in its control loop, \
-            the run ends after 3 s with exit code 5. With --on-lost report, the command waits for a lost board.")]
+            Ctrl-C stops control, then applications, in reverse order. If no board remains in its control \
+            loop, the run ends after 3 s with exit code 5. With --on-lost report, the run does not end while \
+            a board is lost.")]
     Run(RunArgs),
-    /// Own the bus, and serve it to many clients by HTTP
-    #[command(after_help = "Only one client at a time commands. Every client can stop the boards.\n\n\
+    /// Share the bus among many clients by HTTP
+    #[command(after_help = "Only one client at a time can move or change boards. Every client can stop the \
+        boards.\n\n\
         Examples:\n  \
         ucom serve --bus socketcan:can0\n  \
         ucom serve --sim --boards 3\n  \
         curl http://127.0.0.1:8781/api/boards\n  \
         curl -X POST http://127.0.0.1:8781/api/stop\n\n\
-        The commands of this program do not go through an agent. On the bus of an agent, they meet the agent as \
+        The other commands of `ucom` do not use the agent. On the bus of an agent, they report the agent as \
         a competing master.\n\n\
         Ctrl-C stops everything that the agent has started.\n\n\
         Exit codes:\n  \
         0  ended\n  \
         2  the address or a file cannot be used\n  \
-        3  the bus is gone")]
+        3  the bus was lost")]
     Serve(ServeArgs),
     /// Show a live view of boards, bus load and foreign frames
     #[command(after_help = "The command asks the boards once, and then only listens.\n\n\
@@ -264,8 +278,8 @@ pub enum Command {
         ucom --json monitor --count 5\n\n\
         Press s to stop the control loops of all boards, r to ask the boards again, and q to quit. Arrows, \
         PageUp, PageDown, Home and End scroll. The terminal needs 40 columns and 12 rows.\n\n\
-        If space is short, status bits are letters, and a dot is a bit that is not set. On wider terminals they \
-        are words. The letters are:\n  \
+        On a narrow terminal, the view shows status bits as letters, and a dot for a bit that is not set. \
+        Wider terminals show the names of the bits. The letters are:\n  \
         M MSTART, A ASTART, R MCARUN, X EXLRUN, I INIT, P PROG, o OPINIT, i IPINIT")]
     Monitor(MonitorArgs),
     /// Record the frames of the bus to a file
@@ -273,8 +287,8 @@ pub enum Command {
             ucom record bus.log\n  \
             ucom record bus.mcap --for 10\n  \
             ucom record - | ucom decode -\n\n\
-            The ending of the file selects the format: .log candump -L, .fzi FZI-CAN 1.2, .mcap MCAP. `-` \
-            writes a candump log to stdout.")]
+            The ending of the file name selects the format: .log for candump -L, .fzi for FZI-CAN 1.2, .mcap \
+            for MCAP. `-` writes a candump log to stdout.")]
     Record(RecordArgs),
     /// Send the frames of a recording with their original timing
     #[command(after_help = "Examples:\n  \
@@ -282,36 +296,38 @@ pub enum Command {
         ucom replay bus.log --intrusive\n\n\
         Without --intrusive the command skips frames that reset, number, program, start or move boards.")]
     Replay(ReplayArgs),
-    /// Send single frames as they are
+    /// Send single frames unchanged
     #[command(after_help = "Examples:\n  \
             ucom send 240#                     ask for all boards (PC_REPORT to all)\n  \
             ucom send 1C1#0202 201# --intrusive\n\n\
-            The command sends the frames in the order of the command line. Frames that reset, number, program, \
-            start or move boards need --intrusive. If one of the frames needs it and you do not give it, the command \
-            sends none of the frames, and ends with exit code 4. To see the answers of boards, run ucom decode --live in another terminal.")]
+            The command sends the frames in the order of the command line. Frames that reset, number, \
+            program, start or move boards need --intrusive. Without --intrusive, the command refuses a list \
+            with such a frame: it sends no frame, and ends with exit code \
+            4. To see the answers of boards, run `ucom \
+            decode --live` in another terminal.")]
     Send(SendArgs),
     /// Decode frames of a file, stdin or the live bus
     #[command(
         after_help = "Examples:\n  ucom decode bus.log\n  echo '141#2100011934126E38' | ucom decode -\n  ucom decode --live"
     )]
     Decode(DecodeArgs),
-    /// Measure how the boards read the protocol, and write a profile
+    /// Measure how boards interpret the protocol; write a profile
     #[command(
         after_help = "Examples:\n  ucom probe\n  ucom probe --init --out boards.toml\n  ucom probe --image firmware.hex"
     )]
     Probe(ProbeArgs),
-    /// Test that boards follow the protocol page; by default only ask
+    /// Test that boards follow the protocol
     #[command(after_help = "Examples:\n  \
             ucom conformance\n  \
             ucom conformance 1 --run\n  \
             ucom conformance 1 --flash-id 0x21 --program firmware.hex\n  \
             ucom --json conformance all --init --only D-T1,D-T4\n\n\
-            Without options the command sends only harmless requests, and leaves running applications alone. \
-            Each test is an acceptance test of the project. The test shows the frames that were sent, the \
-            expected result and the actual result.\n\n\
-            With --init, --run and --program the command restores the boards afterwards, also after Ctrl-C or \
-            an error. This includes numbers, ASTART and applications (with the parameters of a start). --run \
-            takes about 80 s per board.\n\n\
+            Without options, the command sends only requests that change nothing, and does not disturb \
+            running applications. Each test is an acceptance test of the project. A test shows the frames \
+            that it sent, the expected result and the actual result.\n\n\
+            With --init, --run and --program, the command restores the boards afterwards, also after Ctrl-C \
+            or an error. The command restores numbers, ASTART and applications (with the parameters of a \
+            start). --run takes about 80 s per board.\n\n\
             Exit codes:\n  \
             0  all tests passed or were skipped\n  \
             1  some tests failed, or a board is not restored\n  \
@@ -328,7 +344,7 @@ pub enum Command {
     )]
     Explain(ExplainArgs),
     /// Write a DBC file for other CAN tools
-    #[command(after_help = "The file has the names of the boards' inputs, outputs and parameters.\n\n\
+    #[command(after_help = "The file has the names of inputs, outputs and parameters of the boards.\n\n\
             Examples:\n  \
             ucom dbc --out chain.dbc\n  \
             ucom dbc 1-4 > chain.dbc\n  \
@@ -416,8 +432,9 @@ mod tests {
     /// docs/commands-ucom.md; `UPDATE_DOCS=1` writes it again.
     #[test]
     fn the_page_of_the_commands_is_made_from_them() {
-        let opening = "Made from the command line's own definition, as `ucom COMMAND --help` and the manual pages are. The variable in brackets sets an option \
-                       that is not typed. Messages of commands about faults: [troubles](troubles.md); what a word means: [codes](codes.md).";
+        let opening = "This page is generated from the definition of the command line, like `ucom COMMAND --help` and the manual pages. The \
+                       variable in brackets sets an option that you do not type. [Troubles](troubles.md) shows the messages of \
+                       commands about faults, and [codes](codes.md) explains each word.";
         test_kit::page::whole("commands-ucom.md", &cli_kit::reference::markdown::<Cli>(opening));
     }
 

@@ -22,7 +22,7 @@ pub struct SimArgs {
     pub flash_ids: Vec<u16>,
     /// Listen here for clients of the socketcand protocol.
     ///
-    /// With port 0 the simulator takes a free port
+    /// With port 0, the simulator selects a free port
     #[arg(long, env = "UCOM_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:29536")]
     pub listen: String,
     /// Simulate the boards of this TOML file.
@@ -48,7 +48,7 @@ pub struct InitArgs {
     pub inventory: PathBuf,
     /// Write a new inventory without comparing it to the old one.
     ///
-    /// Names and flash records are kept for boards with the same flash number
+    /// The command keeps the names and flash records of boards with the same flash number
     #[arg(long)]
     pub renew: bool,
     #[command(flatten)]
@@ -77,7 +77,7 @@ pub struct StatusArgs {
     pub clear: Option<ucom::Status>,
     /// Send one PC_SETSTATUS unchanged.
     ///
-    /// Mask and value are hexadecimal bytes. Value bits outside the mask are sent too
+    /// Mask and value are hexadecimal bytes. The command also sends value bits outside the mask
     #[arg(long, value_name = "MASK:VALUE", value_parser = raw_status, conflicts_with_all = ["set", "clear"])]
     pub raw: Option<(u8, u8)>,
     #[command(flatten)]
@@ -123,7 +123,7 @@ pub struct IoArgs {
     pub boards: Boards,
     /// Write a template of a signal table to this TOML file.
     ///
-    /// The template has all names. - is stdout
+    /// The template has all names. With -, the command writes to stdout
     #[arg(long, env = "UCOM_TEMPLATE", value_name = "FILE")]
     pub template: Option<PathBuf>,
     #[command(flatten)]
@@ -156,12 +156,12 @@ pub struct CiArgs {
     pub board: u8,
     /// Name or index of the signal, and its value.
     ///
-    /// `ucom io` shows the names. Case does not matter, and you can omit the unit of the name
+    /// `ucom io` shows the names. You can use upper or lower case, and omit the unit of the name
     #[arg(value_name = "NAME=VALUE")]
     pub values: Vec<Assignment>,
     /// Run the board under supervision for this time, s.
     ///
-    /// The outputs are active: the board moves
+    /// The outputs are enabled: the board moves
     #[arg(long = "for", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
     #[command(flatten)]
@@ -175,20 +175,22 @@ pub struct CiArgs {
 pub struct ParArgs {
     /// Board number, list, range, or all.
     ///
-    /// With --apply, all means the boards of the file; numbers select some of them
+    /// With --apply, all means all boards of the file, and numbers select some of these boards
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// Name or index of the signal, and its value.
     ///
-    /// `ucom io` shows the names. Case does not matter, and you can omit the unit of the name
+    /// `ucom io` shows the names. You can use upper or lower case, and omit the unit of the name
     #[arg(value_name = "NAME=VALUE", conflicts_with = "apply")]
     pub values: Vec<Assignment>,
-    /// Write a parameter file, YAML; - is stdout.
+    /// Write a parameter file, YAML; - writes to stdout.
     ///
-    /// The file has the values that were written last, and all other names as comments
+    /// The file has the values that this tool wrote last, and all other names as comments
     #[arg(long, env = "UCOM_SAVE", value_name = "FILE", conflicts_with = "apply")]
     pub save: Option<PathBuf>,
-    /// Check a parameter file against the boards, then write its parameters
+    /// Write the parameters of this parameter file.
+    ///
+    /// The command first checks the file against the boards
     #[arg(long, value_name = "FILE")]
     pub apply: Option<PathBuf>,
     /// Check everything with --apply, but write nothing
@@ -257,7 +259,7 @@ pub struct RunArgs {
     pub inventory: PathBuf,
     /// Set the action for a lost board.
     ///
-    /// Default: on_lost of the profile
+    /// Default: `on_lost` of the profile
     #[arg(long, value_enum, value_name = "POLICY")]
     pub on_lost: Option<OnLost>,
     /// Make the boards send the texts of their applications
@@ -322,9 +324,9 @@ pub struct ReplayArgs {
 /// Options of `ucom send`.
 #[derive(Args, Debug)]
 pub struct SendArgs {
-    /// Frames as candump writes them, ID#DATA.
+    /// Frames in the format of candump, ID#DATA.
     ///
-    /// For example 240#, 1C1#0202, 12345678#11, 123#R
+    /// Examples are 240#, 1C1#0202, 12345678#11 and 123#R
     #[arg(value_name = "FRAME", required = true)]
     pub frames: Vec<String>,
     /// Also send frames that change boards.
@@ -358,7 +360,7 @@ pub struct ProbeArgs {
     pub out: Option<PathBuf>,
     /// Reset and number the chain to measure more.
     ///
-    /// Some properties show only while boards are numbered
+    /// Some properties can be measured only during the numbering
     #[arg(long)]
     pub init: bool,
     /// Start a control loop to see which heartbeats count.
@@ -368,7 +370,7 @@ pub struct ProbeArgs {
     pub alive: bool,
     /// Find the checksum of Program IDs with this image.
     ///
-    /// The image must be the one on a board
+    /// A board must have this image in its flash
     #[arg(long, env = "UCOM_IMAGE", value_name = "FILE")]
     pub image: Option<PathBuf>,
     #[command(flatten)]
@@ -395,7 +397,7 @@ pub struct ConformanceArgs {
     pub run: bool,
     /// Add tests that program the named board with this image.
     ///
-    /// Name exactly one board
+    /// You must name exactly one board
     #[arg(long, value_name = "IMAGE")]
     pub program: Option<PathBuf>,
     /// Require this flash number of the board, with --program.
@@ -437,7 +439,7 @@ pub struct DbcArgs {
 /// Options of `ucom explain`.
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
-    /// Word as a screen shows it, or the number of an error.
+    /// Word as shown on the screen, or the number of an error.
     ///
     /// Without a word, the command lists all words
     pub word: Vec<String>,

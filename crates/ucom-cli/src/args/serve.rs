@@ -27,34 +27,34 @@ pub struct ServeArgs {
     pub listen: SocketAddr,
     /// Keep the tokens of the agent in this TOML file.
     ///
-    /// The agent creates the file if it does not exist. Default: openjtc/ucom-tokens.toml in $XDG_STATE_HOME or
+    /// The agent creates a missing file. Default: openjtc/ucom-tokens.toml in $XDG_STATE_HOME or
     /// ~/.local/state
     #[arg(long, env = "UCOM_TOKEN_FILE", value_name = "FILE")]
     pub token_file: Option<PathBuf>,
-    /// Accept this host name for the agent, besides its address.
+    /// Accept this host name in addition to the address.
     ///
-    /// Repeat the option, or use commas, for several names
+    /// Requests to the agent may then use this host name. For several names, repeat the option or use commas
     #[arg(long = "name", env = "UCOM_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
     /// Print the dashboard link with the operator's token.
     ///
-    /// The link with the token is printed only on a terminal. Without this option it is printed once, when the token is
-    /// made
+    /// The command prints this link only on a terminal. Without this option, it prints the link once, when it creates the
+    /// token
     #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// Append each command to this file.
     ///
-    /// The file shows the client, the command, the time and the result
+    /// A line of the file has the client, the command, the time and the result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
     /// Read the flash numbers from this inventory of `ucom init`.
     ///
-    /// Updates record there what they wrote
+    /// Each update records the written image in this file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Limit the size of the command log.
     ///
-    /// At half of this size, the log is renamed to FILE.1
+    /// At half of this size, the agent renames the log to FILE.1
     #[arg(long, env = "UCOM_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
     pub command_log_limit: u64,
     /// Use TLS with this certificate chain, PEM
@@ -62,7 +62,7 @@ pub struct ServeArgs {
     pub tls_cert: Option<PathBuf>,
     /// Use this private key of the certificate, PEM.
     ///
-    /// The file must not be readable by every user
+    /// Only the owner and the group may have access to the file
     #[arg(long, env = "UCOM_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
     pub tls_key: Option<PathBuf>,
     #[command(flatten)]

@@ -29,8 +29,8 @@ pub struct StatusObject {
     pub sent: u64,
     /// Number of frames that do not belong to this protocol.
     pub foreign_frames: u64,
-    /// `true` if this agent sends heartbeats. It sends them after a command of the lease holder, and while boards that it
-    /// has started are not stopped.
+    /// `true` if this agent sends heartbeats. The agent sends them after a command of the lease holder, and while boards
+    /// that the agent has started are not stopped.
     pub is_master: bool,
     /// `true` if another PC commands on this bus.
     pub competing_master: bool,

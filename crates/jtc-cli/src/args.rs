@@ -64,7 +64,7 @@ pub use variables::VARIABLES;
 pub struct Cli {
     /// Print JSON instead of text.
     ///
-    /// Commands that print a stream print one object per line
+    /// A stream has one object per line
     #[arg(long, global = true, env = "JTC_JSON", value_parser = on_off, help_heading = "Common")]
     pub json: bool,
     /// Set the serial port, before the command
@@ -235,7 +235,8 @@ pub enum Command {
             straight line. The command checks the limits of velocity, acceleration, jerk and torque before \
             it sends anything. The command does not check for obstacles.\n\n\
             The command runs and ends like `jtc traj run`. On a terminal, press space to pause and resume, s to \
-            stop, + and - to change the speed. Ctrl-C stops on the path. --margin works as in `jtc plan`.\n\n\
+            stop, + and - to change the speed. Ctrl-C stops the arm on its path. --margin works as in `jtc \
+            plan`.\n\n\
             Examples:\n  \
             jtc move --to home --arm my-arm.toml\n  \
             jtc move --to 0,0.5,-1,0,0.5,0\n  \

@@ -85,7 +85,7 @@ pub enum ChainEvent {
     },
     /// Loss of the bus.
     Lost {
-        /// Reason.
+        /// Reason of the loss.
         why: String,
     },
     /// Start of a job.

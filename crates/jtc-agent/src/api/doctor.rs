@@ -34,7 +34,7 @@ pub struct DoctorObject {
 pub struct FindingObject {
     /// `problem`, `warning` or `good`.
     pub severity: String,
-    /// Observation.
+    /// Text of the finding.
     pub what: String,
     /// Usual cause; empty if no cause is known.
     pub why: String,

@@ -30,7 +30,7 @@ pub enum ArmEvent {
     },
     /// Loss of the port.
     Lost {
-        /// Reason.
+        /// Reason of the loss.
         why: String,
     },
     /// Start of a job.

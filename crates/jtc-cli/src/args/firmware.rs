@@ -20,7 +20,7 @@ pub enum FirmwareCommand {
     )]
     List,
     /// Flash a Nucleo board through its ST-LINK drive, and verify
-    #[command(after_help = "Flashing resets the board: an arm that it holds falls.\n\n\
+    #[command(after_help = "Flashing resets the board: an arm that the board holds falls.\n\n\
             The command always asks the controller at the serial port of the drive's own USB device (known \
             on Linux), and also at --port. If a controller cannot be asked or reports torque, the command \
             ends with exit code 4. No option overrides this.\n\n\

@@ -11,7 +11,8 @@ pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of t
     speed of an approach is --speed percent of the limits, but at most 50 %. Without --speed, the approach \
     runs at 10 % of the limits, and at 25 % in a simulator.\n\n\
     On a terminal, press space to pause and resume, and s to stop. Press + and - to change the speed if the \
-    controller has extensions. Ctrl-C stops on the path, then ends. A second Ctrl-C ends at once.\n\n\
+    controller has extensions. Ctrl-C stops the arm on its path, then ends the command. A second Ctrl-C ends \
+    the command at once.\n\n\
     The command opens output files before anything moves, and writes a recording while the arm moves. If the \
     program is killed, the recording can lack the last 0.2 s. If the recording cannot be written before the \
     motion starts, nothing moves. If writing fails during the motion (full disk), the command reports this \

@@ -47,7 +47,7 @@ pub use variables::VARIABLES;
 pub struct Cli {
     /// Print JSON instead of text.
     ///
-    /// Commands that print a stream print one object per line
+    /// A stream has one object per line
     #[arg(long, global = true, env = "UCOM_JSON", value_parser = on_off, help_heading = "Common")]
     pub json: bool,
     #[command(flatten)]
@@ -171,8 +171,8 @@ pub enum Command {
             ucom update 3 program.hex --data data.hex\n  \
             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
             Image formats are raw binary, Intel HEX and Motorola S-record. The command recognises them by their \
-            content. If the records follow each other without gaps in one unit only, the command knows if \
-            their addresses count bytes or words. --addresses sets this unit. `prog.plan` of the profile \
+            content. The command detects the unit of the addresses (bytes or words) if the records follow \
+            each other without gaps in only one unit. --addresses sets this unit. `prog.plan` of the profile \
             decides if the command sends two files (see `ucom help profile`).\n\n\
             `all` means the boards that answer and the boards of the inventory. The command reports a \
             missing board.\n\n\
@@ -233,9 +233,8 @@ pub enum Command {
             ucom par --apply head.yaml --dry-run\n  \
             ucom par 1-3 --apply head.yaml\n\n\
             The protocol cannot read parameters back. The command marks values that it has just written as \
-            assumed. The command also shows the value that this tool wrote last, with its \
-            date. `ucom help params` shows the format \
-            of parameter files.")]
+            assumed. The command also shows the value that this tool wrote last, with its date. `ucom help \
+            params` shows the format of parameter files.")]
     Par(ParArgs),
     /// Show live sensor outputs of running boards
     #[command(after_help = "The command only listens.\n\n\
@@ -302,9 +301,8 @@ pub enum Command {
             ucom send 1C1#0202 201# --intrusive\n\n\
             The command sends the frames in the order of the command line. Frames that reset, number, \
             program, start or move boards need --intrusive. Without --intrusive, the command refuses a list \
-            with such a frame: it sends no frame, and ends with exit code \
-            4. To see the answers of boards, run `ucom \
-            decode --live` in another terminal.")]
+            with such a frame: it sends no frame, and ends with exit code 4. To see the answers of boards, \
+            run `ucom decode --live` in another terminal.")]
     Send(SendArgs),
     /// Decode frames of a file, stdin or the live bus
     #[command(

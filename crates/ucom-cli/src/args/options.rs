@@ -110,7 +110,7 @@ pub struct StopArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
-    /// Stop only control; the application stays started
+    /// Stop only control; the application continues to run
     #[arg(long)]
     pub control_only: bool,
 }
@@ -283,7 +283,7 @@ pub struct MonitorArgs {
     /// End after this number of views, one per second
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
-    /// Only listen: send no frames, not even PC_INFO
+    /// Listen only, and send no frames, not even PC_INFO
     #[arg(long, env = "UCOM_LISTEN_ONLY", value_parser = on_off)]
     pub listen_only: bool,
 }

@@ -21,7 +21,7 @@ pub struct ChainObject {
 pub struct FindingObject {
     /// Severity: `problem`, `warning` or `good`.
     pub severity: String,
-    /// Observation.
+    /// Text of the finding.
     pub what: String,
     /// Probable cause; empty if no cause is known.
     pub why: String,

@@ -98,13 +98,13 @@ impl Default for Profile {
 
 keys! {
     bitrate: u32 = 1_000_000, Number, "bitrate", "1000000", "10000 to 1000000", 10_000..=1_000_000,
-        "D-03: nominal bit rate, bit/s; 500000, 250000 and 125000 are usual, too.";
+        "D-03: nominal bit rate, bit/s; other usual rates are 500000, 250000 and 125000.";
     sample_point: u32 = 875, Number, "sample_point", "875", "500 to 950", 500..=950,
         "D-03: sample point, thousandths of the bit time.";
     endian: Endian = Endian::Little, Word, "endian", "little", "little or big", _,
         "D-10: byte order of 16-bit fields.";
     dlc_strict: bool = false, YesNo, "dlc.strict", "no", "yes or no", _,
-        "D-12: messages with surplus bytes are refused, too.";
+        "D-12: boards also refuse messages with surplus bytes.";
     addr_first: u32 = 1, Number, "addr.first", "1", "0 or 1", 0..=1,
         "D-04: number of the first board.";
     addr_broadcast: Broadcast = Broadcast::Zero, Word, "addr.broadcast", "0", "0, 31 or none", _,
@@ -114,7 +114,7 @@ keys! {
     shared_backoff: u32 = 8, Number, "shared.backoff", "8", "1 to 50", 1..=50,
         "D-05: longest random delay of a board's own MCA_ADMIN_DATA, ms.";
     report_mode: ReportMode = ReportMode::Flash7, Word, "report.mode", "flash7", "flash7, seq or all4", _,
-        "D-07: how boards answer PC_REPORT and PC_RESET.";
+        "D-07: form of the answers to PC_REPORT and PC_RESET.";
     report_window: u32 = 1000, Number, "report.window", "1000", "10 to 60000", 10..=60_000,
         "D-07: ms for which reports are collected after PC_RESET.";
     report_ask_window: u32 = 300, Number, "report.ask_window", "300", "10 to 60000", 10..=60_000,
@@ -128,7 +128,7 @@ keys! {
     string_gap: u32 = 100, Number, "string.gap", "100", "1 to 60000", 1..=60_000,
         "D-14: ms of silence that end a string.";
     string_quiet: u32 = 50, Number, "string.quiet", "50", "0 to 60000", 0..=60_000,
-        "D-14: ms without a surplus frame until a dump counts as complete.";
+        "D-14: ms without a further frame after which a dump is complete.";
     string_count_includes_header: bool = false, YesNo, "string.count_includes_header", "no", "yes or no", _,
         "D-13: the count in a string's header includes the header.";
     string_max: u32 = 512, Number, "string.max", "512", "8 to 512", 8..=512,
@@ -140,25 +140,25 @@ keys! {
     xreset_wait: u32 = 500, Number, "xreset.wait", "500", "0 to 60000", 0..=60_000,
         "D-46: ms from PC_XRESET to the first PC_INFO.";
     xreset_keeps_init: bool = true, YesNo, "xreset.keeps_init", "yes", "yes or no", _,
-        "D-23: number and outgoing pin survive PC_XRESET.";
+        "D-23: a board keeps its number and its outgoing pin after PC_XRESET.";
     start_timeout: u32 = 2000, Number, "start.timeout", "2000", "1 to 60000", 1..=60_000,
         "D-30: ms from PC_START to MCA_DSP_READY.";
     admin_timeout: u32 = 100, Number, "admin.timeout", "100", "1 to 60000", 1..=60_000,
         "D-37: ms until the answer to MCA_ADMIN_DATA.";
     debug_rate: u32 = 20, Number, "debug.rate", "20", "0 to 20", 0..=20,
-        "D-38: most debug texts of a board in any second.";
+        "D-38: largest number of debug texts of a board in any second.";
     error_rate: u32 = 10, Number, "error.rate", "10", "1 to 10", 1..=10,
-        "Most DSP_ERROR of one code and board in any second.";
+        "Largest number of DSP_ERROR with one code from a board in any second.";
     prog_endian: Endian = Endian::Little, Word, "prog.endian", "little", "little or big", _,
         "D-41: byte order of program words and the header block.";
     prog_plan: Plan = Plan::VerifyWrite, Word, "prog.plan", "verify-write",
-        "verify-write, exloader-app, pmem-xmem or raw", _, "D-40: what the two cycles carry.";
+        "verify-write, exloader-app, pmem-xmem or raw", _, "D-40: contents of the two cycles of an update.";
     prog_header: HeaderForm = HeaderForm::V1, Word, "prog.header", "v1", "v1 or none", _,
         "D-41: header block of each cycle.";
     prog_checksum: Checksum = Checksum::Crc16, Word, "prog.checksum", "crc16", "crc16, sum16, xor16 or none", _,
-        "D-44: how the Program ID is computed.";
+        "D-44: checksum that is the Program ID.";
     prog_date: DateForm = DateForm::Fat, Word, "prog.date", "fat", "fat, days2000, bcd or raw", _,
-        "D-45: how the flash date is written.";
+        "D-45: encoding of the flash date.";
     prog_frame_gap_us: u32 = 200, Number, "prog.frame_gap_us", "200", "0 to 100000", 0..=100_000,
         "D-46: microseconds between frames of a block.";
     prog_frame_timeout: u32 = 200, Number, "prog.frame_timeout", "200", "1 to 60000", 1..=60_000,
@@ -168,19 +168,19 @@ keys! {
     prog_erase_timeout: u32 = 10_000, Number, "prog.erase_timeout", "10000", "1 to 600000", 1..=600_000,
         "D-42: ms until DSP_READY after the header of cycle 2, and until DSP_PROGFINISHED.";
     prog_attempts: u32 = 3, Number, "prog.attempts", "3", "1 to 10", 1..=10,
-        "D-46: attempts of an update in all.";
+        "D-46: total number of attempts of an update.";
     so_period: u32 = 10, Number, "so.period", "10", "1 to 60000", 1..=60_000,
         "D-33: ms between transfers of the sensor outputs.";
     ci_period: u32 = 20, Number, "ci.period", "20", "1 to 60000", 1..=60_000,
         "D-34: ms between repetitions of the controller inputs.";
     ci_latch: CiLatch = CiLatch::Frame, Word, "ci.latch", "frame", "frame or last", _,
-        "D-34: when controller inputs take effect.";
+        "D-34: time at which controller inputs take effect.";
     pd_short_last: bool = false, YesNo, "pd.short_last", "no", "yes or no", _,
-        "D-15: the last package of a buffer has only the words that are meant.";
+        "D-15: the last package of a buffer has only the remaining words.";
     pd_signed: bool = true, YesNo, "pd.signed", "yes", "yes or no", _,
-        "D-11: process words without a type of their own are shown as signed.";
+        "D-11: process words without a type are shown as signed.";
     alive_mode: AliveMode = AliveMode::Broadcast, Word, "alive.mode", "broadcast",
-        "broadcast, unicast or both", _, "D-04: to whom the PC's heartbeat goes.";
+        "broadcast, unicast or both", _, "D-04: receivers of the heartbeat of the PC.";
     alive_pc_period: u32 = 500, Number, "alive.pc_period", "500", "1 to 60000", 1..=60_000,
         "ms between heartbeats of the PC.";
     alive_dsp_period: u32 = 1000, Number, "alive.dsp_period", "1000", "1 to 60000", 1..=60_000,
@@ -190,7 +190,7 @@ keys! {
     alive_dsp_lost: u32 = 3000, Number, "alive.dsp_lost", "3000", "2 to 600000", 2..=600_000,
         "D-51: ms without a heartbeat of a board until it counts as lost.";
     on_lost: OnLost = OnLost::StopAll, Word, "on_lost", "stop-all", "report, stop-board or stop-all", _,
-        "D-51: what the PC does then.";
+        "D-51: action of the PC for a lost board.";
     load_limit: u32 = 70, Number, "load.limit", "70", "1 to 100", 1..=100,
-        "Highest forecast bus load at which boards are started, percent.";
+        "Highest predicted bus load at which boards are started, percent.";
 }

@@ -176,7 +176,7 @@ keys! {
     ci_latch: CiLatch = CiLatch::Frame, Word, "ci.latch", "frame", "frame or last", _,
         "D-34: time at which controller inputs take effect.";
     pd_short_last: bool = false, YesNo, "pd.short_last", "no", "yes or no", _,
-        "D-15: the last package of a buffer has only the remaining words.";
+        "D-15: senders do not fill up the last package of a buffer with zeros.";
     pd_signed: bool = true, YesNo, "pd.signed", "yes", "yes or no", _,
         "D-11: process words without a type are shown as signed.";
     alive_mode: AliveMode = AliveMode::Broadcast, Word, "alive.mode", "broadcast",

@@ -92,7 +92,7 @@ pub struct LinkArgs {
     /// `jtc serve` creates the file if the file does not exist. Default: the token file of an agent on this computer
     #[arg(long, env = "JTC_TOKEN_FILE", value_name = "FILE", help_heading = "Link")]
     pub token_file: Option<std::path::PathBuf>,
-    /// Trust these CA certificates, PEM, for an agent at https://.
+    /// Trust these certificates, PEM, for an agent at https://.
     ///
     /// Default: the agent's own certificate if the agent runs on this computer, else the certificates of the system
     #[arg(long, env = "JTC_TLS_CA", value_name = "FILE", help_heading = "Link")]
@@ -259,7 +259,7 @@ pub enum Command {
     /// Move the arm by hand, and record its motion
     #[command(subcommand)]
     Teach(TeachCommand),
-    /// Read the recorded seconds before an error (flight recorder)
+    /// Read the flight recorder (the seconds before an error)
     #[command(subcommand)]
     Log(LogCommand),
     /// Clear errors of the controller and all nodes

@@ -132,7 +132,7 @@ fn capital(text: &str) -> String {
 pub fn profile_help() -> String {
     let mut text = String::from(
         "A profile defines how the boards on a bus interpret the parts of the protocol that its published description\n\
-         leaves open. It is a TOML file for `--profile FILE`. All keys are optional, and unknown keys are an error.\n\
+         leaves open. The format of `--profile FILE` is TOML. All keys are optional, and unknown keys are an error.\n\
          `a.b = 1` and `[a]` with `b = 1` have the same meaning. `ucom probe` measures the keys that real boards show.\n",
     );
     for key in KEYS {

@@ -21,7 +21,7 @@ pub struct MonitorArgs {
 pub struct ClearArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// Also clear the memory of errors that occurred
+    /// Also clear the record of errors that occurred
     #[arg(long)]
     pub occurred: bool,
 }

@@ -41,9 +41,9 @@ pub struct CheckArgs {
     /// has extensions
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Set the speed in percent of the file's own (1 to 200).
+    /// Set the speed in percent of the file's speed (1 to 200).
     ///
-    /// Default: 100. A speed of 50 takes twice the time on the same path
+    /// Default: 100. With 50, the motion takes twice the time on the same path
     #[arg(long, value_name = "PCT", allow_hyphen_values = true)]
     pub speed: Option<f64>,
     /// Read the numbers of the file as degrees.
@@ -193,7 +193,7 @@ pub struct RunArgs {
     pub approach: bool,
     /// Set the points per segment (1 to 1500).
     ///
-    /// A trajectory has at most 100 segments. By default segments are short enough for the CRC to be strong
+    /// A trajectory has at most 100 segments. By default, segments are short enough for a reliable CRC
     #[arg(long, value_name = "N")]
     pub points_per_segment: Option<usize>,
     /// Run the trajectory this number of times (1 to 100000).

@@ -24,12 +24,12 @@ pub struct PlanArgs {
     pub blend: f64,
     /// Keep the flange on straight lines.
     ///
-    /// This applies to each leg without a type of path in the file
+    /// This applies to each leg for which the file has no value of `leg`
     #[arg(long)]
     pub line: bool,
     /// Round corners of lines and arcs, m (0 to 0.5).
     ///
-    /// The number is the largest distance from the waypoint. With 0, the arm stops at the waypoint
+    /// This is the largest distance from the waypoint. With 0, the arm stops at the waypoint
     #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend_m: f64,
     /// Set the speed in percent of the allowed speed (1 to 100)

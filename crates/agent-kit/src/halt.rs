@@ -18,9 +18,9 @@ pub trait Halts {
 #[into_params(parameter_in = Query)]
 pub struct KnownHalt {
     /// Value of `last_halt` in the status that the client used. If a client, also this one, has requested another Stop
-    /// or Pause since then, the agent refuses this request, even if it was sent earlier. Without this parameter, the
-    /// agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the request
-    /// within 3 s after a Stop or Pause of another client.
+    /// or Pause since then, the agent refuses this request, however late the request arrives. Without this parameter,
+    /// the agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the
+    /// request within 3 s after a Stop or Pause of another client.
     pub asked_after: Option<u64>,
 }
 

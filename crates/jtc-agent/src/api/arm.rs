@@ -107,7 +107,7 @@ pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, P
 ///
 /// The agent sends settings, name, friction, gains and model, reads them back and compares them. If settings differ, the
 /// controller must be in Init or Error (`POST /api/disable`). In Init, the controller starts the position hold as soon as
-/// it has the complete arm. If the arm is stored, the controller stays in Init. If the arm has values that a controller
+/// it has the complete arm. With `store`, the controller stays in Init instead. If the arm has values that a controller
 /// would refuse, the agent refuses the arm and sends nothing.
 #[utoipa::path(
     put,

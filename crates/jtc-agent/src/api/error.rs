@@ -58,7 +58,8 @@ pub(super) struct Denials;
 impl IntoResponses for Denials {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
         denials(
-            "The request is refused: another client holds the lease, another request is running, or a check or the controller refuses it",
+            "The request is refused: another client holds the lease, another request is running, or a check or \
+             the controller refuses the request",
             "The port is lost, or the controller does not answer",
         )
     }

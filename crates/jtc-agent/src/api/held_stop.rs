@@ -44,8 +44,8 @@ impl From<HeldStop> for HeldStopObject {
 /// Reactions of a controller to disturbances.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct ReactionsObject {
-    /// Last held stop, also after its errors were cleared. Missing without a held stop since the start of the controller, or
-    /// since the errors that occurred were cleared.
+    /// Last held stop, also after its current errors were cleared. Missing if no held stop has occurred since the start of
+    /// the controller, or since the record of occurred errors was cleared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_held_stop: Option<HeldStopObject>,
     /// Joints that yield to a push or lower a load, counted from 1.

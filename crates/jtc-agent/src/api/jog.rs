@@ -34,9 +34,9 @@ pub struct JogRequest {
 #[into_params(parameter_in = Query)]
 pub(super) struct KnownToJog {
     /// Value of `last_halt` in the status that the client used. If a client, also this one, has requested another Stop
-    /// or Pause since then, the agent refuses this request, even if it was sent earlier. Without this parameter, the
-    /// agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the request
-    /// within 3 s after a Stop or Pause of another client.
+    /// or Pause since then, the agent refuses this request, however late the request arrives. Without this parameter,
+    /// the agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the
+    /// request within 3 s after a Stop or Pause of another client.
     asked_after: Option<u64>,
     /// Value of `at_ms` in the newest status that the user saw. If this request arrives more than 500 ms later, nothing
     /// moves. Zeros, which end the jog, are always accepted.

@@ -31,8 +31,8 @@ pub struct LeaseRequest {
     /// Policy for a motion after the lease has lapsed.
     #[serde(default)]
     pub policy: Policy,
-    /// `true`: if another client holds the lease, wait for the lease. Only one client can wait at a time. The waiting client
-    /// must repeat `PUT /api/lease`.
+    /// `true`: if another client holds the lease, ask that client for the lease, and wait. Only one client can wait at a
+    /// time. The waiting client must repeat `PUT /api/lease` within `lasts_s`.
     #[serde(default)]
     pub ask: bool,
 }

@@ -96,7 +96,7 @@ pub(super) async fn clear(
 
 /// Restarts nodes of the joint bus.
 ///
-/// The agent does not restart joints while the arm moves.
+/// The agent and the controller refuse to restart joints while the arm moves.
 #[utoipa::path(
     post,
     path = "/api/reset",

@@ -249,8 +249,8 @@ pub fn description() -> String {
     info(
         title = "openjtc agent",
         description = "Agent that owns the port of one controller. On the computer of the agent, reading needs no token. On other \
-                       computers, reading needs the token of a viewer or of an operator. Every client that can read can \
-                       also request a Stop or a Pause.",
+                       computers, reading needs the token of a viewer or of an operator. The same clients can request a \
+                       Stop or a Pause. Web pages of an allowed origin can only read.",
         license(name = "MIT OR Apache-2.0")
     ),
     components(schemas(Problem, EventObject, ArmEvent)),

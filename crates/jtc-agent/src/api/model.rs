@@ -135,7 +135,8 @@ impl From<&Identity> for ModelObject {
 
 /// Returns frames, limits and masses of the arm in use.
 ///
-/// The agent asks the controller if its arm may have changed, or if its last answer is older than 10 s.
+/// The agent reads them from the controller again when the arm may have changed, or when the last answer is older than
+/// 10 s.
 #[utoipa::path(
     get,
     path = "/api/arm/model",

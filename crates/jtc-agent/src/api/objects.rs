@@ -58,7 +58,7 @@ pub struct ControllerObject {
     pub errors: Vec<String>,
     /// Codes of these errors, in the same order, for `GET /api/explain/{code}`.
     pub error_codes: Vec<String>,
-    /// Causes of the errors, each with its joint and the errors of its drive. The most specific cause is the first.
+    /// Causes of the errors, the most specific first, each with its joint. The causes include the errors of the drives.
     /// `GET /api/explain/{code}` accepts these texts.
     pub causes: Vec<String>,
     /// Held stop with its cause (J-69). Missing without a held stop, and until the controller has reported the cause.

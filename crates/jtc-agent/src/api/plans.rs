@@ -43,7 +43,7 @@ pub struct PlanRequest {
     #[serde(default)]
     #[schema(minimum = 0)]
     pub blend_rad: f64,
-    /// `true`: the flange moves on a straight line on each leg without a type of path in the waypoints.
+    /// `true`: the flange moves on a straight line on each leg for which the waypoints do not specify the type of path.
     #[serde(default)]
     pub line: bool,
     /// Largest distance from a waypoint for rounding the corner between two lines or arcs, m. 0: the arm stops at the

@@ -45,7 +45,7 @@ pub struct RunRequest {
     #[serde(default = "one")]
     #[schema(minimum = 1, maximum = 1000000)]
     pub repeat: u32,
-    /// Policy for the motion if this client falls silent; missing: the policy of its lease.
+    /// Policy for the motion after the lease of this client has lapsed; missing: the policy of the lease.
     #[serde(default)]
     pub policy: Option<Policy>,
     /// `true`: accept a controller that cannot report its limits. Its built-in limits must be safe for this arm.
@@ -78,7 +78,7 @@ pub struct MoveRequest {
     #[serde(default = "margin")]
     #[schema(minimum = 0, maximum = 50)]
     pub margin_percent: f64,
-    /// Policy for the motion if this client falls silent; missing: the policy of its lease.
+    /// Policy for the motion after the lease of this client has lapsed; missing: the policy of the lease.
     #[serde(default)]
     pub policy: Option<Policy>,
     /// `true`: accept a controller that cannot report its limits. Its built-in limits must be safe for this arm.

@@ -26,7 +26,7 @@ pub struct LeaseRequest {
     /// Policy for running boards after the lease has lapsed.
     #[serde(default)]
     policy: Policy,
-    /// `true`: if another client holds the lease, wait for the lease.
+    /// `true`: if another client holds the lease, ask that client for the lease, and wait.
     #[serde(default)]
     ask: bool,
 }

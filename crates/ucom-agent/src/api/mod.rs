@@ -145,8 +145,8 @@ pub fn description() -> String {
     info(
         title = "openjtc UCoM agent",
         description = "Agent that owns one bus of UCoM boards. On the computer of the agent, reading needs no token. On other \
-                       computers, reading needs the token of a viewer or of an operator. Every client that can read can \
-                       also request a Stop.",
+                       computers, reading needs the token of a viewer or of an operator. The same clients can request a \
+                       Stop.",
         license(name = "MIT OR Apache-2.0")
     ),
     components(schemas(Problem, EventObject, ChainEvent)),
@@ -188,7 +188,8 @@ struct Denials;
 impl IntoResponses for Denials {
     fn responses() -> BTreeMap<String, RefOr<openapi::Response>> {
         denials(
-            "The request is refused: another client holds the lease, another request is running, a check or a board refuses it, or a board does not answer",
+            "The request is refused: another client holds the lease, another request is running, a check or a \
+             board refuses the request, or a board does not answer",
             "The bus is lost",
         )
     }

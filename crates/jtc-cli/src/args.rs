@@ -137,7 +137,7 @@ pub enum Command {
         with exit code 5.\n\n\
         The simulator accepts these events as lines on stdin:\n  \
         push 3 12 0.5    push joint 3 (counted from 1) with 12 N·m for 0.5 s\n  \
-        hand lead.csv    in teaching, lead the arm by a simulated hand along a trajectory file")]
+        hand lead.csv    in Teaching, a simulated hand leads the arm along a trajectory file")]
     Sim(SimArgs),
     /// Share the port of a controller among many clients
     #[command(
@@ -217,7 +217,7 @@ pub enum Command {
             straight lines and arcs. --blend-m rounds the corners between lines and arcs.\n\n\
             The motion uses at most 98 % of the limits of velocity and acceleration. By the arm model, the \
             torque of each joint stays below its limit minus --margin. The jerk limit lets the acceleration \
-            rise from 0 to its limit in 100 ms. The command checks the planned trajectory like `jtc traj \
+            rise from 0 to its limit in 100 ms. The planned trajectory has passed the check of `jtc traj \
             check`.\n\n\
             The margin is for masses and friction that the model does not know. If gravity and friction \
             leave less torque than the margin, the motion uses a quarter of the remaining torque. A note \
@@ -276,7 +276,7 @@ pub enum Command {
     /// Switch the vacuum pump of the gripper on or off
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
     Gripper(GripperArgs),
-    /// Switch off the torque of an arm at rest
+    /// Switch off the torque at rest; an arm without brakes falls
     #[command(
         after_help = "The controller returns to Init, and you must send the parameters again. An arm without \
             holding brakes falls: support it first. On a terminal, the command asks before it acts. --yes \
@@ -297,8 +297,8 @@ pub enum Command {
         after_help = "On a terminal, the keys 1 to 6 select a joint. Hold the left or right arrow to move it. The up and \
             down arrows change the rate, and q quits.\n\n\
             The arm begins to stop 0.2 s after the last key press, or 0.2 s after the last message of this \
-            command. The stop takes about 0.5 s. Joints stop before the ends of their ranges. You can jog \
-            only in HoldPos, and not while a motion is paused.\n\n\
+            command. The stop takes at most 0.52 s if the torque suffices. Joints stop before the ends of \
+            their ranges. You can jog only in HoldPos, and not while a motion is paused.\n\n\
             Examples:\n  \
             jtc jog\n  \
             jtc jog 3 0.1                  joint 3 at 0.1 rad/s until Ctrl-C\n  \

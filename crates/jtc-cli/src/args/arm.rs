@@ -62,8 +62,8 @@ pub enum ArmCommand {
             and compares them with the file.\n\n\
             Settings can change only while the controller is in Init or Error. `jtc disable` switches off \
             the torque.\n\n\
-            With --store, the controller keeps the arm after a loss of power, and is then in Init. Run \
-            `jtc params use-defaults` or `jtc recover --defaults` to use the stored arm.\n\n\
+            With --store, the controller keeps the arm after a loss of power. After storing, the controller \
+            is in Init. Run `jtc params use-defaults` or `jtc recover --defaults` to use the stored arm.\n\n\
             A controller without extensions accepts only friction, gains and model. If its own limits, \
             gravity or rotor inertia differ from the file, the command sends nothing unless you use \
             --accept-device-limits.\n\n\

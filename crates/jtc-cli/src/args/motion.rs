@@ -65,8 +65,8 @@ impl CheckArgs {
 pub enum TrajCommand {
     /// Check the limits of a trajectory; nothing is sent
     #[command(
-        after_help = "The check covers the limits at and between points, and the torques by the arm model. The \
-            torque margin is the smallest share of a torque limit that the motion does not use. A margin \
+        after_help = "The check covers the limits at and between points, and the torques by the arm model. \
+            The torque margin is the smallest share of a torque limit that the motion does not use. A margin \
             below 10 % gives a warning.\n\n\
             Examples:\n  \
             jtc traj check motion.csv\n  \

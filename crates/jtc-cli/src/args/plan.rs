@@ -100,7 +100,7 @@ pub struct MoveArgs {
     pub line: bool,
     /// Read positions, or roll, pitch and yaw, as degrees.
     ///
-    /// This option does not apply to named poses
+    /// The command refuses this option for a named pose, because its unit is known
     #[arg(long)]
     pub deg: bool,
     /// Set the speed in percent of the allowed speed (1 to 100).

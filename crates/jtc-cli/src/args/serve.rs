@@ -37,8 +37,8 @@ pub struct ServeArgs {
         long = "allow-origin",
         help = "Allow web pages of this origin read-only access",
         long_help = "Allow web pages of this origin read-only access.\n\n\
-            Examples are https://app.foxglove.dev, and file:// for desktop applications. For several origins, repeat \
-            the option or use commas",
+            Examples are https://app.foxglove.dev, and file:// for desktop applications. For several origins, \
+            repeat the option or use commas",
         env = "JTC_ALLOW_ORIGINS",
         value_name = "ORIGIN",
         value_delimiter = ',',

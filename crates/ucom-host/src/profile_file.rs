@@ -131,9 +131,10 @@ fn capital(text: &str) -> String {
 /// Returns the text of `ucom help profile`: every key with default, range, rule and meaning.
 pub fn profile_help() -> String {
     let mut text = String::from(
-        "A profile defines how the boards on a bus interpret the parts of the protocol that its published description\n\
-         leaves open. The format of `--profile FILE` is TOML. All keys are optional, and unknown keys are an error.\n\
-         `a.b = 1` and `[a]` with `b = 1` have the same meaning. `ucom probe` measures the keys that real boards show.\n",
+        "A profile defines how the boards on a bus interpret the parts of the protocol that its published\n\
+         description leaves open. The format of `--profile FILE` is TOML. All keys are optional, and unknown\n\
+         keys are an error. `a.b = 1` and `[a]` with `b = 1` have the same meaning. `ucom probe` measures the\n\
+         keys that real boards can show.\n",
     );
     for key in KEYS {
         let _ = write!(text, "\n{} = {}\n    {} {}.\n", key.name, key.default, key.doc, capital(key.range));

@@ -156,7 +156,7 @@ keys! {
     prog_header: HeaderForm = HeaderForm::V1, Word, "prog.header", "v1", "v1 or none", _,
         "D-41: header block of each cycle.";
     prog_checksum: Checksum = Checksum::Crc16, Word, "prog.checksum", "crc16", "crc16, sum16, xor16 or none", _,
-        "D-44: checksum that is the Program ID.";
+        "D-44: checksum algorithm for the Program ID.";
     prog_date: DateForm = DateForm::Fat, Word, "prog.date", "fat", "fat, days2000, bcd or raw", _,
         "D-45: encoding of the flash date.";
     prog_frame_gap_us: u32 = 200, Number, "prog.frame_gap_us", "200", "0 to 100000", 0..=100_000,

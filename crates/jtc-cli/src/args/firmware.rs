@@ -22,8 +22,8 @@ pub enum FirmwareCommand {
     /// Flash a Nucleo board through its ST-LINK drive, and verify
     #[command(after_help = "Flashing resets the board: an arm that the board holds falls.\n\n\
             The command always asks the controller at the serial port of the drive's own USB device (known \
-            on Linux), and also at --port. If one of these ports cannot be used, or if a controller reports \
-            torque, the command ends with exit code 4. No option overrides this.\n\n\
+            on Linux), and also at --port. The command ends with exit code 4 if the board's own port cannot \
+            be used, if --port is in use, or if a controller reports torque. No option overrides this.\n\n\
             The command flashes without a question only under three conditions. The controller at the \
             board's own port reports no torque, every joint answers this controller, and the gripper is off. \
             Otherwise the command asks on a terminal. --yes answers this question.\n\n\

@@ -281,7 +281,8 @@ pub struct RunFiles {
 #[derive(Debug, Subcommand)]
 pub enum TeachCommand {
     /// Start teaching, to move the arm by hand
-    #[command(after_help = "During teaching, the controller only compensates gravity.\n\n\
+    #[command(after_help = "During teaching, the controller compensates gravity and part of the friction, \
+        and damps the motion. The controller does not hold a position against the hand.\n\n\
         Examples:\n  \
         jtc teach on")]
     On(LinkArgs),

@@ -254,7 +254,7 @@ async def check_channels(arm):
             await ws.send(wrong)
             while len(viewer.warnings) == before:
                 await viewer.take()
-        assert await viewer.call(77, 5) == "there is no service 77"
+        assert await viewer.call(77, 5) == "service 77 does not exist"
         print(f"channels: {', '.join(topics)}; {count} messages of joints in 5 s, as /api/status has them")
 
 
@@ -354,7 +354,7 @@ async def check_origins(arm, tokens, log):
         await viewer.subscribe("/joint_states")
         await viewer.until("/joint_states")
         assert viewer.info["capabilities"] == [] and not viewer.services
-        assert await viewer.call(1, 1) == "pages of this origin may only look"
+        assert await viewer.call(1, 1) == "pages of this origin have read-only access"
     text = log.read_text()
     assert "refused" in text and not any(token in text for token in tokens.values())
     print("origins: an allowed one looks, and does nothing else; no token in the log")

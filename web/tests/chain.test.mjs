@@ -409,7 +409,7 @@ on('the lease is asked of who has it, and let go', { boards: 1 }, async ({ agent
   const page = await look();
   await page.getByText('Anna commands this chain: one client at a time.').first().waitFor();
   await page.getByRole('button', { name: 'Start', exact: true }).click();
-  await page.getByRole('alert').getByText(/one client commands at a time/).waitFor();
+  await page.getByRole('alert').getByText(/only one client can hold it at a time/).waitFor();
   await page.getByRole('alert').getByRole('button', { name: 'Ask for it' }).click();
   await page.getByRole('button', { name: 'Asked Anna' }).waitFor();
   await until('Anna lets it go', async () => (await agent.ask('DELETE', '/api/lease', undefined, key)).status < 300);

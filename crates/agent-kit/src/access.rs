@@ -37,22 +37,22 @@ const MINUTE: Duration = Duration::from_secs(60);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// Request for a name that this agent does not have.
-    #[error("this agent is not {0}: it is asked for by its address, or by a name given with --name")]
+    #[error("host {0} does not belong to this agent: expected its address, or a name set with --name")]
     Host(String),
     /// Request of a page of another site.
-    #[error("a page of {0} may not use this agent")]
+    #[error("pages of {0} have no access to this agent")]
     Origin(String),
     /// Token that does not belong to this agent.
     #[error("the token is not valid for this agent")]
     WrongToken,
     /// Request without a token.
-    #[error("a token is needed: `Authorization: Bearer …`")]
+    #[error("token missing: expected the header `Authorization: Bearer …`")]
     NoToken,
     /// Operator's token in an address; it is refused because addresses are stored in histories and logs.
-    #[error("the operator's token may not stand in an address")]
+    #[error("the operator's token is not accepted in an address (URL)")]
     InAddress,
     /// Too many wrong tokens from this address.
-    #[error("too many wrong tokens came from this address")]
+    #[error("too many invalid tokens were sent from this address")]
     TooManyWrong,
 }
 
@@ -99,7 +99,7 @@ pub fn origin(text: &str) -> Result<String, String> {
         Some((scheme, host)) if !scheme.is_empty() && !host.is_empty() && !host.contains(['/', '*', ' ']) => {
             Ok(format!("{scheme}://{host}"))
         }
-        _ => Err("an origin is a scheme and a host, as https://app.foxglove.dev; or file://".to_owned()),
+        _ => Err("not a valid origin: expected SCHEME://HOST or file://".to_owned()),
     }
 }
 

@@ -104,8 +104,8 @@ impl Events {
     ) -> Result<Json<EventsObject<Entry<E>>>, Problem> {
         let EventsRequest { after, job, wait_s } = request;
         if !(0.0..=WAIT_MAX_S).contains(&wait_s) {
-            let message = format!("wait_s is {wait_s}: 0 to {WAIT_MAX_S} s are possible");
-            let next = "ask again from `last` on to wait longer";
+            let message = format!("wait_s is out of range: {wait_s}, expected 0 to {WAIT_MAX_S} s");
+            let next = "to wait longer, send the request again with `after` set to `last` of the answer";
             return Err(Problem::new("request", message, next).unreadable());
         }
         let place = self.waiting.try_acquire();

@@ -124,7 +124,7 @@ impl Caller {
             Role::Operator => Ok(()),
             Role::Viewer => Err(Problem::new(
                 "denied",
-                "this client was let in to look and to stop, not to command",
+                "this client can only read and stop: commands need the operator's token",
                 "use the operator's token",
             )
             .forbidden()),
@@ -260,12 +260,14 @@ impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
         let (status, next) = match &self {
             Self::Host(_) => (StatusCode::FORBIDDEN, "use the address that the agent printed"),
-            Self::Origin(_) => (StatusCode::FORBIDDEN, "open the agent's own page"),
-            Self::InAddress => {
-                (StatusCode::FORBIDDEN, "use the viewer's token there, or send this one in Authorization")
-            }
-            Self::WrongToken => (StatusCode::UNAUTHORIZED, "take the token from the agent's token file"),
-            Self::NoToken => (StatusCode::UNAUTHORIZED, "take a token from the agent's token file"),
+            Self::Origin(_) => (StatusCode::FORBIDDEN, "open the page at the agent's own address"),
+            Self::InAddress => (
+                StatusCode::FORBIDDEN,
+                "use the viewer's token in the address, or send the operator's token in the header \
+                 Authorization",
+            ),
+            Self::WrongToken => (StatusCode::UNAUTHORIZED, "send the token from the agent's token file"),
+            Self::NoToken => (StatusCode::UNAUTHORIZED, "send a token from the agent's token file"),
             Self::TooManyWrong => (StatusCode::TOO_MANY_REQUESTS, "wait a minute"),
         };
         (status, Json(Problem::new("not-let-in", self.to_string(), next))).into_response()

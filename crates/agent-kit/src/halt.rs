@@ -39,9 +39,10 @@ impl KnownHalt {
         match self.asked_after {
             Some(known) if known > last => {
                 let message = format!(
-                    "asked_after {known}: this agent has counted {last} halts; it may have been started again"
+                    "asked_after {known} is out of range: this agent has counted {last} Stops and Pauses; it \
+                     may have been restarted"
                 );
-                Err(Problem::new("request", message, "GET /api/status has last_halt")
+                Err(Problem::new("request", message, "read last_halt with GET /api/status")
                     .with(Facts::beyond(known as f64, last as f64))
                     .unreadable())
             }

@@ -34,9 +34,13 @@ pub fn lasts(lasts_s: f64) -> Result<Duration, Problem> {
         return Ok(Duration::from_secs_f64(lasts_s));
     }
     let (least, most) = LASTS_S.into_inner();
-    let message = format!("lasts_s is {lasts_s}: {least} to {most} s are possible");
-    Err(Problem::new("lease", message, "choose how long it may last without a request")
-        .kind(ErrorKind::Usage))
+    let message = format!("lasts_s is out of range: {lasts_s}, expected {least} to {most} s");
+    Err(Problem::new(
+        "lease",
+        message,
+        "set lasts_s to the time after which the lease lapses without a request",
+    )
+    .kind(ErrorKind::Usage))
 }
 
 /// Key of a lease, for the description of a request.
@@ -93,7 +97,7 @@ pub struct Lease {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
     /// Another client holds the lease.
-    #[error("{holder} has commanded for {age_s} s: one client commands at a time")]
+    #[error("{holder} has held the lease for {age_s} s: only one client can hold it at a time")]
     Held {
         /// Name of the holder.
         holder: String,
@@ -101,7 +105,7 @@ pub enum Denied {
         age_s: u64,
     },
     /// Another client already waits for the lease.
-    #[error("{by} has asked for the lease of {holder} before, and waits for it: one waits at a time")]
+    #[error("{by} already waits for the lease of {holder}: only one client can wait for it")]
     Awaited {
         /// Name of the holder.
         holder: String,
@@ -109,13 +113,13 @@ pub enum Denied {
         by: String,
     },
     /// The client sends no key.
-    #[error("commands need a lease")]
+    #[error("this request needs a lease")]
     NoKey,
     /// The key belongs to no lease.
-    #[error("this key belongs to no lease, or to a lease that lapsed long ago")]
+    #[error("the lease key is unknown, or its lease lapsed long ago")]
     Unknown,
     /// Too many clients are registered.
-    #[error("too many clients have come for the lease")]
+    #[error("too many clients have requested a lease")]
     Full,
 }
 
@@ -126,12 +130,14 @@ impl From<Denied> for Problem {
             Denied::Held { .. } => Self::new(
                 "denied",
                 text,
-                "GET /api/status shows who commands; ask for the lease with POST /api/lease and ask: true",
+                "find the lease holder with GET /api/status, and request the lease with POST /api/lease and \
+                 ask: true",
             ),
             Denied::Awaited { .. } => Self::new(
                 "denied",
                 text,
-                "ask again when that one has had the lease: GET /api/status shows it",
+                "request the lease again after that client has had it: GET /api/status shows the lease \
+                 holder",
             ),
             Denied::NoKey | Denied::Unknown => Self::new(
                 "no-lease",
@@ -142,7 +148,7 @@ impl From<Denied> for Problem {
             Denied::Full => Self::new(
                 "full",
                 text,
-                "let leases go that are not needed any more with DELETE /api/lease; they are forgotten after a minute",
+                "release unused leases with DELETE /api/lease; the agent removes them after a minute",
             ),
         }
     }

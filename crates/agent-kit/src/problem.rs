@@ -40,7 +40,7 @@ impl Problem {
 
     /// Returns a problem for an object with this number that does not exist.
     pub fn nothing(what: &str, number: impl std::fmt::Display, list: &str) -> Self {
-        let next = format!("GET {list} lists what there is");
+        let next = format!("list the existing entries with GET {list}");
         let problem = Self::new("not-found", format!("there is no {what} {number}"), next);
         Self { status: StatusCode::NOT_FOUND, ..problem }
     }

@@ -140,8 +140,8 @@ async fn serve_connection(
 
 /// Returns the answer when the remaining places are reserved for Stop and Pause.
 fn full() -> Response {
-    let next = "ask again in a second; Stop and Pause are taken meanwhile";
-    Problem::new("full", "all connections of this agent are taken", next)
+    let next = "send the request again after 1 s; the agent still accepts Stop and Pause";
+    Problem::new("full", "all connections of this agent are in use", next)
         .kind(ErrorKind::NoLink)
         .into_response()
 }

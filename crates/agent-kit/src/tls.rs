@@ -27,7 +27,7 @@ pub enum TlsError {
         mode: u32,
     },
     /// Certificate and private key that do not match.
-    #[error("certificate and private key: {0}")]
+    #[error("certificate and private key do not work together: {0}")]
     Pair(rustls::Error),
 }
 
@@ -36,8 +36,7 @@ impl host_kit::Diagnose for TlsError {
         let next = match self {
             Self::Open { path, .. } => format!("`chmod 600 {}`", path.display()),
             Self::File { .. } | Self::Pair(_) => {
-                "name a certificate chain with --tls-cert and its private key with --tls-key, both as PEM"
-                    .into()
+                "pass a PEM certificate chain with --tls-cert and its PEM private key with --tls-key".into()
             }
         };
         host_kit::Diagnosis::new(host_kit::ErrorKind::Usage, "tls", next)
@@ -58,7 +57,7 @@ pub fn load(certificate: &Path, key: &Path) -> Result<Arc<ServerConfig>, TlsErro
     let chain = CertificateDer::pem_file_iter(certificate).map_err(wrong(certificate))?;
     let chain: Vec<_> = chain.collect::<Result<_, _>>().map_err(wrong(certificate))?;
     if chain.is_empty() {
-        let what = "there is no certificate in it".to_owned();
+        let what = "the file contains no certificate".to_owned();
         return Err(TlsError::File { path: certificate.to_owned(), what });
     }
     let private = PrivateKeyDer::from_pem_file(key).map_err(wrong(key))?;

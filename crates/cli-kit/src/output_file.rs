@@ -35,9 +35,14 @@ pub enum OutputError {
 impl fmt::Display for OutputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Exists { path } => write!(f, "{} is there already", path.display()),
+            Self::Exists { path } => write!(f, "{} already exists", path.display()),
             Self::SameFile { path, other } => {
-                write!(f, "{} is {}, which this command uses itself", path.display(), other.display())
+                write!(
+                    f,
+                    "{} is the same file as {}, which this command already uses",
+                    path.display(),
+                    other.display()
+                )
             }
             Self::Io { path, source } => write!(f, "{}: {source}", path.display()),
         }
@@ -49,13 +54,15 @@ impl std::error::Error for OutputError {}
 impl Diagnose for OutputError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::Exists { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "exists", "name another file; --overwrite writes over it")
-            }
+            Self::Exists { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "exists",
+                "choose another file; --overwrite writes over it",
+            ),
             Self::SameFile { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "same-file",
-                "name another file; --overwrite does not cover this",
+                "choose another file; --overwrite does not replace this one",
             ),
             Self::Io { source, .. } => source.diagnosis(),
         }
@@ -209,7 +216,7 @@ mod tests {
             |result: Result<OutputFile, OutputError>| result.err().map(|e| (exit::of(e.kind()), e.code()));
         // Commands without a port or bus send no frames, so the message does not say that nothing was sent.
         let there = OutputFile::open(&old, false, &[]).err().unwrap();
-        assert!(there.to_string().ends_with("is there already"), "{there}");
+        assert!(there.to_string().ends_with("already exists"), "{there}");
         assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists")));
         assert_eq!(code(OutputFile::open(&input, true, &[&input])), Some((4, "same-file")));
         let around = dir.path().join(".").join("input");

@@ -20,13 +20,17 @@ pub fn size(text: &str, least: u64) -> Result<u64, String> {
         "gib" => 1024_f64.powi(3),
         "tib" => 1024_f64.powi(4),
         unit => {
-            return Err(format!("{unit:?} is no unit of a size: B, kB, MB, GB, TB, KiB, MiB, GiB or TiB"));
+            return Err(format!(
+                "{unit:?} is not a valid unit of size: expected B, kB, MB, GB, TB, KiB, MiB, GiB or TiB"
+            ));
         }
     };
-    let number: f64 = number.parse().map_err(|_| "a size is a number and its unit, as 500MB".to_owned())?;
+    let number: f64 = number
+        .parse()
+        .map_err(|_| "not a valid size: expected a number and a unit, for example 500MB".to_owned())?;
     let bytes = (number * factor) as u64;
     if bytes < least {
-        return Err(format!("{bytes} B is too small: {} MB at least", least as f64 / 1e6));
+        return Err(format!("size {bytes} B is too small: expected at least {} MB", least as f64 / 1e6));
     }
     Ok(bytes)
 }
@@ -52,6 +56,6 @@ mod tests {
             assert!(size(text, LEAST).is_err(), "{text}");
         }
         assert_eq!(size("9MB", 9_000_000), Ok(9_000_000));
-        assert_eq!(size("9MB", LEAST), Err("9000000 B is too small: 10 MB at least".into()));
+        assert_eq!(size("9MB", LEAST), Err("size 9000000 B is too small: expected at least 10 MB".into()));
     }
 }

@@ -228,16 +228,18 @@ impl Unread {
     fn note(&self, chosen: &Chosen<'_>) -> String {
         let Self { variable, value, .. } = self;
         let (program, typed, options) = (chosen.program, chosen.typed(), self.options.join(" or "));
-        format!("{program}: {variable}={value} is ignored: {typed} does not read it; type {options}")
+        format!(
+            "{program}: {variable}={value} is ignored: {typed} does not read this variable; use {options}"
+        )
     }
 
     fn refusal(&self, chosen: &Chosen<'_>) -> Failure {
         let Self { variable, value, .. } = self;
         Failure::usage(format!(
-            "{variable}={value} is set, and {} does not read it any more; nothing was sent",
+            "{variable}={value} is set, but {} no longer reads this variable; nothing was sent",
             chosen.typed()
         ))
-        .next(format!("type {}, or unset {variable}", self.options.join(" or ")))
+        .next(format!("use {}, or unset {variable}", self.options.join(" or ")))
     }
 }
 

@@ -47,7 +47,7 @@ pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
         return false;
     }
     let text = format!(
-        "{keys}: this view needs {} columns and {} rows, the terminal has {} and {}.",
+        "{keys}: this view needs {} columns and {} rows, but the terminal has {} and {}.",
         LEAST.0, LEAST.1, area.width, area.height
     );
     let lines: Vec<Line<'static>> = wrapped(&text, area.width).into_iter().map(Line::from).collect();
@@ -105,7 +105,7 @@ impl Trouble {
         }
         let rest: Vec<Line<'static>> = blocks[taken..].iter().flatten().cloned().collect();
         if taken < blocks.len() {
-            head.push(red(format!("and {} more, below", blocks.len() - taken)));
+            head.push(red(format!("{} more below", blocks.len() - taken)));
         }
         head.extend(foot);
         (head, rest)
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(text(&head), [&all[..], &["next: jtc recover"]].concat());
         assert!(rest.is_empty());
         let (head, rest) = trouble.lines(20, 5);
-        assert_eq!(text(&head), [&all[..2], &["and 3 more, below", "next: jtc recover"]].concat());
+        assert_eq!(text(&head), [&all[..2], &["3 more below", "next: jtc recover"]].concat());
         assert_eq!(text(&rest), all[2..]);
         // The first cause is complete even without any space.
         assert_eq!(text(&trouble.lines(20, 0).0)[..2], all[..2]);

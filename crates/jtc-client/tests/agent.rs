@@ -50,7 +50,7 @@ fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
     let outcome = anna.follow(|_| Flow::Continue).expect("it comes to an end");
     assert!(matches!(outcome, Outcome::Stopped(status) if status.trajectory == TrajectoryState::Stop));
     let refused = passer_by.teach(true).expect_err("a viewer");
-    assert!(refused.to_string().contains("to look and to stop"), "{refused}");
+    assert!(refused.to_string().contains("can only read and stop"), "{refused}");
 
     // When anna has disconnected, bob gets the lease at once.
     drop(anna);

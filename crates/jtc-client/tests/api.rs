@@ -329,7 +329,7 @@ fn a_program_that_is_begun_again_and_again_keeps_nobody_out() {
             assert!(
                 grant["message"]
                     .as_str()
-                    .is_some_and(|m| m.contains("again has asked for the lease of anna"))
+                    .is_some_and(|m| m.contains("again already waits for the lease of anna"))
             );
         }
     }

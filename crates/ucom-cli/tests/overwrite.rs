@@ -19,13 +19,13 @@ fn writing_over_a_file_never_resets_a_running_chain() {
         let probe =
             |more: &[&str]| sim.ucom(&[&["probe", option, "--out", &file], more].concat()).ends(4).err;
         let there = probe(&[]);
-        assert!(there.contains("is there already") && there.contains("--overwrite"), "{option}: {there}");
+        assert!(there.contains("already exists") && there.contains("--overwrite"), "{option}: {there}");
         assert!(!there.contains("--force"), "{option}: {there}");
         let runs = probe(&["--overwrite"]);
         assert!(runs.contains("running its control loop"), "{option}: {runs}");
         assert!(!runs.contains("--overwrite"), "{option}: {runs}");
         let forced = probe(&["--force"]);
-        assert!(forced.contains("is there already") && !forced.contains("--force"), "{option}: {forced}");
+        assert!(forced.contains("already exists") && !forced.contains("--force"), "{option}: {forced}");
     }
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
     peer.wait("381#");
@@ -50,7 +50,7 @@ fn force_writes_over_no_file() {
     ] {
         for more in [&[][..], &["--force"]] {
             let refused = sim.ucom(&[words, more].concat()).ends(4).err;
-            assert!(refused.contains("is there already; nothing was sent"), "{words:?}: {refused}");
+            assert!(refused.contains("already exists; nothing was sent"), "{words:?}: {refused}");
             let hint = refused.lines().last().unwrap();
             assert!(hint.contains("--overwrite writes over it"), "{words:?}: {refused}");
             assert!(!hint.contains("--force"), "{words:?}: {refused}");

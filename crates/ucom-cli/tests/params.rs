@@ -98,7 +98,7 @@ fn files_are_not_written_over() {
     let file = sim.file("mine", b"mine");
     let mut peer = sim.peer();
     for words in [&["par", "1", "kp=3", "--save", &file][..], &["io", "1", "--template", &file]] {
-        assert!(sim.ucom(words).ends(4).err.contains("is there already"), "{words:?}");
+        assert!(sim.ucom(words).ends(4).err.contains("already exists"), "{words:?}");
         assert_eq!(std::fs::read(&file).unwrap(), b"mine");
         assert!(!peer.all(50).iter().any(|f| f.starts_with("3C1#")));
         sim.ucom(&[words, &["--overwrite"]].concat()).ends(0);

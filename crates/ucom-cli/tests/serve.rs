@@ -58,7 +58,7 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     signal(&child, "-TERM");
     let (code, err) = over(child);
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("operator's token, new in") && err.contains("`cat "), "{err}");
+    assert!(err.contains("new operator's token in") && err.contains("`cat "), "{err}");
     assert!(!err.contains(&http(&ready).operator) && !err.contains("#token="), "{err}");
     // The tokens are the same in the next start.
     let (child, again) = serve(dir.path(), &["--sim"]);
@@ -84,7 +84,7 @@ fn the_link_with_the_token_is_printed_on_a_terminal() {
     let mut child = terminal.start(&command);
     terminal.until_it_shows("ready: ");
     let text = terminal.picture.text();
-    assert!(text.contains("operator's token, new in") && text.contains("/#token="), "{text}");
+    assert!(text.contains("new operator's token in") && text.contains("/#token="), "{text}");
     terminal.press("\u{3}");
     assert_eq!(terminal.ends(&mut child), 0);
 }

@@ -32,7 +32,7 @@ test('the first command takes it, with name, policy and duration; two at once ta
 });
 
 test('held by somebody else: refused with the name, and asked for on demand', async () => {
-  const denied = { code: 'denied', message: 'anna has commanded this arm for 3 s', next: '' };
+  const denied = { code: 'denied', message: 'anna has held the lease of this arm for 3 s', next: '' };
   const { lease, asked } = setUp([{ status: 409, body: denied }, { body: { ...grant, held: false } }, { body: { held: true } }]);
   await assert.rejects(lease.take(), (error: unknown) => error instanceof ApiError && error.problem.message.includes('anna'));
   assert.equal(lease.phase, 'none');

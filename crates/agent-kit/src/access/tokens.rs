@@ -36,7 +36,7 @@ pub enum TokenError {
         mode: u32,
     },
     /// File that is not a token file.
-    #[error("{path}: no token file: {what}", path = path.display())]
+    #[error("{path}: not a valid token file: {what}", path = path.display())]
     Contents {
         /// Path of the file.
         path: PathBuf,
@@ -44,7 +44,7 @@ pub enum TokenError {
         what: String,
     },
     /// Operating system without random numbers.
-    #[error("no random numbers from this system: {0}")]
+    #[error("the operating system provides no random numbers: {0}")]
     Random(getrandom::Error),
 }
 
@@ -54,11 +54,11 @@ impl host_kit::Diagnose for TokenError {
             Self::Open { path, .. } => format!("`chmod 600 {}`", path.display()),
             Self::Contents { path, .. } => {
                 format!(
-                    "remove {}, and new tokens are made; or name another with --token-file",
+                    "remove {} to create new tokens, or select another file with --token-file",
                     path.display()
                 )
             }
-            Self::Io { .. } | Self::Random(_) => "name a file that you may write with --token-file".into(),
+            Self::Io { .. } | Self::Random(_) => "select a file that you can write with --token-file".into(),
         };
         host_kit::Diagnosis::new(host_kit::ErrorKind::Usage, "token-file", next)
     }
@@ -89,7 +89,7 @@ impl Tokens {
         let tokens: Self = toml::from_str(&text).map_err(|e| contents(e.message().to_owned()))?;
         let short = [&tokens.operator, &tokens.viewer].into_iter().any(|token| token.len() < 20);
         if short || tokens.operator == tokens.viewer {
-            let what = "`operator` and `viewer` are two different tokens of 20 characters or more";
+            let what = "`operator` and `viewer` must be two different tokens of at least 20 characters";
             return Err(contents(what.into()));
         }
         Ok(tokens)
@@ -112,7 +112,8 @@ impl Tokens {
                 fs::create_dir_all(parent)?;
             }
             let text = format!(
-                "# Lets its bearer command.\noperator = \"{}\"\n# Lets its bearer look and stop.\nviewer = \"{}\"\n",
+                "# Token that allows commands.\noperator = \"{}\"\n# Token that allows reading and \
+                stopping.\nviewer = \"{}\"\n",
                 tokens.operator, tokens.viewer
             );
             private(path)?.write_all(text.as_bytes())
@@ -132,11 +133,11 @@ impl Tokens {
         let (operator, file) = (&self.operator, file.display());
         let mut lines = Vec::new();
         if are_new && on_terminal {
-            lines.push(format!("operator's token, new in {file}: {operator}"));
+            lines.push(format!("new operator's token in {file}: {operator}"));
         } else if are_new {
-            lines.push(format!("operator's token, new in {file}: `cat {file}` shows it"));
+            lines.push(format!("new operator's token in {file}: `cat {file}` shows it"));
         } else if link && !on_terminal {
-            lines.push(format!("operator's token: printed on a terminal alone; `cat {file}` shows it"));
+            lines.push(format!("operator's token: printed only on a terminal; `cat {file}` shows it"));
         }
         lines.push(match on_terminal && (are_new || link) {
             true => format!("dashboard: {url}/#token={operator}"),

@@ -61,7 +61,7 @@ impl Target for Rotated {
                 let (path, before) = (path.display(), before.display());
                 io::Error::new(
                     error.kind(),
-                    format!("{path} is full, and cannot be renamed to {before}: {error}"),
+                    format!("log file {path} is full and cannot be renamed to {before}: {error}"),
                 )
             })?,
         }

@@ -44,8 +44,10 @@ impl Body for InTime {
         }
         let Some((end, within)) = &mut self.end else { return Poll::Pending };
         end.as_mut().poll(context).map(|()| {
-            let text =
-                format!("the body has not come within {} s: few connections are free", within.as_secs());
+            let text = format!(
+                "the request body was not complete within {} s, and few connections are free",
+                within.as_secs()
+            );
             Some(Err(text.into()))
         })
     }

@@ -79,14 +79,14 @@ fn variables_of_options_that_act_are_named_and_ignored_or_refused() {
     assert_eq!(
         found.ignored,
         [
-            "try: TRY_ACTIVE=x is ignored: `try go` does not read it; type --active",
-            "try: TRY_OUT=a\\u{1b}[2J\\nb is ignored: `try go` does not read it; type --out or TRY_GO_OUT"
+            "try: TRY_ACTIVE=x is ignored: `try go` does not read this variable; use --active",
+            "try: TRY_OUT=a\\u{1b}[2J\\nb is ignored: `try go` does not read this variable; use --out or TRY_GO_OUT"
         ]
     );
     let refused = report(&["go"], &[("TRY_SPEED", "9")]).refused.unwrap();
     assert_eq!(
         (crate::exit::of(refused.kind), refused.next.to_string().as_str()),
-        (2, "type --speed, or unset TRY_SPEED")
+        (2, "use --speed, or unset TRY_SPEED")
     );
     assert!(refused.message.contains("TRY_SPEED=9") && refused.message.contains("`try go`"), "{refused:?}");
     // Typed, off, empty, or of another command.

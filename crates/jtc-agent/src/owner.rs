@@ -224,7 +224,7 @@ impl Drop for Owner {
 
 /// Reads and writes until the port is lost, or the owner was ended and no data is in flight.
 fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
-    let mut gone = Gone(shared, "the agent has a fault".to_owned());
+    let mut gone = Gone(shared, "internal error of the agent".to_owned());
     let mut last_turns = None;
     loop {
         if let Err(error) = turn(shared, &mut port, &mut observer) {
@@ -236,7 +236,7 @@ fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
         }
         let end = *last_turns.get_or_insert_with(|| shared.now() + LAST_TURNS);
         if shared.lock().line.is_idle() || shared.now() >= end {
-            gone.1 = "the agent was ended".to_owned();
+            gone.1 = "the agent has ended".to_owned();
             return;
         }
     }

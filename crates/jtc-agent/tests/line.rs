@@ -161,7 +161,9 @@ fn one_client_commands_and_all_see_who() {
     board.send(a, &fixed::CLEAR_OCCURRED_ERRORS);
     assert_eq!(board.line.lease().map(|lease| lease.holder), Some(a));
     board.run_ms(12_000);
-    for (client, why) in [(b, "anna has commanded this arm for 12 s"), (viewer, "to look and to stop")] {
+    for (client, why) in
+        [(b, "anna has held the lease of this arm for 12 s"), (viewer, "can only read and stop")]
+    {
         board.take(client);
         board.send(client, &fixed::gripper_control(true));
         board.run_ms(100);
@@ -729,7 +731,7 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         let (_, denied) = board.take(bob);
         assert_eq!(arrived, if pass { asked } else { 0 }, "{case}");
         assert_eq!(denied.len(), asked - arrived, "{case}");
-        assert!(denied.iter().all(|why| why.contains("nothing is received from anna")), "{case}: {denied:?}");
+        assert!(denied.iter().all(|why| why.contains("anna is silent")), "{case}: {denied:?}");
         assert_eq!(board.arrived(FrameType::GetSettings), own, "{case}: those of the holder pass");
         board.send(bob, &STOP);
         board.run_ms(500);

@@ -82,7 +82,7 @@ fn a_stop_ends_an_arm_that_is_being_given_and_what_is_in_use_of_it_is_named() {
     // The first frames were on the line before the Stop. The agent does not revert parameters that the controller has
     // accepted.
     let (message, given) = (done["error"]["message"].as_str().expect("words"), &done["given"]);
-    assert!(message.contains("in use already: one setting"), "{done}");
+    assert!(message.contains("the controller already uses: one setting"), "{done}");
     assert_eq!(message.contains("its name"), given["named"] == true, "{done}");
     let (_, status) = served.api("GET /api/status", None, None);
     assert_eq!(status["controller"]["state"], "Init", "it has no torque: {done}");

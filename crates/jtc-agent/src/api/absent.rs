@@ -66,16 +66,20 @@ impl AbsentObject {
             };
             let Some(place) = Joint::from_number(number).and_then(|joint| absent.get_mut(joint.index()))
             else {
-                return refused("there is none".into(), "joints are 1 to 6 from the base", None);
+                return refused(
+                    "the joint does not exist".into(),
+                    "give joints as 1 to 6, from the base",
+                    None,
+                );
             };
             if place.is_some() {
-                return refused("it is given twice".into(), "name each joint once", None);
+                return refused("the joint is listed twice".into(), "list each joint once", None);
             }
             if !(low..=high).contains(&value) {
                 let limit = Some(if value < low { low } else { high });
                 return refused(
-                    format!("{value} rad is outside {low} to {high}"),
-                    "angles are in rad",
+                    format!("angle {value} rad is out of range ({low} to {high} rad)"),
+                    "give the angle in rad",
                     limit,
                 );
             }

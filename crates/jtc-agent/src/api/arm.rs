@@ -149,7 +149,7 @@ pub(super) fn taken(text: &str) -> Result<Arm, Problem> {
     if let Some(ArmFinding { finding, joint, value, limit, .. }) = worst {
         let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
         let next = if finding.next.is_empty() {
-            next!("{} lists all of it", ArmCheck)
+            next!("read all findings with {}", ArmCheck)
         } else {
             finding.next.clone()
         };

@@ -47,6 +47,7 @@ pub(super) async fn blocking<T: Send + 'static>(
     act: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Problem> {
     tokio::task::spawn_blocking(act).await.map_err(|_| {
-        Problem::new("fault", "the agent has a fault", "look at what it printed").kind(ErrorKind::Fault)
+        Problem::new("fault", "internal error of the agent", "read the output of the agent")
+            .kind(ErrorKind::Fault)
     })
 }

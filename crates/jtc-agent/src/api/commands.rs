@@ -159,10 +159,13 @@ pub(super) async fn speed(
     Body(SpeedObject { percent }): Body<SpeedObject>,
 ) -> Result<StatusCode, Problem> {
     if !(SPEED_MIN..=100).contains(&percent) {
-        let message = format!("{percent} % is no speed: {SPEED_MIN} to 100 are possible");
-        return Err(
-            Problem::new("speed", message, "100 is the speed of the trajectory").kind(ErrorKind::Usage)
-        );
+        let message = format!("speed {percent} % is out of range ({SPEED_MIN} to 100 %)");
+        return Err(Problem::new(
+            "speed",
+            message,
+            "choose a speed in this range; 100 % is the speed of the trajectory",
+        )
+        .kind(ErrorKind::Usage));
     }
     let http_session = agent.http_session(&asker)?;
     if let Some(done) = http_session.wish(Flow::Speed(percent)).await {
@@ -222,7 +225,7 @@ pub(super) async fn gripper(
     post,
     path = "/api/disable",
     params(LeaseKey),
-    responses((status = 204, description = "The drives are being disabled"), Refusals, Denials)
+    responses((status = 204, description = "The controller disables the drives"), Refusals, Denials)
 )]
 pub(super) async fn disable(State(agent): State<Agent>, asker: Asker) -> Result<StatusCode, Problem> {
     agent.command(&asker, "disable", Session::disable).await?;
@@ -251,7 +254,12 @@ pub(super) async fn set_payload(
 pub(super) fn body(payload: PayloadObject) -> Result<Payload, Problem> {
     let payload = Payload::from(payload);
     payload.check().map_err(|e| {
-        Problem::new("payload", e.to_string(), "no body has such numbers").kind(ErrorKind::Usage)
+        Problem::new(
+            "payload",
+            e.to_string(),
+            "correct mass, centre of mass and inertia: no real payload has these values",
+        )
+        .kind(ErrorKind::Usage)
     })?;
     Ok(payload)
 }

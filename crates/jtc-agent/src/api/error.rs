@@ -14,13 +14,16 @@ impl From<Denied> for Problem {
     fn from(denied: Denied) -> Self {
         let next = match &denied {
             Denied::Held { .. } => {
-                "GET /api/status shows who commands; ask for the lease with POST /api/lease and ask: true"
+                "find the lease holder with GET /api/status, and request the lease with POST /api/lease and \
+                 ask: true"
             }
-            Denied::Awaited { .. } => "ask again when that one has had the lease: GET /api/status shows it",
+            Denied::Awaited { .. } => {
+                "request the lease again after that client has had it: GET /api/status shows the lease holder"
+            }
             Denied::Viewer => "use the operator's token",
-            Denied::Stopped { .. } => "wait three seconds, and ask again when the arm may move",
+            Denied::Stopped { .. } => "wait 3 s, and send the request again when the arm may move",
             Denied::Unattended { .. } => {
-                "ask again when the arm stands; a Stop or a Pause is always passed on"
+                "send the request again when the arm is at rest; the agent always sends a Stop or a Pause"
             }
             Denied::Gone => "take the lease with POST /api/lease",
             Denied::NotHolder => "take the lease with POST /api/lease",
@@ -35,17 +38,18 @@ impl From<Unable> for Problem {
         match unable {
             Unable::Busy(job) => {
                 let what = job.map_or("another command".into(), |job| format!("job {job}"));
-                let message = format!("{what} of this client is going on: one thing at a time");
+                let message = format!("{what} of this client is still running: only one can run at a time");
                 Self::new(
                     "busy",
                     message,
-                    "wait until it is over; a Stop ends a motion, and speed and resume are for the one that goes on",
+                    "wait until it has ended; a Stop ends a motion, and speed and resume apply to the \
+                     running motion",
                 )
             }
             Unable::Gone => Self::new(
                 "gone",
-                "the line is gone, or this client was put out",
-                "GET /api/status shows whether the controller is there; take the lease again",
+                "the connection to the controller is lost, or the agent disconnected this client",
+                "check with GET /api/status that the controller answers, then take the lease again",
             )
             .kind(ErrorKind::NoLink),
         }

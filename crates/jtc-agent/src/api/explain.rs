@@ -54,8 +54,8 @@ pub(super) async fn explain(Number(code): Number<String>) -> Result<Json<PageObj
     // The page with exactly this name takes precedence over pages that contain the same words.
     let fitting = named(&code).map_or_else(|| find(&code), |page| vec![page]);
     let (first, others) = fitting.split_first().ok_or_else(|| {
-        let message = format!("nothing is known about \"{}\"", agent_kit::gate::plain(&code));
-        Problem::nothing("code", "of that name", "/api/explain").message(message)
+        let message = format!("no page explains \"{}\"", agent_kit::gate::plain(&code));
+        Problem::nothing("code", "with this name", "/api/explain").message(message)
     })?;
     let also = others.iter().map(|page| page.name.to_owned()).collect();
     Ok(Json(PageObject { also, ..PageObject::from(*first) }))

@@ -72,18 +72,21 @@ fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<Problem> {
     let (late, ahead) = (arrived_ms.saturating_sub(as_of_ms), as_of_ms.saturating_sub(arrived_ms));
     if ahead > ms(AHEAD) {
         let message = format!(
-            "as_of_ms {as_of_ms}: this agent began {arrived_ms} ms ago; it may have been started again"
+            "as_of_ms {as_of_ms} is in the future: this agent started {arrived_ms} ms ago; it may have been \
+             restarted"
         );
         let facts = Facts::beyond(as_of_ms as f64, arrived_ms as f64);
-        return Some(Problem::new("request", message, "GET /api/status has at_ms").with(facts).unreadable());
+        return Some(
+            Problem::new("request", message, "read at_ms with GET /api/status").with(facts).unreadable(),
+        );
     }
     (late > ms(SEEN_WITHIN)).then(|| {
         let limit = ms(SEEN_WITHIN);
         let message = format!(
-            "this jog comes {late} ms behind what the person saw, {limit} ms are allowed: nothing moves by it"
+            "jog request is too late: the displayed status was {late} ms old, limit {limit} ms; nothing moved"
         );
         let facts = Facts::beyond(late as f64, limit as f64);
-        let next = "the connection is too slow for jogging: come nearer, or use a move";
+        let next = "use a faster connection, or a move instead of a jog";
         Problem::new("late", message, next).with(facts)
     })
 }

@@ -169,8 +169,11 @@ pub(super) async fn values(
     Asked(LogWindow { last_s }): Asked<LogWindow>,
 ) -> Result<Json<LogValues>, Problem> {
     if !(0.01..=60.0).contains(&last_s) {
-        let object =
-            Problem::new("request", format!("last_s {last_s}: from 0.01 to 60"), "leave it out for 2 s");
+        let object = Problem::new(
+            "request",
+            format!("last_s is out of range: {last_s}, expected 0.01 to 60 s"),
+            "correct last_s, or leave it out for 2 s",
+        );
         let limit = if last_s > 60.0 { 60.0 } else { 0.01 };
         return Err(object.with(Facts::beyond(last_s, limit)).unreadable());
     }
@@ -188,8 +191,8 @@ async fn from_log<T: Send + 'static>(
     caller.operator()?;
     agent.note("log", json!({ "from": caller.peer.to_string() }));
     let room = agent.logs.clone().try_acquire_owned().map_err(|_| {
-        let next = "ask again in some seconds: a log is read by one at a time";
-        Problem::new("busy", "somebody reads the log of the flight recorder", next)
+        let next = "send the request again after some seconds";
+        Problem::new("busy", "another client is reading the log of the flight recorder", next)
     })?;
     // Uses a separate client, so that other questions do not wait for the log.
     let name = format!("{}: log", caller.peer);
@@ -219,8 +222,8 @@ fn written(account: &Account) -> Result<Vec<u8>, Problem> {
 }
 
 fn empty() -> Problem {
-    let message = "the flight recorder holds nothing yet: it was cleared, or the controller has just started";
-    Problem::new("empty-log", message, "ask again after a second").kind(ErrorKind::Device)
+    let message = "the flight recorder is still empty: it was cleared, or the controller has just started";
+    Problem::new("empty-log", message, "send the request again after 1 s").kind(ErrorKind::Device)
 }
 
 /// Deletes the log and restarts the flight recorder, also after it has stopped at an error.

@@ -55,8 +55,8 @@ fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
     for number in joints {
         let Some(joint) = Joint::from_number((*number).into()) else {
             let facts = Facts::beyond((*number).into(), 6.0);
-            let message = format!("there is no joint {number}; nothing was sent");
-            let error = Problem::new("joint", message, "joints are 1 to 6 from the base");
+            let message = format!("joint {number} does not exist; nothing was sent");
+            let error = Problem::new("joint", message, "give joints as 1 to 6, from the base");
             return Err(error.kind(ErrorKind::Usage).with(facts));
         };
         mask |= 1 << joint.index();
@@ -113,8 +113,10 @@ pub(super) async fn reset(
     let ResetRequest { joints, gripper, all, arm_may_fall } = request;
     let named = nodes(&joints, gripper)? | if all { ALL_NODES } else { 0 };
     if named == 0 {
-        let next = "name joints, the gripper, or all";
-        return Err(Problem::new("request", "which nodes? Nothing was sent", next).kind(ErrorKind::Usage));
+        let next = "list joints, or set gripper or all";
+        return Err(
+            Problem::new("request", "no node selected; nothing was sent", next).kind(ErrorKind::Usage)
+        );
     }
     let what = format!("reset {}", labels::node_names(named).join(", "));
     let reset = move |session: &mut Session<ClientPort>| -> Result<(), Error> {

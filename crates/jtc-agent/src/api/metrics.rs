@@ -72,31 +72,27 @@ impl Page {
     fn status(&self, status: &Status, arm: &Arm) -> prometheus::Result<()> {
         self.state(
             "jtc_controller_state",
-            "State of the controller: 1 for that which it is in",
+            "State of the controller: 1 for the current state",
             &ControllerState::ALL.map(|state| state.name()),
             status.state.name(),
         )?;
         self.state(
             "jtc_trajectory_state",
-            "What becomes of the trajectory: 1 for that",
+            "State of the trajectory: 1 for the current state",
             &TrajectoryState::ALL.map(|state| state.name()),
             status.trajectory.name(),
         )?;
-        self.gauge(
-            "jtc_trajectory_point",
-            "The 1 ms point of the trajectory that the controller is at",
-            status.point.into(),
-        )?;
+        self.gauge("jtc_trajectory_point", "Current 1 ms point of the trajectory", status.point.into())?;
         let (now, occurred) = (labels::errors(status.errors), labels::errors(status.occurred));
-        self.gauge("jtc_controller_errors", "Errors of the controller now", now.len() as f64)?;
+        self.gauge("jtc_controller_errors", "Number of current errors of the controller", now.len() as f64)?;
         self.gauge(
             "jtc_controller_occurred_errors",
-            "Errors since they were cleared last",
+            "Number of errors since the last clear",
             occurred.len() as f64,
         )?;
         self.gauges(
             "jtc_controller_error",
-            "1 for each error of the controller now",
+            "1 for each current error of the controller",
             &["error"],
             now.into_iter().map(|error| (vec![error.to_owned()], 1.0)),
         )?;
@@ -130,7 +126,7 @@ impl Page {
         self.gauges("jtc_joint_errors", "Errors that the controller has found at the joint", label, errors)?;
         self.gauges(
             "jtc_joint_position_limit_ratio",
-            "How near the joint is to a limit of its position: 0 in the middle, 1 at one of them",
+            "Joint position relative to its limits: 0 in the middle, 1 at a limit",
             label,
             each(&|j| {
                 let (low, high) = (limits[j].position_min, limits[j].position_max);
@@ -139,13 +135,13 @@ impl Page {
         )?;
         self.gauges(
             "jtc_joint_velocity_limit_ratio",
-            "Speed as a part of its limit",
+            "Speed divided by its limit",
             label,
             each(&|j| velocity(j).abs() / limits[j].velocity_max),
         )?;
         self.gauges(
             "jtc_joint_torque_limit_ratio",
-            "Torque as a part of its limit",
+            "Torque divided by its limit",
             label,
             each(&|j| torque(j).abs() / limits[j].torque_max),
         )
@@ -156,7 +152,7 @@ impl Page {
         let texts = [info.firmware(), info.revision(), info.board.as_str(), info.arm.as_str()];
         self.gauges(
             "jtc_controller_info",
-            "Who the controller is; always 1",
+            "Identity of the controller; always 1",
             &["firmware", "revision", "board", "arm"],
             [(texts.map(str::to_owned).to_vec(), 1.0)],
         )?;
@@ -165,14 +161,10 @@ impl Page {
             "Time since the controller started",
             info.uptime_ms as f64 / 1000.0,
         )?;
-        self.counter(
-            "jtc_controller_starts_total",
-            "How often the controller has started",
-            info.boots.into(),
-        )?;
+        self.counter("jtc_controller_starts_total", "Starts of the controller", info.boots.into())?;
         self.counter(
             "jtc_controller_lost_records_total",
-            "Records that the controller lost because too many waited",
+            "Records that the controller lost because its queue was full",
             info.lost_records.into(),
         )
     }
@@ -183,23 +175,27 @@ impl Page {
         self.counter("jtc_statuses_total", "Statuses received", received.frames)?;
         self.counter(
             "jtc_damaged_statuses_total",
-            "Bytes like a status with a wrong checksum",
+            "Received statuses with an invalid checksum",
             received.bad_frames,
         )?;
-        self.counter("jtc_skipped_bytes_total", "Received bytes of no frame", received.skipped_bytes)?;
-        self.counter("jtc_frames_sent_total", "Frames sent that change something", counts.sent)?;
+        self.counter(
+            "jtc_skipped_bytes_total",
+            "Received bytes that belong to no frame",
+            received.skipped_bytes,
+        )?;
+        self.counter("jtc_frames_sent_total", "Sent frames that change a state", counts.sent)?;
         self.counters(
             "jtc_frames_answered_total",
-            "Those that the controller has answered",
+            "Answered frames that change a state",
             &["answer"],
             [("accepted", counts.accepted), ("refused", counts.refused)],
         )?;
-        self.counter("jtc_frames_denied_total", "Frames of clients that were not passed on", counts.denied)?;
-        self.counter("jtc_put_outs_total", "Clients that were put out", counts.put_out)?;
-        self.counter("jtc_halts_total", "Stops and Pauses that were asked for", agent.line.last_halt())?;
+        self.counter("jtc_frames_denied_total", "Frames of clients that the agent refused", counts.denied)?;
+        self.counter("jtc_put_outs_total", "Clients that the agent disconnected", counts.put_out)?;
+        self.counter("jtc_halts_total", "Requested Stops and Pauses", agent.line.last_halt())?;
         self.counter(
             "jtc_halts_not_taken_total",
-            "Those that the controller has not taken after many tries",
+            "Stops and Pauses that the controller did not confirm after many attempts",
             counts.not_taken,
         )
     }
@@ -209,25 +205,25 @@ impl Page {
         let simulated = agent.simulated.to_string();
         self.gauges(
             "jtc_build_info",
-            "The agent; always 1",
+            "Version of the agent; always 1",
             &["version", "simulated"],
             [(vec![env!("CARGO_PKG_VERSION").to_owned(), simulated], 1.0)],
         )?;
         let (held, clients) = agent.line.with(|line, _| (line.lease().is_some(), line.clients()));
-        self.gauge("jtc_lease_held", "1 while a client commands", f64::from(u8::from(held)))?;
-        self.gauge("jtc_clients", "Clients on the line, the agent's own one included", clients as f64)?;
+        self.gauge("jtc_lease_held", "1 while a client holds the lease", f64::from(u8::from(held)))?;
+        self.gauge("jtc_clients", "Connected clients, including the agent's own client", clients as f64)?;
         let lost = f64::from(u8::from(agent.line.lost().is_some()));
-        self.gauge("jtc_port_lost", "1 when the port is gone", lost)?;
+        self.gauge("jtc_port_lost", "1 if the port is lost", lost)?;
         let (running, ended) = agent.jobs.counts();
-        self.gauge("jtc_jobs_running", "Jobs that go on", running as f64)?;
+        self.gauge("jtc_jobs_running", "Running jobs", running as f64)?;
         self.counters(
             "jtc_jobs_total",
-            "Jobs that have ended, by how",
+            "Ended jobs by stage",
             &["outcome"],
             [("finished", ended.finished), ("stopped", ended.stopped), ("failed", ended.failed)],
         )?;
         self.counter("jtc_events_total", "Events of the agent", agent.jobs.journal.last())?;
-        self.counter("jtc_log_lost_lines_total", "Lines that the log of commands lost", agent.lost_lines())
+        self.counter("jtc_log_lost_lines_total", "Lines missing in the log of commands", agent.lost_lines())
     }
 }
 
@@ -257,7 +253,7 @@ pub(super) async fn metrics(State(agent): State<Agent>) -> Result<impl IntoRespo
         TextEncoder::new().encode_to_string(&page.0.gather())
     };
     let page = page().map_err(|error| {
-        Problem::new("metrics", error.to_string(), "GET /api/status shows the same")
+        Problem::new("metrics", error.to_string(), "read the same values with GET /api/status")
             .kind(jtc_host::ErrorKind::Fault)
     })?;
     Ok(([(header::CONTENT_TYPE, FORMAT)], page))

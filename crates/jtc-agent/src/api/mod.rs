@@ -188,7 +188,7 @@ impl Agent {
         }
         if let Some(lost) = lost {
             let message = format!("{lost}: nothing was sent; the arm may be moving");
-            let object = Problem::new("no-link", message, "the emergency stop, if it is");
+            let object = Problem::new("no-link", message, "if the arm moves, press the emergency stop");
             return Err(object.kind(ErrorKind::NoLink));
         }
         let client = client.map(|client| client.client);

@@ -232,8 +232,8 @@ pub(super) async fn plan(
         agent.jobs.store.is_free(number).map_err(|e| Problem::of(&e))?;
     }
     let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
-        let next = "ask again when it is ready: one plan is made at a time";
-        Problem::new("busy", "another plan is being made", next)
+        let next = "send the request again when that plan is ready";
+        Problem::new("busy", "the agent is computing another plan", next)
     })?;
     let (own, poses) = (agent.jobs.arm().clone(), agent.poses());
     let asked = move |session: &mut Session<ClientPort>| {
@@ -272,7 +272,11 @@ pub(super) async fn plan(
 /// Returns the error for a plan whose client no longer waits. Meanwhile the client may have stored another trajectory
 /// under the number.
 fn abandoned() -> Problem {
-    Problem::new("abandoned", "whoever asked for this plan has gone", "ask for it again")
+    Problem::new(
+        "abandoned",
+        "the client that requested this plan has disconnected",
+        "request the plan again",
+    )
 }
 
 /// Returns the waypoints of a request if they can be planned.
@@ -285,7 +289,7 @@ fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Probl
     let (low, high, value) = (*TEMPERATURES.start(), *TEMPERATURES.end(), request.temperature_c);
     if !TEMPERATURES.contains(&value) {
         let limit = if value < low { low } else { high };
-        let message = format!("temperature_c {value} °C is outside {low} to {high}");
+        let message = format!("temperature_c is out of range: {value} °C, expected {low} to {high} °C");
         return refused("temperature", message, value, limit);
     }
     if let Some(KeepRequest { number, .. }) = request.keep
@@ -301,9 +305,8 @@ fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Probl
     let file = if request.degrees { file.in_degrees().map_err(unread)? } else { file };
     let count = file.waypoints.len();
     if count > WAYPOINTS_MAX {
-        let message =
-            format!("{count} waypoints: an agent plans through {WAYPOINTS_MAX} at most; jtc plan takes more");
-        return refused("way, in parts", message, count as f64, WAYPOINTS_MAX as f64);
+        let message = format!("too many waypoints: {count}, limit {WAYPOINTS_MAX}; `jtc plan` accepts more");
+        return refused("path, or plan it in parts", message, count as f64, WAYPOINTS_MAX as f64);
     }
     Ok((request, file))
 }
@@ -322,7 +325,7 @@ fn planned(
             // A blend in the API is in rad or m, even if the positions are in degrees.
             WaypointError::Route(e @ PlanError::Blend { .. }) => object
                 .message(file.located(e))
-                .next("5° is 0.0873 rad in blend_rad, 20 mm is 0.02 m in blend_m"),
+                .next("give blend_rad in rad (5° is 0.0873 rad) and blend_m in m (20 mm is 0.02 m)"),
             WaypointError::Route(e) => object.message(file.located(e)),
             _ => object,
         }
@@ -347,15 +350,17 @@ fn planned(
     if let Some(aside) = way.off_the_line(&planned, arm) {
         let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
         planned.notes.push(format!(
-            "between waypoints {} and {to} the flange leaves the straight line by up to {mm:.1} mm: legs are straight in joint space; \
-             line keeps it on the line",
+            "between waypoints {} and {to} the flange leaves the straight line by up to {mm:.1} mm: legs are \
+             straight in joint space; set line to keep the flange on the line",
             to - 1
         ));
     }
     if request.blend_m > 0.0 && !way.has_lines() {
-        planned
-            .notes
-            .push("blend_m rounds corners between lines and arcs, and this motion has none".to_owned());
+        planned.notes.push(
+            "blend_m has no effect: it rounds corners between lines and arcs, and this motion has no lines \
+             or arcs"
+                .to_owned(),
+        );
     }
     Ok(planned)
 }

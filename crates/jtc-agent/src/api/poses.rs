@@ -72,9 +72,10 @@ impl Agent {
             return Err(pose_error(&PoseError::Name { name: plain(name) }));
         }
         if self.jobs.arm().poses.contains_key(name) {
-            let message =
-                format!("pose \"{name}\" stands in the arm file of the agent, and is not changed from here");
-            let next = "choose another name, or change the file and begin the agent anew";
+            let message = format!(
+                "pose \"{name}\" belongs to the arm file of the agent and cannot be changed by a request"
+            );
+            let next = "choose another name, or edit the file and restart the agent";
             return Err(Problem::new("read-only", message, next));
         }
         Ok(())
@@ -85,9 +86,8 @@ impl Agent {
 pub(super) fn pose_error(error: &PoseError) -> Problem {
     let object = Problem::of(error);
     match error {
-        PoseError::Unknown { .. } => {
-            object.next("GET /api/poses lists them; PUT /api/poses/{name} saves where the arm stands")
-        }
+        PoseError::Unknown { .. } => object
+            .next("list the poses with GET /api/poses; save the present pose with PUT /api/poses/{name}"),
         _ => object,
     }
 }
@@ -141,7 +141,11 @@ async fn save(agent: &Agent, name: &str, request: PoseRequest) -> Result<[f64; 6
     {
         let value = position[joint.index()];
         let facts = Facts::beyond(value, FARTHEST).at_joint(joint.number());
-        let error = Problem::new("pose", format!("{joint}: {value} rad is nowhere"), "positions are in rad");
+        let error = Problem::new(
+            "pose",
+            format!("{joint}: {value} rad is out of range (±{FARTHEST} rad)"),
+            "give the positions in rad",
+        );
         return Err(error.kind(ErrorKind::Usage).with(facts));
     }
     let (jobs, name) = (agent.jobs.clone(), name.to_owned());

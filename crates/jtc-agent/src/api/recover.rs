@@ -44,8 +44,9 @@ impl RecoverRequest {
         let Self { defaults, arm, accept_device_limits } = self;
         match arm {
             Some(_) if defaults => {
-                let message = "arm and defaults name two sets of numbers; nothing was sent";
-                Err(Problem::new("request", message, "name one").kind(ErrorKind::Usage))
+                let message =
+                    "arm and defaults cannot be combined: each selects a set of parameters; nothing was sent";
+                Err(Problem::new("request", message, "use only one of the two").kind(ErrorKind::Usage))
             }
             Some(text) => {
                 let parameters =

@@ -41,13 +41,14 @@ pub(super) async fn report(
 ) -> Result<([(HeaderName, &'static str); 4], String), Problem> {
     let job = found(&agent, number)?;
     if job.stage == Stage::Running {
-        let message = format!("job {number} goes on: its report is made when it is over");
-        return Err(Problem::new("busy", message, "ask again after its event ended"));
+        let message = format!("job {number} is still running: its report is written when it has ended");
+        return Err(Problem::new("busy", message, "request the report again after the event ended"));
     }
     let report = job.done.report.ok_or_else(|| {
-        let message =
-            format!("job {number} has no report: it has moved nothing, or later ones have taken its place");
-        let next = "GET /api/jobs shows which jobs have a report; jtc serve --record keeps all motions";
+        let message = format!(
+            "job {number} has no report: it moved nothing, or reports of later jobs have replaced it"
+        );
+        let next = "find the jobs with a report with GET /api/jobs; `jtc serve --record` keeps all motions";
         Problem::nothing("report", number, "/api/jobs").message(message).next(next)
     })?;
     let room = agent.reports.clone().acquire_owned().await;

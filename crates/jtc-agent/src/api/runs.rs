@@ -215,11 +215,11 @@ pub(super) async fn begin_run(
     within("repeat", f64::from(repeat), 1e6)?;
     within("speed_percent", speed_percent.unwrap_or(100.0), 1000.0)?;
     let stored = agent.jobs.store.get(number).ok_or_else(|| {
-        let next =
-            "keep one with PUT /api/trajectories/{number}; GET /api/trajectories lists those that there are";
+        let next = "store one with PUT /api/trajectories/{number}, or list the stored ones with GET \
+            /api/trajectories";
         Problem::new(
             "no-trajectory",
-            format!("no trajectory has the number {number} (1 to {NUMBER_MAX})"),
+            format!("trajectory {number} does not exist (numbers are 1 to {NUMBER_MAX})"),
             next,
         )
         .kind(ErrorKind::Usage)
@@ -242,10 +242,10 @@ pub(super) async fn begin_run(
 fn replaced(stored: &Stored) -> Problem {
     let Stored { number, name, digest, .. } = stored;
     let message = format!(
-        "trajectory {number} was replaced since it was looked at: it is {name} now, with the digest {digest}; nothing was sent"
+        "trajectory {number} was replaced since the client read it: it is now {name} with the digest \
+         {digest}; nothing was sent"
     );
-    let next =
-        format!("look at it again: GET /api/trajectories/{number}/points has its points and its digest");
+    let next = format!("read its points and its digest again with GET /api/trajectories/{number}/points");
     Problem::new("replaced", message, next)
 }
 
@@ -289,13 +289,13 @@ pub(super) async fn begin_move(
         }
         (None, None, Some(FlangeObject { xyz_m, rpy_rad })) => {
             let pose = Orientation::Rpy(rpy_rad).at(xyz_m).map_err(|error| {
-                let error = Problem::new("pose", error.to_string(), "lengths are in m, angles in rad");
+                let error = Problem::new("pose", error.to_string(), "give lengths in m and angles in rad");
                 error.kind(ErrorKind::Usage)
             })?;
             (format!("flange {}", listed(&[xyz_m, rpy_rad].concat())), Target::Flange(pose))
         }
         _ => {
-            let message = "a move leads to one place: to_rad, to_pose or to_flange; nothing was sent";
+            let message = "a move needs exactly one target: to_rad, to_pose or to_flange; nothing was sent";
             let next = "GET /openapi.json describes each request";
             return Err(Problem::new("request", message, next).kind(ErrorKind::Usage));
         }
@@ -315,7 +315,7 @@ fn within(name: &str, value: f64, most: f64) -> Result<(), Problem> {
     if (1.0..=most).contains(&value) {
         return Ok(());
     }
-    let message = format!("{name} is {value}: 1 to {most} are possible");
+    let message = format!("{name} is out of range: {value}, expected 1 to {most}");
     Err(Problem::new("request", message, "GET /openapi.json describes each request").kind(ErrorKind::Usage))
 }
 

@@ -112,14 +112,16 @@ impl SettingsRequest {
     fn values(&self) -> Result<Vec<SettingValue>, Problem> {
         let count = self.settings.len();
         if !(1..=SET_VALUES_MAX).contains(&count) {
-            let message = format!("{count} settings: 1 to {SET_VALUES_MAX} are changed at once");
-            return Err(none(message, "send them in parts"));
+            let message = format!(
+                "number of settings is out of range: {count}, expected 1 to {SET_VALUES_MAX} per request"
+            );
+            return Err(none(message, "send the settings in several requests"));
         }
         let mut values: Vec<SettingValue> = Vec::with_capacity(count);
         for change in &self.settings {
             let value = change.value()?;
             if values.iter().any(|other| (other.setting, other.joint) == (value.setting, value.joint)) {
-                let message = format!("{} is given twice; nothing was changed", change.words());
+                let message = format!("{} is listed twice; nothing was changed", change.words());
                 return Err(none(message, "send each setting once").with(change.facts()));
             }
             values.push(value);
@@ -140,11 +142,14 @@ impl SettingChange {
     fn value(&self) -> Result<SettingValue, Problem> {
         let row = settings::named(&self.name).ok_or_else(|| {
             let message = format!("there is no setting {:?}; nothing was changed", short(&self.name));
-            none(message, "GET /api/settings lists all of them")
+            none(message, "list the settings with GET /api/settings")
         })?;
         if PAYLOAD.contains(&row.number) {
             let message = format!("{} is part of the payload; nothing was changed", row.name);
-            return Err(none(message, "PUT /api/payload changes it, and checks that the arm can hold it"));
+            return Err(none(
+                message,
+                "change the payload with PUT /api/payload, which checks that the arm can hold it",
+            ));
         }
         let refused = |what: &str, next: &'static str| {
             let message = format!("{}: {what}; nothing was changed", self.words());
@@ -153,24 +158,38 @@ impl SettingChange {
         let joint = match (self.joint, row.of_joint()) {
             (None, false) => 0,
             (Some(joint @ 1..=6), true) => joint,
-            (Some(_), true) => return refused("joints are 1 to 6", "count them from the base"),
-            (None, true) => return refused("each joint has one", "name the joint, 1 to 6 from the base"),
-            (Some(_), false) => return refused("it is one of the arm, and of no joint", "leave joint out"),
+            (Some(_), true) => {
+                return refused("the joint does not exist", "give the joint as 1 to 6, from the base");
+            }
+            (None, true) => {
+                return refused(
+                    "the joint is missing: each joint has its own value",
+                    "set joint to 1 to 6, counted from the base",
+                );
+            }
+            (Some(_), false) => {
+                return refused("this setting belongs to the arm, not to a joint", "leave out joint");
+            }
         };
         let Self { value, .. } = *self;
         let facts = |limit| Facts { limit: Some(limit), ..self.facts() };
         let (low, high) = (row.low, row.high);
         if !(low..=high).contains(&value) {
             let message = format!(
-                "{}: {value} {} is outside {low} to {high}; nothing was changed",
+                "{}: {value} {} is out of range ({low} to {high}); nothing was changed",
                 self.words(),
                 row.unit
             );
             let limit = if value < low { low } else { high };
-            return Err(none(message, "GET /api/settings has the range of each").with(facts(limit)));
+            return Err(
+                none(message, "read the range of each setting with GET /api/settings").with(facts(limit))
+            );
         }
         if row.whole && value.fract() != 0.0 {
-            return refused("it has whole numbers only", "GET /api/settings has the range of each");
+            return refused(
+                "only whole numbers are valid",
+                "read the range of each setting with GET /api/settings",
+            );
         }
         Ok(SettingValue { setting: row.number, joint, value })
     }

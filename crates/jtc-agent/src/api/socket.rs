@@ -197,7 +197,8 @@ async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Mes
             (line.take_deliveries(client), halt)
         });
         let Some(deliveries) = deliveries else {
-            let reason = Utf8Bytes::from_static("put out: no frames, too many of them, or nothing read");
+            let reason =
+                Utf8Bytes::from_static("disconnected: invalid frames, too many frames, or unread data");
             send(&mut to, Message::Close(Some(CloseFrame { code: CLOSE_PUT_OUT, reason }))).await;
             return;
         };

@@ -306,8 +306,8 @@ pub(super) async fn points(
     if !(2..=POINTS_MAX).contains(&most) {
         let limit = if most < 2 { 2 } else { POINTS_MAX };
         let facts = Facts::beyond(most as f64, limit as f64);
-        let message = format!("{most} points: 2 to {POINTS_MAX} are shown");
-        let error = Problem::new("points", message, "ask for fewer, and draw lines between them");
+        let message = format!("number of points is out of range: {most}, expected 2 to {POINTS_MAX}");
+        let error = Problem::new("points", message, "request fewer points, and interpolate between them");
         return Err(error.kind(ErrorKind::Usage).with(facts));
     }
     Ok(Json(PointsObject::new(&*kept(&agent, number)?, most)))

@@ -198,8 +198,8 @@ impl HttpSession {
     pub async fn wish(&self, flow: Flow) -> Option<Result<(), Problem>> {
         let done = self.wished(flow)?;
         Some(done.await.unwrap_or_else(|_| {
-            let next = "GET /api/jobs shows how";
-            Err(Problem::new(MOTION_ENDED, "the motion had ended before this was done", next))
+            let next = "find the outcome of the motion with GET /api/jobs";
+            Err(Problem::new(MOTION_ENDED, "the motion ended before the command was applied", next))
         }))
     }
 

@@ -278,8 +278,8 @@ impl Unfinished {
 impl Drop for Unfinished {
     fn drop(&mut self) {
         if self.jobs.job(self.number).is_some_and(|job| job.stage == Stage::Running) {
-            let next = "GET /api/status shows where the arm is; look at what the agent printed";
-            self.end(Done::default(), Some(Problem::new("fault", "the agent has a fault", next)));
+            let next = "check the arm with GET /api/status, and read the output of the agent";
+            self.end(Done::default(), Some(Problem::new("fault", "internal error of the agent", next)));
         }
     }
 }

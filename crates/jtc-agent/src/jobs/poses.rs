@@ -19,7 +19,7 @@ const DECIMALS: f64 = 1e6;
 #[derive(Debug, thiserror::Error)]
 pub enum PoseStoreError {
     /// The store is full.
-    #[error("{POSES_MAX} poses are kept: there is no room for another")]
+    #[error("the store is full: it has {POSES_MAX} poses, the maximum")]
     Full,
     /// The file has invalid contents.
     #[error("{}: {why}", path.display())]
@@ -43,14 +43,14 @@ impl host_kit::Diagnose for PoseStoreError {
     fn diagnosis(&self) -> host_kit::Diagnosis {
         let (kind, next) = match self {
             Self::Full => {
-                (host_kit::ErrorKind::Refused, "delete one that is not needed: GET /api/poses lists them")
+                (host_kit::ErrorKind::Refused, "delete an unused pose; GET /api/poses lists the poses")
             }
             Self::Form { .. } => {
-                (host_kit::ErrorKind::Usage, "correct the file, or move it away: poses are lost with it")
+                (host_kit::ErrorKind::Usage, "correct the file, or move it away to start without its poses")
             }
             Self::Io { .. } => (
                 host_kit::ErrorKind::Usage,
-                "make room, or name another directory with `jtc serve --trajectories DIR`",
+                "free disk space, or choose another directory with `jtc serve --trajectories DIR`",
             ),
         };
         host_kit::Diagnosis::new(kind, "poses", next)
@@ -146,11 +146,11 @@ impl PoseStore {
 fn understood(bytes: &[u8]) -> Result<Poses, String> {
     let Kept { format, poses_rad } = serde_json::from_slice(bytes).map_err(|e| e.to_string())?;
     if format != FORMAT {
-        return Err(format!("format {format}, and this program knows {FORMAT}"));
+        return Err(format!("format {format} is not supported: expected {FORMAT}"));
     }
     match poses_rad.keys().find(|name| !is_pose_name(name)) {
-        Some(name) => Err(format!("{name:?} is no name of a pose")),
-        None if poses_rad.len() > POSES_MAX => Err(format!("more than {POSES_MAX} poses")),
+        Some(name) => Err(format!("{name:?} is not a valid pose name")),
+        None if poses_rad.len() > POSES_MAX => Err(format!("too many poses: the limit is {POSES_MAX}")),
         None => Ok(poses_rad),
     }
 }

@@ -88,15 +88,16 @@ fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> Problem {
     };
     let object = if halted {
         let by = task.halted_by();
-        let message = format!("{by} stopped or paused the arm before the controller had all of it");
-        Problem::new(STOPPED, message, "give it again when the arm may have torque")
+        let message =
+            format!("{by} stopped or paused the arm before the controller had the complete arm data");
+        Problem::new(STOPPED, message, "send the arm data again when the arm may have torque")
     } else {
         Problem::of(error)
     };
     match given.in_use() {
         Some(parts) => {
-            let message = format!("{}; in use already: {parts}", object.message);
-            object.message(message).next("give the whole of it again, or the arm that was in use before")
+            let message = format!("{}; the controller already uses: {parts}", object.message);
+            object.message(message).next("send the complete arm data again, or the previous arm")
         }
         None => object,
     }

@@ -75,8 +75,8 @@ impl MotionReport {
             title: "Job".into(),
             rows: vec![
                 row("Number", task.job.to_string()),
-                row("This is its", made.phase.to_owned()),
-                row("Motions finished before", made.before.to_string()),
+                row("Part of the job", made.phase.to_owned()),
+                row("Earlier motions", made.before.to_string()),
                 row("Ended", outcome.to_owned()),
             ],
         };

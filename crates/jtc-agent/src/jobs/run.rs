@@ -285,10 +285,13 @@ fn not_begun(error: &StartError) -> Problem {
     let object = Problem::of(error);
     match error {
         StartError::Check(_) => object,
-        StartError::Elsewhere(_) => object.next("ask for the run with approach: true"),
+        StartError::Elsewhere(_) => object.next("request the run with approach: true"),
         StartError::Approach(_) => object.next(
-            "bring the arm nearer to its first point, by hand with teaching or with a trajectory of your own around what is in the way",
+            "bring the arm nearer to the first point by hand (teaching), or with a trajectory around the \
+             obstacle",
         ),
-        StartError::Open(_) => object.next("approach: true leads back to its first point before each run"),
+        StartError::Open(_) => object.next(
+            "request the run with approach: true, which moves the arm to the first point before each run",
+        ),
     }
 }

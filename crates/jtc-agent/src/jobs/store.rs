@@ -34,10 +34,10 @@ pub struct Stored {
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The number is out of range.
-    #[error("{0} is no number of a trajectory: 1 to {NUMBER_MAX} are")]
+    #[error("trajectory number {0} is out of range (1 to {NUMBER_MAX})")]
     Number(u16),
     /// The number is in use, and the caller does not allow the trajectory to be replaced.
-    #[error("trajectory {number} is there already, {name}: nothing was replaced")]
+    #[error("trajectory {number} already exists, {name}: nothing was replaced")]
     Taken {
         /// Number of the trajectory.
         number: u16,
@@ -45,7 +45,7 @@ pub enum StoreError {
         name: String,
     },
     /// Two files have the same number.
-    #[error("{directory}: two files are trajectory {number}", directory = directory.display())]
+    #[error("{directory}: two files have the trajectory number {number}", directory = directory.display())]
     Twice {
         /// Directory of the files.
         directory: PathBuf,
@@ -53,7 +53,7 @@ pub enum StoreError {
         number: u16,
     },
     /// The trajectory has more points than a controller holds.
-    #[error("{points} points: a controller holds {POINTS_MAX}")]
+    #[error("too many points: {points}, a controller holds at most {POINTS_MAX}")]
     TooMany {
         /// Number of points.
         points: usize,
@@ -79,18 +79,17 @@ impl host_kit::Diagnose for StoreError {
         let (code, next) = match self {
             Self::Number(_) => ("number", format!("choose a number from 1 to {NUMBER_MAX}")),
             Self::Taken { .. } => {
-                let next = "choose another number, or ask for it to be replaced: without `new`";
+                let next = "choose another number, or leave out `new` to replace the trajectory";
                 return host_kit::Diagnosis::new(host_kit::ErrorKind::Refused, "taken", next);
             }
-            Self::Twice { .. } => {
-                ("store", "remove the one that is not meant, or give it another number".into())
-            }
-            Self::TooMany { .. } => ("too-long", "send it in parts, or with a longer step".into()),
+            Self::Twice { .. } => ("store", "remove one of the files, or give it another number".into()),
+            Self::TooMany { .. } => ("too-long", "split the trajectory, or use a longer step".into()),
             Self::File(error) => return error.diagnosis(),
             Self::Poses(error) => return error.diagnosis(),
-            Self::Io { .. } => {
-                ("store", "make room, or name another directory with `jtc serve --trajectories DIR`".into())
-            }
+            Self::Io { .. } => (
+                "store",
+                "free disk space, or choose another directory with `jtc serve --trajectories DIR`".into(),
+            ),
         };
         host_kit::Diagnosis::new(host_kit::ErrorKind::Usage, code, next)
     }
@@ -406,6 +405,6 @@ mod tests {
             std::fs::write(directory.path().join(name), TEXT).expect("a file");
         }
         let error = Store::open(directory.path()).err().expect("which is meant?");
-        assert!(error.to_string().contains("two files are trajectory 7"), "{error}");
+        assert!(error.to_string().contains("two files have the trajectory number 7"), "{error}");
     }
 }

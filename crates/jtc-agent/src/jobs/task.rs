@@ -56,7 +56,7 @@ pub fn stopped(line: &Line, client: ClientId) -> Problem {
     let by = line.with(|line, _| line.halted_by(client).to_owned());
     Problem::new(
         STOPPED,
-        format!("{by} stopped or paused the arm before this moved it: nothing is begun behind that"),
-        "ask for it again when the arm may move",
+        format!("{by} stopped or paused the arm before this request moved it: the request was discarded"),
+        "send the request again when the arm may move",
     )
 }

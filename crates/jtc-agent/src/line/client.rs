@@ -99,18 +99,19 @@ impl Delivery {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PutOut {
     /// The client sent bytes that are not a host frame.
-    #[error("it sent bytes that are no frame of this protocol")]
+    #[error("the client sent bytes that are not a frame of this protocol")]
     NoFrame,
     /// The client sent more than the line and the other clients can tolerate.
     #[error(
-        "it sent more than {FRAMES_PER_S} frames a second, or more than {FRAMES_WAITING} frames or {WAITING_MAX} bytes wait for the line"
+        "the client sent more than {FRAMES_PER_S} frames per second, or has more than {FRAMES_WAITING} \
+         frames or {WAITING_MAX} bytes in the queue"
     )]
     TooMuch,
     /// The lease holder was silent for seconds.
-    #[error("it held the lease, and nothing was received from it for some seconds")]
+    #[error("the client held the lease, and was silent for some seconds")]
     Silent,
     /// The client does not read.
-    #[error("it has left more than {UNREAD_MAX} bytes unread")]
+    #[error("the client has left more than {UNREAD_MAX} bytes unread")]
     Unread,
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 use super::{ClientId, Delivery, Introduction, LineEvent, Policy, PutOut, Role, SharedLine};
 
 /// Name that is reported as the source of a Stop that a disconnected client's policy requested.
-pub(super) const POLICY: &str = "the policy of a client that has gone";
+pub(super) const POLICY: &str = "the policy of a disconnected client";
 /// Special value instead of the number of a Stop: the policy of the client has cancelled the client's requests.
 pub(super) const NOT_ASKED: u64 = u64::MAX;
 
@@ -27,7 +27,7 @@ pub struct Lease {
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Denied {
     /// Another client holds the lease.
-    #[error("{holder} has commanded this arm for {age_s:.0} s: one client commands at a time", age_s = *age_ms as f64 / 1000.0)]
+    #[error("{holder} has held the lease of this arm for {age_s:.0} s: only one client can hold it at a time", age_s = *age_ms as f64 / 1000.0)]
     Held {
         /// Name of the holder.
         holder: String,
@@ -35,7 +35,7 @@ pub enum Denied {
         age_ms: u64,
     },
     /// Another client already waits for the lease.
-    #[error("{by} has asked for the lease of {holder} before, and waits for it: one waits at a time")]
+    #[error("{by} already waits for the lease of {holder}: only one client can wait for it")]
     Awaited {
         /// Name of the holder.
         holder: String,
@@ -43,30 +43,31 @@ pub enum Denied {
         by: String,
     },
     /// The client may only read and stop.
-    #[error("this client was let in to look and to stop, not to command")]
+    #[error("this client can only read and stop: commands need the operator's token")]
     Viewer,
     /// The arm was stopped or paused after the request, or by another client shortly before it (hold-off).
     #[error(
-        "{by} has stopped the arm: what was asked for before is not done, and nothing that moves it for three seconds"
+        "{by} has stopped the arm: earlier requests were discarded, and motion requests are refused for 3 s"
     )]
     Stopped {
         /// Name of the client that stopped or paused the arm.
         by: String,
     },
     /// The client was disconnected.
-    #[error("this client is on the line no more: it was put out, or has gone")]
+    #[error("this client has lost its connection: the agent or the client ended it")]
     Gone,
     /// The controller supervises its host, and the lease holder is silent. Questions of other clients would hide the
     /// silence from the controller (J-59).
     #[error(
-        "nothing is received from {who}, and the controller pauses the motion when its host is silent: questions of others wait until the arm stands"
+        "{who} is silent: the agent sends no queries of other clients until the arm is at rest, so that the \
+         controller can pause the motion"
     )]
     Unattended {
         /// Name of the present or last lease holder.
         who: String,
     },
     /// The client does not hold the lease.
-    #[error("this client does not command the arm: it has no lease to give or to renew")]
+    #[error("this client does not hold the lease of the arm: it cannot release or renew the lease")]
     NotHolder,
 }
 

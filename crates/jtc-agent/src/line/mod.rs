@@ -387,7 +387,7 @@ impl SharedLine {
 
     /// Stops the arm because the agent ends. Prevents the motions that clients still prepare.
     pub fn end(&mut self, now: Duration) {
-        self.halt(OWNER, "the end of the agent", ExecCommand::Stop, now);
+        self.halt(OWNER, "the agent, which ended", ExecCommand::Stop, now);
         self.motion_tracker.end_teaching(now);
     }
 
@@ -472,8 +472,8 @@ impl SharedLine {
     fn name(&self, client: ClientId) -> String {
         match self.introduction(client) {
             Some(client) => client.name.clone(),
-            None if client == OWNER => "the owner of the line".to_owned(),
-            None => "a client that has gone".to_owned(),
+            None if client == OWNER => "the agent".to_owned(),
+            None => "a disconnected client".to_owned(),
         }
     }
 }

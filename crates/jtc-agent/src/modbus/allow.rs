@@ -12,7 +12,7 @@ pub struct Network {
 
 /// Text that is neither an address nor a network.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is neither an address nor a network: 192.168.0.10, 192.168.0.0/24 and fd00::/8 are")]
+#[error("not a valid address or network: {0}, expected for example 192.168.0.10, 192.168.0.0/24 or fd00::/8")]
 pub struct NoNetwork(String);
 
 impl Network {

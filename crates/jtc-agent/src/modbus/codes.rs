@@ -47,9 +47,9 @@ numbered! {
         /// Teaching off.
         TeachOff = 6, "end Teaching";
         /// Pump on.
-        GripperOn = 7, "gripper: pump on";
+        GripperOn = 7, "switch the pump of the gripper on";
         /// Pump off.
-        GripperOff = 8, "gripper: pump off";
+        GripperOff = 8, "switch the pump of the gripper off";
         /// Clear.
         Clear = 9, "clear the errors of the controller and of all drives";
         /// Recover.
@@ -75,9 +75,9 @@ numbered! {
         /// Done.
         Done = 1, "done; a job has begun";
         /// Wrong sequence number.
-        Sequence = 2, "`sequence` is neither `acknowledged` nor one more: nothing was done";
+        Sequence = 2, "`sequence` is neither `acknowledged` nor `acknowledged` + 1: nothing was done";
         /// Impossible value.
-        Value = 3, "a value is not possible for this command, or the watchdog is off: nothing was done";
+        Value = 3, "a value is invalid for this command, or the watchdog is off: nothing was done";
         /// Unknown trajectory.
         NoTrajectory = 4, "no trajectory has this number: nothing was done";
         /// Busy.

@@ -236,7 +236,7 @@ pub const INPUTS: &[Input] = &[
     })),
     one(20, Form::U16, "job_error", "error that stopped or failed the job (table of errors); 0: none",
         |v, _| v.job(|j| j.error.as_ref().map_or(0, |e| error_number(e.code).into()))),
-    one(21, Form::U16, "job_error_joint", "joint of that error, 1 to 6 from the base; 0: none",
+    one(21, Form::U16, "job_error_joint", "joint of the error, 1 to 6 from the base; 0: none",
         |v, _| v.job(|j| j.error.as_ref().and_then(|e| e.facts.joint).unwrap_or(0).into())),
     one(22, Form::U32, "job_error_point", "point of that error, as in the text of the error; 4294967295: none",
         |v, _| v.job.as_ref().and_then(|j| j.error.as_ref()).and_then(|e| e.facts.point).unwrap_or(UNKNOWN_LONG)),

@@ -117,11 +117,11 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
         };
         // The drop of the stream closes the connection at once.
         if !allowed.contains(peer.ip()) {
-            plc.refused(peer, "this address may not connect: --modbus-allow names those that may");
+            plc.refused(peer, "this address is not allowed: --modbus-allow lists the allowed addresses");
             continue;
         }
         if !make_room(&connections, plc, start) {
-            plc.refused(peer, "too many connections of PLCs");
+            plc.refused(peer, "too many PLC connections");
             continue;
         }
         last += 1;

@@ -217,7 +217,7 @@ impl Writer {
             Ok(open) => {
                 if self.failed.take().is_some() {
                     let file = open.begun.path.clone();
-                    let words = format!("recordings are written again, into {}", file.display());
+                    let words = format!("the agent records again, to {}", file.display());
                     self.notice("recording-again", json!({ "file": file }), Some(words));
                 }
                 self.open = Some(open);
@@ -231,7 +231,7 @@ impl Writer {
         let file = self.break_off();
         if self.failed.replace(Instant::now()).is_none() {
             let words = format!(
-                "{error}; nothing is recorded until the disk takes it again, commands are taken all the same"
+                "{error}; the agent records nothing until the disk accepts data again; commands still work"
             );
             self.notice("recording-stopped", json!({ "file": file, "why": error }), Some(words));
         }
@@ -258,7 +258,7 @@ impl Writer {
         if bytes > self.retention.longest() {
             let ending = Ending {
                 outcome: "continued".into(),
-                reason: "the next recording goes on with this motion".into(),
+                reason: "the next recording continues this motion".into(),
                 ..Ending::default()
             };
             self.complete(&ending);
@@ -292,7 +292,7 @@ impl Writer {
                     "reason": ending.reason, "lost_samples": ending.lost_samples,
                 });
                 let words = format!(
-                    "{}: {} samples are missing, which the disk did not take in time",
+                    "{}: {} samples are missing, because the disk was too slow",
                     file.display(),
                     ending.lost_samples
                 );

@@ -255,7 +255,7 @@ impl Following {
             self.follow(steps, &mut session);
             self.resolve_doubt(&mut session);
         }
-        let steps = self.follower.end("stopped", "the agent was ended");
+        let steps = self.follower.end("stopped", "the agent has ended");
         self.follow(steps, &mut session);
     }
 

@@ -129,7 +129,7 @@ impl Follower {
         if !silent {
             return Vec::new();
         }
-        self.end("fault", &format!("no status came for {} s", SILENT.as_secs()))
+        self.end("fault", &format!("no status received for {} s", SILENT.as_secs()))
     }
 
     /// Ends the recording with the given reason, because no more statuses will be taken.
@@ -198,7 +198,7 @@ fn ending(motion: Motion, status: &Status) -> Ending {
         _ if fault => ("fault", labels::errors_line(status)),
         (Motion::Jog | Motion::Teaching, _) => ("finished", String::new()),
         (_, Some(TrajectoryState::Finish)) => ("finished", String::new()),
-        (_, Some(TrajectoryState::Null)) => ("fault", "the controller has no trajectory any more".to_owned()),
+        (_, Some(TrajectoryState::Null)) => ("fault", "the controller no longer has a trajectory".to_owned()),
         _ => ("stopped", String::new()),
     };
     Ending { outcome: outcome.into(), reason, ..Ending::default() }
@@ -312,7 +312,7 @@ mod tests {
         assert_eq!(seen.iter().filter(|s| *s == "begin execution").count(), 5);
         let ended: Vec<&str> = seen.iter().filter(|s| !s.starts_with("begin")).map(String::as_str).collect();
         assert_eq!(ended[..2], ["finished", "stopped"]);
-        assert_eq!(ended[2], "fault the controller has no trajectory any more");
+        assert_eq!(ended[2], "fault the controller no longer has a trajectory");
         assert!(ended[4].starts_with("fault ") && ended[4].contains("CAN"), "{ended:?}");
     }
 
@@ -384,11 +384,11 @@ mod tests {
         arm.now += Duration::from_millis(2_100);
         let steps = arm.follower.silence(arm.now);
         arm.note(steps);
-        assert_eq!(arm.take(), ["begin execution", "fault no status came for 2 s"]);
+        assert_eq!(arm.take(), ["begin execution", "fault no status received for 2 s"]);
         assert!(arm.follower.silence(arm.now).is_empty());
         arm.run_ms(1_000);
-        let steps = arm.follower.end("stopped", "the agent was ended");
+        let steps = arm.follower.end("stopped", "the agent has ended");
         arm.note(steps);
-        assert_eq!(arm.take(), ["begin execution", "stopped the agent was ended"]);
+        assert_eq!(arm.take(), ["begin execution", "stopped the agent has ended"]);
     }
 }

@@ -67,9 +67,10 @@ impl Retention {
         let path = dir.join(LIST);
         let mut list = OpenOptions::new().read(true).append(true).create(true).open(path)?;
         list.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => {
-                io::Error::new(io::ErrorKind::WouldBlock, "another agent records into this directory")
-            }
+            TryLockError::WouldBlock => io::Error::new(
+                io::ErrorKind::WouldBlock,
+                "another agent uses this directory for its recordings",
+            ),
             TryLockError::Error(error) => error,
         })?;
         let mut text = Vec::new();

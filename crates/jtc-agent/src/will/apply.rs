@@ -67,18 +67,20 @@ fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> boo
 /// command.
 fn in_words(applied: Applied, reports: bool, taken: bool) -> String {
     let sent = match applied {
-        Applied::Rests => return "nothing moves any more".into(),
-        Applied::GoesOn if !reports => return "nothing is received from the controller".into(),
-        Applied::GoesOn => return "it goes on".into(),
-        Applied::Paused => return "it stays paused".into(),
+        Applied::Rests => return "the arm no longer moves".into(),
+        Applied::GoesOn if !reports => return "the controller is silent".into(),
+        Applied::GoesOn => return "the motion continues".into(),
+        Applied::Paused => return "the motion stays paused".into(),
         Applied::Sent(ExecCommand::Pause) => "a Pause",
         Applied::Sent(_) => "a Stop",
     };
     match (reports, taken) {
-        (true, true) => format!("{sent} was sent, and the controller has taken it"),
-        (true, false) => format!("{sent} was sent, and is sent until the controller has taken it"),
+        (true, true) => format!("{sent} was sent, and the controller confirmed it"),
+        (true, false) => {
+            format!("{sent} was sent, and the agent repeats it until the controller confirms it")
+        }
         (false, _) => {
-            format!("nothing is received from the controller: {sent} is sent until it has taken it")
+            format!("the controller is silent: the agent repeats {sent} until the controller confirms it")
         }
     }
 }
@@ -88,7 +90,7 @@ fn notice(found: &Found, moves: bool, done: &str) -> Notice {
         Found::Left(Stored { client, policy, what, since_unix_s, .. }) => Notice {
             what: "policy-found",
             warning: Some(format!(
-                "the agent before ended in {} of {client}, policy {}: {done}",
+                "the previous agent ended during {} of {client}, policy {}: {done}",
                 what.text(),
                 policy.name()
             )),
@@ -101,7 +103,8 @@ fn notice(found: &Found, moves: bool, done: &str) -> Notice {
             Notice {
                 what: "policy-in-doubt",
                 warning: Some(format!(
-                    "what the agent before has left cannot be read ({why}), and in doubt the arm is stopped: {done}"
+                    "the policy file of the previous agent cannot be used ({why}), so the agent stops the \
+                     arm: {done}"
                 )),
                 facts: json!({ "why": why, "moves": moves, "done": done }),
             }

@@ -59,10 +59,10 @@ pub(super) fn read(path: &Path, port: &str) -> Found {
         Ok(metadata) => metadata,
     };
     if !metadata.is_file() || metadata.len() > LEN_MAX {
-        return Found::Doubtful("it is no such file".into());
+        return Found::Doubtful("it is not a regular file, or it is too large".into());
     }
     if is_open(&metadata) || path.parent().is_some_and(|folder| is_others(folder, &metadata)) {
-        return Found::Doubtful("other users can write it".into());
+        return Found::Doubtful("other users can write to it".into());
     }
     let text = match fs::read(path) {
         Err(error) => return Found::Doubtful(error.to_string()),
@@ -71,9 +71,9 @@ pub(super) fn read(path: &Path, port: &str) -> Found {
     match serde_json::from_slice::<Stored>(&text) {
         Err(error) => Found::Doubtful(format!("it is damaged: {error}")),
         Ok(stored) if stored.version != VERSION => {
-            Found::Doubtful(format!("it has version {}, and this agent knows {VERSION}", stored.version))
+            Found::Doubtful(format!("it has version {}, expected {VERSION}", stored.version))
         }
-        Ok(stored) if stored.port != port => Found::Doubtful("it is that of another port".into()),
+        Ok(stored) if stored.port != port => Found::Doubtful("it belongs to another port".into()),
         Ok(stored) => {
             let client = stored.client.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect();
             Found::Left(Stored { client, ..stored })
@@ -233,7 +233,7 @@ mod tests {
             doubtful(why);
         }
         fs::write(&path, " ".repeat(1 << 20)).expect("a file");
-        doubtful("no such file");
+        doubtful("not a regular file");
         fs::write(&path, good.replace("anna", "an\\u001b[31mna")).expect("a file");
         assert!(matches!(read(&path, PORT), Found::Left(stored) if stored.client == "an[31mna: jtc traj"));
         #[cfg(unix)]
@@ -243,10 +243,10 @@ mod tests {
             doubtful("other users");
             remove(&path).expect("it is there");
             std::os::unix::fs::symlink(dir.path().join("elsewhere"), &path).expect("a link");
-            doubtful("no such file");
+            doubtful("not a regular file");
             remove(&path).expect("it is there");
         }
         fs::create_dir(&path).expect("a directory");
-        doubtful("no such file");
+        doubtful("not a regular file");
     }
 }

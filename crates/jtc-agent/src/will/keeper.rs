@@ -194,7 +194,8 @@ impl Writer {
                 what: "policy-not-kept",
                 facts: json!({ "file": path, "why": error.to_string() }),
                 warning: Some(format!(
-                    "{path}: {error}; motions are begun all the same, and if this agent is killed the next one may not know whose policy is to act on them"
+                    "{path}: {error}; motions still start, but if this agent is killed, the next agent may \
+                     not know the policy of the client"
                 )),
             }),
             Ok(()) if self.fails => {
@@ -280,7 +281,10 @@ mod tests {
         std::fs::write(&folder, "no folder").expect("a file");
         let (keeper, _, notices) = begin(&folder);
         let first = notices.recv().expect("a notice");
-        assert!(first.what == "policy-not-kept" && first.warning.is_some_and(|w| w.contains("all the same")));
+        assert!(
+            first.what == "policy-not-kept"
+                && first.warning.is_some_and(|w| w.contains("motions still start"))
+        );
         keeper.settle(None, None);
         let witness = keeper.witness();
         for policy in [Policy::Pause, Policy::Stop, Policy::Pause] {

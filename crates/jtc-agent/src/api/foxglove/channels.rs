@@ -11,15 +11,15 @@ const STATUS_SCHEMA: &str = r#"{
   "type": "object",
   "properties": {
     "state": { "type": "string", "description": "State of the controller" },
-    "trajectory": { "type": "string", "description": "What becomes of the trajectory" },
-    "point": { "type": "integer", "description": "The 1 ms point that the controller is at" },
-    "errors": { "type": "array", "items": { "type": "string" }, "description": "Errors now" },
-    "held_stop": { "type": "string", "description": "Cause of the held stop that the arm is in; empty where there is none" },
-    "errors_occurred": { "type": "array", "items": { "type": "string" }, "description": "Errors since they were cleared" },
-    "next": { "type": "string", "description": "What helps; empty where nothing is wrong" },
-    "age_ms": { "type": "integer", "description": "Time since the controller reported that" },
-    "commanded_by": { "type": "string", "description": "Who commands; empty: nobody" },
-    "simulated": { "type": "boolean", "description": "No arm moves" }
+    "trajectory": { "type": "string", "description": "State of the trajectory" },
+    "point": { "type": "integer", "description": "Current 1 ms point of the trajectory" },
+    "errors": { "type": "array", "items": { "type": "string" }, "description": "Current errors" },
+    "held_stop": { "type": "string", "description": "Cause of the held stop; empty: no held stop" },
+    "errors_occurred": { "type": "array", "items": { "type": "string" }, "description": "Errors since the last clear" },
+    "next": { "type": "string", "description": "Remedy; empty: no problem" },
+    "age_ms": { "type": "integer", "description": "Age of the status" },
+    "commanded_by": { "type": "string", "description": "Lease holder; empty: none" },
+    "simulated": { "type": "boolean", "description": "`true`: the controller is simulated" }
   }
 }"#;
 
@@ -81,11 +81,12 @@ impl Subscriptions {
     /// Adds a subscription. The error is a message for the user.
     pub fn add(&mut self, Subscription { id, channel_id: channel }: &Subscription) -> Result<(), String> {
         if topic(*channel).is_none() && *channel != STATUS {
-            return Err(format!("subscription {id} is not taken: there is no channel {channel}"));
+            return Err(format!("subscription {id} refused: channel {channel} does not exist"));
         }
         if self.0.contains_key(id) || self.0.values().any(|other| other.channel == *channel) {
             return Err(format!(
-                "subscription {id} is not taken: it exists, or another one of channel {channel}"
+                "subscription {id} refused: it already exists, or channel {channel} already has a \
+                subscription"
             ));
         }
         self.0.insert(

@@ -71,8 +71,8 @@ pub(super) async fn foxglove(
     upgrade: WebSocketUpgrade,
 ) -> Response {
     if !is_asked(&headers) {
-        let message = format!("this socket speaks {}", NAMES.join(" and "));
-        let next = "ask for one of them in Sec-WebSocket-Protocol; /api/stream needs none";
+        let message = format!("subprotocol missing: this socket accepts {}", NAMES.join(" and "));
+        let next = "send one of them in Sec-WebSocket-Protocol, or use /api/stream, which needs none";
         return Problem::new("request", message, next).unreadable().into_response();
     }
     let sockets = agent.sockets.clone();
@@ -160,25 +160,25 @@ fn ask(shared: &Shared, text: &str) -> bool {
             true
         }
         Ok(FromClient::Other) => {
-            shared.warn("not done: this server has announced nothing of that kind".to_owned())
+            shared.warn("request ignored: this server does not offer that operation".to_owned())
         }
-        Err(error) => shared.warn(format!("not understood: {error}")),
+        Err(error) => shared.warn(format!("message not understood: {error}")),
     }
 }
 
 /// Handles a binary message: Stop and Pause, if the client may send them.
 fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
     let Some(call) = Call::parse(bytes) else {
-        return shared.warn("not done: this server takes no messages on channels".to_owned());
+        return shared.warn("message ignored: this server accepts no messages on channels".to_owned());
     };
     let command = match call.service {
         STOP => Ok(ExecCommand::Stop),
         PAUSE => Ok(ExecCommand::Pause),
-        other => Err(format!("there is no service {other}")),
+        other => Err(format!("service {other} does not exist")),
     };
     let done = command.and_then(|command| {
         if caller.looks_only {
-            return Err("pages of this origin may only look".to_owned());
+            return Err("pages of this origin have read-only access".to_owned());
         }
         agent.halt(&caller.clone().into(), command).map_err(|error| error.message.clone())
     });
@@ -225,7 +225,7 @@ impl Sender<'_> {
         loop {
             self.answer(&mut writer).await?;
             if let Some(why) = self.agent.line.lost() {
-                let message = format!("the port is gone: {why}");
+                let message = format!("the port is lost: {why}");
                 return self.text(&ToClient::Status { level: 2, message }).await;
             }
             let due = async {

@@ -20,7 +20,7 @@ pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyAr
         Ok(array.cast_into::<PyArrayDyn<f64>>()?)
     };
     made().map(|array| array.readonly()).map_err(|error| {
-        Failure::usage(format!("{what}: is no array of numbers: {error}"))
+        Failure::usage(format!("{what}: not an array of numbers: {error}"))
             .next("pass six numbers, or rows of six")
     })
 }
@@ -30,8 +30,8 @@ pub fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Fai
     let array = floats(value, what)?;
     let numbers = array.as_slice().ok().and_then(|all| <[f64; JOINTS]>::try_from(all).ok());
     let numbers = numbers.filter(|_| array.ndim() == 1).ok_or_else(|| {
-        Failure::usage(format!("{what}: has the shape {:?}, not (6,)", array.shape()))
-            .next("pass one number a joint, base to wrist")
+        Failure::usage(format!("{what}: shape {:?}, expected (6,)", array.shape()))
+            .next("pass one number per joint, base to wrist")
     })?;
     finite(&[numbers], what)?;
     Ok(numbers)
@@ -43,8 +43,8 @@ pub fn rows(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<[f64; JOINTS]>,
     let shape = array.shape().to_vec();
     let one = shape == [JOINTS];
     if !one && (shape.len() != 2 || shape[1] != JOINTS) {
-        return Err(Failure::usage(format!("{what}: has the shape {shape:?}, not (6,) or (N, 6)"))
-            .next("pass one number a joint, base to wrist, in each row"));
+        return Err(Failure::usage(format!("{what}: shape {shape:?}, expected (6,) or (N, 6)"))
+            .next("pass one number per joint, base to wrist, in each row"));
     }
     let numbers = array.as_slice().map_err(|e| Failure::usage(format!("{what}: {e}")))?;
     let rows: Vec<[f64; JOINTS]> = numbers.as_chunks::<JOINTS>().0.to_vec();
@@ -56,7 +56,8 @@ fn finite(rows: &[[f64; JOINTS]], what: &str) -> Result<(), Failure> {
     for (number, row) in rows.iter().enumerate() {
         if let Some(joint) = row.iter().position(|value| !value.is_finite()) {
             let place = if rows.len() > 1 { format!("row {number}, ") } else { String::new() };
-            let failure = Failure::usage(format!("{what}: {place}joint {} is {}", joint + 1, row[joint]));
+            let failure =
+                Failure::usage(format!("{what}: {place}joint {} is not finite: {}", joint + 1, row[joint]));
             let facts = Facts {
                 joint: Joint::from_index(joint).map(Joint::number),
                 value: Some(row[joint]),

@@ -173,10 +173,10 @@ impl Dynamics {
     ) -> Result<Bound<'py, PyAny>, Failure> {
         let (poses, one) = poses(pose)?;
         let [pose] = poses[..] else {
-            return Err(Failure::usage(format!("pose: {} poses, this is for one", poses.len())));
+            return Err(Failure::usage(format!("pose: {} poses, expected one", poses.len())));
         };
         if !one {
-            return Err(Failure::usage("pose: has the shape [1, 4, 4], not (4, 4)"));
+            return Err(Failure::usage("pose: shape [1, 4, 4], expected (4, 4)"));
         }
         let all = py.detach(|| self.kinematics.all(&pose));
         Ok(array::matrix(py, &all).into_any())
@@ -190,7 +190,7 @@ impl Dynamics {
         temperature: &Bound<'py, PyAny>,
     ) -> Result<Bound<'py, PyAny>, Failure> {
         let model = self.arm.friction().ok_or_else(|| {
-            let what = format!("the arm {:?} has no friction: its file gives none", self.arm.name);
+            let what = format!("the file of the arm {:?} gives no friction", self.arm.name);
             Failure::usage(what)
                 .next("add friction_polynomial to the joints of the arm file (`jtc help files`)")
         })?;
@@ -207,7 +207,7 @@ impl Dynamics {
             if let Some(joint) = found.iter().position(Option::is_none) {
                 let v = pick(&states.columns[0], row)[joint];
                 let message =
-                    format!("qd: row {row}: {v} rad/s is beyond the friction table of joint {}", joint + 1);
+                    format!("qd: row {row}: {v} rad/s is outside the friction table of joint {}", joint + 1);
                 return Err(Failure::usage(message));
             }
         }
@@ -264,7 +264,8 @@ fn common<const K: usize>(shapes: [(&'static str, usize, bool); K]) -> Result<us
     match shapes.iter().find(|(_, rows, one)| !one && *rows != count) {
         None => Ok(count),
         Some((other, rows, _)) => Err(Failure::usage(format!(
-            "{first} has {count} rows and {other} has {rows}: one row a state, or one row for all as shape (6,)"
+            "{first} has {count} rows, but {other} has {rows}: pass the same number of rows, or one row of \
+             shape (6,) for all states"
         ))),
     }
 }
@@ -297,7 +298,7 @@ fn poses(value: &Bound<'_, PyAny>) -> Result<(Vec<Pose>, bool), Failure> {
     let shape = array.shape().to_vec();
     let one = shape == [4, 4];
     if !one && (shape.len() != 3 || shape[1..] != [4, 4]) {
-        return Err(Failure::usage(format!("pose: has the shape {shape:?}, not (4, 4) or (N, 4, 4)"))
+        return Err(Failure::usage(format!("pose: shape {shape:?}, expected (4, 4) or (N, 4, 4)"))
             .next("pass homogeneous matrices: rotation, and translation (m) in the last column"));
     }
     let numbers = array.as_slice().map_err(|e| Failure::usage(format!("pose: {e}")))?;
@@ -305,7 +306,7 @@ fn poses(value: &Bound<'_, PyAny>) -> Result<(Vec<Pose>, bool), Failure> {
     let (matrices, _) = rows.as_chunks::<4>();
     let pose = |m: &[[f64; 4]; 4]| {
         if m[3] != [0.0, 0.0, 0.0, 1.0] {
-            return Err(Failure::usage(format!("pose: its last row is {:?}, not 0 0 0 1", m[3])));
+            return Err(Failure::usage(format!("pose: last row {:?}, expected 0 0 0 1", m[3])));
         }
         Ok(Pose {
             rotation: std::array::from_fn(|i| [m[i][0], m[i][1], m[i][2]]),

@@ -58,7 +58,7 @@ impl FlightLog {
         };
         let file = options.open(&path).map_err(|error| {
             Failure::usage(format!("{}: {error}", path.display()))
-                .next("name another file, or pass overwrite=True")
+                .next("choose another file, or pass overwrite=True")
         })?;
         py.detach(|| self.account.write(file, &path)).map_err(|error| Failure::of(&error))
     }

@@ -16,8 +16,9 @@ pub fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) ->
     let (low, high) = range.into_inner();
     let limit = if value < low { low } else { high };
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    let failure =
-        Failure::usage(format!("{what}: {value}{unit} is outside {low}..{high}{unit}; nothing was sent"));
+    let failure = Failure::usage(format!(
+        "{what}: {value}{unit} is out of range ({low} to {high}{unit}); nothing was sent"
+    ));
     Err(failure.with(Facts::beyond(value, limit)))
 }
 

@@ -135,7 +135,9 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     if value.is_finite() && value >= 0.0 {
         return Ok(value);
     }
-    Err(Failure::usage(format!("{what}: {value} is no distance")))
+    Err(Failure::usage(format!(
+        "{what}: {value} is not a valid distance, expected a finite number of at least 0"
+    )))
 }
 
 /// Returns the torque margin of the call (%), or the default.
@@ -206,7 +208,10 @@ impl Planner {
         let times = times.unwrap_or_else(|| vec![f64::NAN; positions.len()]);
         if times.len() != positions.len() {
             let (count, given) = (positions.len(), times.len());
-            return Err(Failure::usage(format!("{count} waypoints and {given} times: each has one")).into());
+            return Err(Failure::usage(format!(
+                "{count} waypoints, but {given} times: pass one time per waypoint"
+            ))
+            .into());
         }
         let waypoints: Vec<Waypoint> = positions
             .into_iter()
@@ -265,8 +270,8 @@ fn example_text(name: &str) -> Result<String, Failure> {
     let all = &jtc_host::example::EXAMPLES;
     all.iter().find(|example| example.name == name).map(|example| example.text()).ok_or_else(|| {
         let names: Vec<_> = all.iter().map(|example| example.name).collect();
-        Failure::usage(format!("there is no example {name:?}"))
-            .next(format!("there are {}", names.join(", ")))
+        Failure::usage(format!("example {name:?} does not exist"))
+            .next(format!("the examples are {}", names.join(", ")))
     })
 }
 
@@ -279,8 +284,8 @@ fn thinned<'py>(
     tolerance: f64,
 ) -> Result<Bound<'py, numpy::PyArray2<f64>>, Failure> {
     if !(1e-6..=1.0).contains(&tolerance) {
-        return Err(Failure::usage(format!("a tolerance of {tolerance} rad is outside 0.000001..1"))
-            .next("0.01 rad is half a degree"));
+        return Err(Failure::usage(format!("tolerance {tolerance} rad is out of range (0.000001 to 1 rad)"))
+            .next("choose a tolerance in this range; 0.01 rad is about half a degree"));
     }
     let (rows, _) = array::rows(positions, "positions")?;
     let kept = py.detach(|| jtc_host::waypoints::thinned(&rows, tolerance));

@@ -50,7 +50,7 @@ impl Plant {
             if !(*low..=*high).contains(q) {
                 let joint = joint + 1;
                 let what = format!(
-                    "position: joint {joint} at {q} rad is not between its stops at {low} and {high} rad"
+                    "position: joint {joint} at {q} rad is outside its end stops ({low} to {high} rad)"
                 );
                 return Err(Failure::usage(what));
             }

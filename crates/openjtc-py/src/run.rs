@@ -146,8 +146,8 @@ impl Samples {
     #[pyo3(signature = (path, overwrite=false))]
     fn write(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
         if path.exists() && !overwrite {
-            return Err(Failure::usage(format!("{}: the file exists", path.display()))
-                .next("name another file, or pass overwrite=True"));
+            return Err(Failure::usage(format!("{}: the file already exists", path.display()))
+                .next("choose another file, or pass overwrite=True"));
         }
         py.detach(|| write_all(&path, &self.info, &self.samples)).map_err(|error| Failure::of(&error))?;
         Ok(())

@@ -43,11 +43,13 @@ impl SimulatedArm<'_> {
         if let Some((mass, friction, mass_factors, friction_factors)) = self.model_error {
             // With a share above 1, random masses could be negative.
             if let Some(bad) = [mass, friction].iter().find(|share| !(0.0..=1.0).contains(*share)) {
-                return Err(Failure::usage(format!("model_error: a share of {bad} is not within 0..1")));
+                return Err(Failure::usage(format!(
+                    "model_error: relative error {bad} is out of range (0 to 1)"
+                )));
             }
             let mut factors = mass_factors.iter().flatten().chain(friction_factors.iter().flatten());
             if let Some(bad) = factors.find(|factor| !(0.0..=10.0).contains(*factor)) {
-                return Err(Failure::usage(format!("model_error: a factor of {bad} is not within 0..10")));
+                return Err(Failure::usage(format!("model_error: factor {bad} is out of range (0 to 10)")));
             }
             config.model_error = ModelError { mass, friction, mass_factors, friction_factors };
         }
@@ -56,7 +58,7 @@ impl SimulatedArm<'_> {
                 if !(*low..=*high).contains(q) {
                     let joint = joint + 1;
                     let what = format!(
-                        "start: joint {joint} at {q} rad is not between its stops at {low} and {high} rad"
+                        "start: joint {joint} at {q} rad is outside its end stops ({low} to {high} rad)"
                     );
                     return Err(Failure::usage(what));
                 }
@@ -110,7 +112,7 @@ pub fn support(name: &str) -> Result<Support, Failure> {
         "stand" => Support::Stand,
         "none" => Support::None,
         other => {
-            let what = format!("support: {other:?} is none of \"brakes\", \"stand\" and \"none\"");
+            let what = format!("support: {other:?} is not valid, expected \"brakes\", \"stand\" or \"none\"");
             return Err(Failure::usage(what));
         }
     })
@@ -130,6 +132,8 @@ pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
 /// Makes the path of a hand that leads the arm.
 pub fn hand(points: Vec<[f64; JOINTS]>, step_s: f64) -> Result<HandPath, Failure> {
     HandPath::new(points, step_s).ok_or_else(|| {
-        Failure::usage(format!("hand: it needs points, and a step above 0 s; step_s is {step_s}"))
+        Failure::usage(format!(
+            "hand: expected at least one point and a step above 0 s; the step is {step_s} s"
+        ))
     })
 }

@@ -36,7 +36,9 @@ impl Simulator {
         watch: bool,
     ) -> Result<Self, Failure> {
         if baud.is_some_and(|baud| baud < 300) {
-            return Err(Failure::usage("baud: the slowest line has 300 Bd; None: bytes take no time"));
+            return Err(Failure::usage(
+                "baud is out of range: expected at least 300 Bd, or None for a line without delay",
+            ));
         }
         let plan = faults.map(self::faults).transpose()?.unwrap_or_default();
         let config = SimConfig {
@@ -165,7 +167,7 @@ pub fn truth<'py>(py: Python<'py>, truth: &Truth, what: &str) -> Result<Bound<'p
         "torque" => &truth.torque,
         "outside" => &truth.outside,
         "temperature" => &truth.temperature,
-        other => return Err(Failure::usage(format!("the true arm has no {other:?}"))),
+        other => return Err(Failure::usage(format!("the simulated arm has no value {other:?}"))),
     };
     Ok(PyArray1::from_slice(py, values))
 }

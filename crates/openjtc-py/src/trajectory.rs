@@ -63,7 +63,7 @@ impl Trajectory {
         let count = position.len();
         if velocity.len() != count || acceleration.len() != count {
             return Err(Failure::usage(format!(
-                "{count} positions, {} velocities and {} accelerations: a point has one of each",
+                "{count} positions, {} velocities and {} accelerations: expected the same number of each",
                 velocity.len(),
                 acceleration.len()
             )));

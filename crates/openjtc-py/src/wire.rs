@@ -45,7 +45,7 @@ fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes
         "default gains" => Command::PidParamUseDefault,
         "default model" => Command::ArmModelUseDefault,
         "disable" => Command::Disable,
-        other => return Err(Failure::usage(format!("there is no command {other:?}"))),
+        other => return Err(Failure::usage(format!("command {other:?} does not exist"))),
     };
     Ok(PyBytes::new(py, &emitted(&command)?))
 }
@@ -78,15 +78,15 @@ fn encode_trajectory<'py>(
     points_a_frame: usize,
 ) -> Result<Vec<Bound<'py, PyBytes>>, Failure> {
     if !(1..=SEGMENT_POINTS_MAX).contains(&points_a_frame) {
-        let message = format!("points_a_frame: {points_a_frame} is not within 1..{SEGMENT_POINTS_MAX}");
+        let message = format!("points_a_frame: {points_a_frame} is out of range (1 to {SEGMENT_POINTS_MAX})");
         return Err(Failure::usage(message));
     }
     let points = trajectory.inner.raw().map_err(|error| Failure::usage(error.to_string()))?;
     let segments: Vec<_> = points.chunks(points_a_frame).collect();
     let count = |n: usize| {
         u16::try_from(n).ok().filter(|n| usize::from(*n) <= SEGMENTS_MAX).ok_or_else(|| {
-            Failure::usage(format!("{n} frames: a trajectory has {SEGMENTS_MAX} at most"))
-                .next("pass more points_a_frame")
+            Failure::usage(format!("too many frames: {n}, a trajectory has at most {SEGMENTS_MAX}"))
+                .next("pass a larger points_a_frame")
         })
     };
     let all = count(segments.len())?;
@@ -191,7 +191,7 @@ fn node(node: u8, below: usize) -> Result<u8, Failure> {
     if usize::from(node) < below {
         return Ok(node);
     }
-    Err(Failure::usage(format!("node: {node} is not within 0..{}", below - 1)))
+    Err(Failure::usage(format!("node: {node} is out of range (0 to {})", below - 1)))
 }
 
 /// Makes a joint's answer to a move.

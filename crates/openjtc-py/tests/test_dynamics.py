@@ -125,11 +125,11 @@ def test_one_state_and_many_mix(arm):
 def test_wrong_arguments_are_explained(arm):
     dynamics = Dynamics(arm)
     zeros = np.zeros(6)
-    with pytest.raises(UsageError, match=re.escape("q: has the shape [5], not (6,) or (N, 6)")):
+    with pytest.raises(UsageError, match=re.escape("q: shape [5], expected (6,) or (N, 6)")):
         dynamics.inverse(zeros[:5], zeros, zeros)
-    with pytest.raises(UsageError, match="q has 3 rows and qdd has 2"):
+    with pytest.raises(UsageError, match="q has 3 rows, but qdd has 2"):
         dynamics.inverse(np.zeros((3, 6)), zeros, np.zeros((2, 6)))
-    with pytest.raises(UsageError, match="qd: joint 4 is NaN"):
+    with pytest.raises(UsageError, match="qd: joint 4 is not finite: NaN"):
         dynamics.inverse(zeros, [0, 0, 0, np.nan, 0, 0], zeros)
     with pytest.raises(UsageError, match="mass is -1 kg"):
         Dynamics(arm, Payload(-1.0))

@@ -477,7 +477,7 @@ def test_settings_info_and_arm_are_those_of_the_controller(robot):
     assert len(settings["position_max_rad"]) == 6
     assert settings["position_max_rad"] == pytest.approx(robot.arm.limits["position_max"].tolist())
     assert robot.info["board"] == "simulator" and robot.info["firmware"] == openjtc.__version__
-    with pytest.raises(openjtc.UsageError, match="no setting"):
+    with pytest.raises(openjtc.UsageError, match="does not exist"):
         robot.set_settings({"no_such": 1.0})
     # Settings can only change while the drives have no torque.
     with pytest.raises(openjtc.Error, match="not allowed"):

@@ -621,7 +621,7 @@ def test_teaching_ends_with_a_stop_an_error_ctrl_c_and_the_connection(live):
         stop.join()
         until(lambda: live.status.state == "HoldPos")
         assert len(teaching.time) > 5
-        with pytest.raises(openjtc.FaultError, match="not taught"):
+        with pytest.raises(openjtc.FaultError, match="teaching has ended"):
             teaching.record(100)
     with pytest.raises(KeyboardInterrupt), live.teach() as teaching:
         press_after(0.5)

@@ -50,7 +50,7 @@ class Connected:
             self.close()
         except Error as second:
             # The error that ended the block is raised. The second error is added as a note, because the arm may be moving.
-            text = f"and at the end of the connection: {second}"
+            text = f"and when the connection was closed: {second}"
             if hasattr(error, "add_note"):
                 error.add_note(text)
             else:
@@ -165,7 +165,7 @@ class Connected:
         for name, value in values.items():
             numbers = np.asarray(value, dtype=float)
             if numbers.shape not in ((), (6,)):
-                raise UsageError(f"{name}: has the shape {numbers.shape}, not () or (6,); nothing was changed", "usage")
+                raise UsageError(f"{name}: shape {numbers.shape}, expected () or (6,); nothing was changed", "usage")
             if numbers.ndim:
                 flat += [(name, joint, float(v)) for joint, v in enumerate(numbers, 1)]
             else:

@@ -104,7 +104,7 @@ def connect(
         arm = Arm.load(Path(arm))
     if target.startswith("sim:"):
         if target != "sim:":
-            raise UsageError(f"{target!r}: a simulator is `sim:`, its options are arguments", "target")
+            raise UsageError(f"{target!r}: not a valid target, expected `sim:`; options of the simulator are arguments", "target")
         numbers = payload._numbers() if payload else None
         return _kept(_native.Link.simulated(arm, seed, speed, faults, numbers))
     who = name or f"{_user()}: Python"

@@ -43,7 +43,7 @@ class Dynamics:
     def __init__(self, arm: Arm, payload: Payload | None = None, gravity: ArrayLike | None = None) -> None:
         vector: Any = None if gravity is None else np.asarray(gravity, dtype=np.float64)
         if vector is not None and vector.shape != (3,):
-            raise UsageError(f"gravity: has the shape {vector.shape}, not (3,)", "usage")
+            raise UsageError(f"gravity: shape {vector.shape}, expected (3,)", "usage")
         self._native = _native.Dynamics(arm, None if payload is None else payload._numbers(), None if vector is None else vector.tolist())
 
     def inverse(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Floats:

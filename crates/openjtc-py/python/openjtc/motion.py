@@ -96,7 +96,7 @@ class Motion:
             FaultError, DeviceError, NoLinkError: The motion ended in an error; ``run`` of the error has the samples until then.
         """
         if not self._is_over(timeout):
-            raise TimeoutError(f"the motion goes on after {timeout} s")
+            raise TimeoutError(f"the motion has not ended after {timeout} s")
         return self._ended(self._stopped or self._robot._stopped_since(self._asked))
 
     def _ended(self, own: bool) -> Run:
@@ -106,9 +106,9 @@ class Motion:
         assert self._run is not None
         if self._run.outcome == "stopped" and not own:
             error = StoppedError(
-                "the motion was stopped on its way, and not by who waits for it",
+                "another client or thread stopped the motion on its path",
                 "stopped",
-                next="find out who stopped it, and why; what is asked for from now on is done",
+                next="find out who stopped the arm and why; new requests are executed",
             )
             error.run = self._run
             raise error
@@ -178,7 +178,7 @@ def options_of(
     if not 1 <= count < 2**32:
         limit = 1 if count < 1 else 2**32 - 1
         raise UsageError(
-            f"repeat: {count} is outside 1..{2**32 - 1}; nothing was sent", "usage", value=float(count), limit=float(limit)
+            f"repeat: {count} is out of range (1 to {2**32 - 1}); nothing was sent", "usage", value=float(count), limit=float(limit)
         )
     return {
         "asked": asked,

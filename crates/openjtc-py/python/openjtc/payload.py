@@ -27,5 +27,5 @@ class Payload:
     def _numbers(self) -> tuple[float, list[float], list[float]]:
         """Returns mass, centre of mass and inertia in the form of the compiled module."""
         if len(self.com) != 3 or len(self.inertia) != 6:
-            raise UsageError("a payload has a centre of mass of 3 numbers and an inertia of 6", "payload")
+            raise UsageError("payload: expected 3 numbers for the centre of mass and 6 for the inertia", "payload")
         return (float(self.mass), [float(x) for x in self.com], [float(x) for x in self.inertia])

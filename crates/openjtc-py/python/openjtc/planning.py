@@ -141,7 +141,7 @@ def joints_of(arm: Arm, place: ArrayLike | str, degrees: bool) -> ArrayLike:
     """Returns joint positions in rad, from numbers or a named pose."""
     if isinstance(place, str):
         if degrees:
-            raise UsageError("a named pose has its unit: leave `degrees` out", "usage")
+            raise UsageError("`degrees` does not apply to a named pose: leave out `degrees`", "usage")
         return arm.pose(place)
     return radians_of(place, degrees)
 

@@ -142,8 +142,8 @@ class Samples:
             with open(path, "w" if overwrite else "x", encoding="utf-8") as file:
                 file.write(self._native.html())
         except FileExistsError as error:
-            next = "name another file, or pass overwrite=True"
-            raise UsageError(f"{path}: the file exists", "file", next=next) from error
+            next = "choose another file, or pass overwrite=True"
+            raise UsageError(f"{path}: the file already exists", "file", next=next) from error
         return path
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:

@@ -82,7 +82,7 @@ class Robot(Connected):
             given = given.trajectory
         if isinstance(given, Trajectory):
             if degrees:
-                raise UsageError("only the numbers of a file can be degrees; these are rad", "usage")
+                raise UsageError("`degrees` applies only to a file; a trajectory object is in rad", "usage")
             return given, "trajectory"
         path = Path(given)
         return Trajectory.load(path, self.arm, degrees), path.stem
@@ -238,7 +238,7 @@ class Robot(Connected):
             StoppedError: The motion was stopped; ``run`` of the error has the samples until then.
         """
         if (to is None) == (flange is None):
-            raise UsageError("give either a place or `flange`; nothing was sent", "target")
+            raise UsageError("give either a target position or `flange`; nothing was sent", "target")
         # The number of Stops is read before any step that takes time, so that a Stop in the meantime cancels the
         # motion.
         asked = self._link.asked()
@@ -314,7 +314,7 @@ class Robot(Connected):
         rate = np.asarray(velocity, dtype=float)
         if joint is not None:
             if rate.ndim != 0 or joint not in range(1, 7):
-                raise UsageError(f"joint {joint}: a joint is 1 to 6, and has one velocity; nothing was sent", "usage")
+                raise UsageError(f"joint {joint}: expected a joint from 1 to 6 and one velocity; nothing was sent", "usage")
             rates = np.zeros(6)
             rates[joint - 1] = rate
             rate = rates

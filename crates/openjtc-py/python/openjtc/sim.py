@@ -53,7 +53,7 @@ def _natural(value: SupportsIndex, what: str) -> int:
     """Returns a whole number within 0 to 2^64-1, else raises `UsageError`."""
     number = operator.index(value)
     if not 0 <= number < 1 << 64:
-        raise UsageError(f"{what}: {number} is not within 0..2^64-1", "usage")
+        raise UsageError(f"{what}: {number} is out of range (0 to 2^64-1)", "usage")
     return number
 
 
@@ -61,7 +61,7 @@ def _floats(value: ArrayLike, count: int, what: str) -> list[float]:
     """Returns `count` numbers as floats, else raises `UsageError`."""
     array = np.asarray(value, dtype=np.float64)
     if array.shape != (count,):
-        raise UsageError(f"{what}: has the shape {array.shape}, not ({count},)", "usage")
+        raise UsageError(f"{what}: shape {array.shape}, expected ({count},)", "usage")
     return [float(number) for number in array]
 
 
@@ -71,7 +71,7 @@ def _plain(value: object) -> object:
         return value.item()
     if isinstance(value, np.ndarray):
         return value.tolist()
-    raise UsageError(f"a fault has no value like {value!r}", "usage", next="`jtc help faults` lists kinds and keys")
+    raise UsageError(f"{value!r} is not a valid value in a fault", "usage", next="`jtc help faults` lists kinds and keys")
 
 
 def _of_joints(value: ArrayLike | None, what: str) -> list[float] | None:
@@ -219,7 +219,7 @@ class Simulator:
     ) -> tuple[tuple[list[Frame], bytes, bool, bool, bool, bool, bool], tuple[Frame | None, bytes, bool]]:
         exchange = self._native.exchange()
         if exchange is None:
-            raise RuntimeError("inputs and outputs are kept with Simulator(watch=True)")
+            raise RuntimeError("inputs and outputs need Simulator(watch=True)")
         return exchange
 
     def write(self, data: bytes) -> None:
@@ -278,7 +278,7 @@ class Simulator:
                 status = self.status
                 causes = ", ".join(status.causes) if status else ""
                 raise FaultError(
-                    f"the controller is in {self.telemetry.state} after {limit} s, not in {state}", "timeout", cause=causes
+                    f"the controller did not reach {state} within {limit} s: it is in {self.telemetry.state}", "timeout", cause=causes
                 )
             self.step()
 

@@ -24,7 +24,7 @@ pub fn stopped(what: &str) -> Failure {
     Failure::fault(
         "stopped",
         format!("{what}: the arm was stopped"),
-        "find out who stopped it, and why; what is asked for from now on is done",
+        "find out who stopped the arm and why; new requests are executed",
     )
 }
 
@@ -158,9 +158,12 @@ impl WorkerState {
                 last = now;
                 lock(&self.shared.taught).push(((now - start).as_secs_f64(), status.positions()));
             } else if now - last > TAUGHT_NO_MORE && !asked.is_halted() {
-                let message =
-                    format!("the arm is not taught any more: the controller is in {}", status.state);
-                return Err(Failure::fault("not-teaching", message, "`robot.teach()` begins it again"));
+                let message = format!("teaching has ended: the controller is in {}", status.state);
+                return Err(Failure::fault(
+                    "not-teaching",
+                    message,
+                    "start teaching again with `robot.teach()`",
+                ));
             }
         }
         Ok(())

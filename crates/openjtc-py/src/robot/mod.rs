@@ -109,7 +109,7 @@ impl Link {
             }
             Waited::NotYet | Waited::Gone if self.worker.is_closed() => Err(worker::closed().into()),
             Waited::NotYet | Waited::Gone => {
-                Err(Failure::refused("not-moving", "the motion was over before", "").into())
+                Err(Failure::refused("not-moving", "the motion has already ended", "").into())
             }
         }
     }
@@ -132,8 +132,8 @@ impl Link {
         let faults = faults.map_err(|error| Failure::usage(format!("faults: {error}")))?.unwrap_or_default();
         let payload = payload(payload_of_arm)?;
         if let Some(speed) = speed.filter(|speed| !(0.01..=1000.0).contains(speed)) {
-            let message = format!("speed: {speed} times real time is outside 0.01..1000");
-            return Err(Failure::usage(message).next("None is as fast as the computer is").into());
+            let message = format!("speed: {speed} times real time is out of range (0.01 to 1000)");
+            return Err(Failure::usage(message).next("pass None for the highest possible speed").into());
         }
         let way = Way::Simulated(Box::new(Simulated { seed, speed, faults, payload }));
         let arm = arm.map(|arm| Arc::clone(&arm.inner));

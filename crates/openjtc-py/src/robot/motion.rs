@@ -106,7 +106,8 @@ impl WorkerState {
         *lock(&self.shared.speed) = Some(speed);
         if speed != 1.0 {
             notes.push(format!(
-                "the controller ran it at {speed} of its speed, which was set before: `robot.speed = 1` ends that"
+                "the controller ran the motion at {speed} of its speed, which was set earlier; set \
+                 `robot.speed = 1` for the full speed"
             ));
         }
         let mut info = RecordingInfo {
@@ -321,11 +322,12 @@ fn not_begun(error: &StartError) -> Failure {
     let failure = Failure::of(error);
     match error {
         StartError::Check(_) => failure,
-        StartError::Elsewhere(_) => failure.next("pass approach=True: the arm is moved to the first point"),
-        StartError::Approach(_) => failure.next(
-            "nothing moved: bring the arm nearer to the first point, by hand or with a motion of your own",
-        ),
-        StartError::Open(_) => failure.next("approach=True leads back to its first point before each run"),
+        StartError::Elsewhere(_) => failure.next("pass approach=True to move the arm to the first point"),
+        StartError::Approach(_) => failure
+            .next("nothing moved: bring the arm nearer to the first point, by hand or with another motion"),
+        StartError::Open(_) => {
+            failure.next("pass approach=True to move the arm back to the first point before each run")
+        }
     }
 }
 

@@ -123,9 +123,11 @@ impl Link {
         accept_device_limits: bool,
     ) -> PyResult<Vec<String>> {
         if arm.is_some() && defaults {
-            return Err(Failure::usage("arm and defaults name two sets of parameters; nothing was sent")
-                .next("pass one of them")
-                .into());
+            return Err(Failure::usage(
+                "arm and defaults cannot be combined: each selects a set of parameters; nothing was sent",
+            )
+            .next("pass only one of the two")
+            .into());
         }
         let parameters = match arm.map(|arm| Arc::clone(&arm.inner)) {
             Some(arm) => RecoverParameters::Arm { arm, accept_device_limits },
@@ -195,7 +197,8 @@ impl Link {
         let mut given = Vec::new();
         for (name, joint, value) in values {
             let setting = settings::named(&name).ok_or_else(|| {
-                Failure::usage(format!("there is no setting {name:?}")).next("`robot.settings` lists them")
+                Failure::usage(format!("setting {name:?} does not exist"))
+                    .next("`robot.settings` lists all settings")
             })?;
             given.push(SettingValue { setting: setting.number, joint, value });
         }

@@ -42,7 +42,7 @@ impl Recording {
         let file = opened.map_err(|error| {
             let exists = error.kind() == std::io::ErrorKind::AlreadyExists;
             let failure = Failure::usage(format!("{}: {error}; nothing was sent", path.display()));
-            if exists { failure.next("name another file, or pass overwrite=True") } else { failure }
+            if exists { failure.next("choose another file, or pass overwrite=True") } else { failure }
         })?;
         Ok(Self { path: path.clone(), aside, file: Some(file), live: None })
     }
@@ -70,7 +70,7 @@ impl Recording {
                 });
                 if let Err(error) = done {
                     let file = written.display();
-                    ran.notes.push(format!("{file}: the recording is not whole: {error}"));
+                    ran.notes.push(format!("{file}: the recording is incomplete: {error}"));
                 }
                 Ok(ran)
             }

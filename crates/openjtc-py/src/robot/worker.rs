@@ -263,8 +263,8 @@ impl Worker {
             return Err(closed());
         }
         if !self.simulated {
-            return Err(Failure::usage("this is no simulator, and nobody can touch it from here")
-                .next("`openjtc.connect(\"sim:\")` is one"));
+            return Err(Failure::usage("this needs a simulator: a program cannot push a real arm")
+                .next("connect to a simulator with `openjtc.connect(\"sim:\")`"));
         }
         lock(&self.shared.touches).push(Box::new(touch));
         Ok(())

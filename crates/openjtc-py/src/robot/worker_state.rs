@@ -167,11 +167,13 @@ impl WorkerState {
         Err(Failure::refused(
             "other-arm",
             format!(
-                "the controller has another arm than {}: {} differences, the first is {first}; nothing was sent",
+                "the controller has another arm than {}: {} differences, the first: {first}; nothing was \
+                 sent",
                 self.arm.name,
                 differences.len()
             ),
-            "`robot.push_arm(arm)` gives it this one, in Init or Error; without `arm=` the controller's own counts",
+            "send this arm with `robot.push_arm(arm)` in Init or Error, or connect without `arm=` to use the \
+             controller's arm",
         ))
     }
 

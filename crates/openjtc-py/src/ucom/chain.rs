@@ -85,12 +85,14 @@ impl Chain {
     ) -> Result<Self, Failure> {
         let deadline = deadline_s.map(|s| match Duration::try_from_secs_f64(s) {
             Ok(deadline) if !deadline.is_zero() => Ok(deadline),
-            _ => Err(Failure::usage(format!("deadline_s: {s} s is no time"))),
+            _ => {
+                Err(Failure::usage(format!("deadline_s: {s} s is not a valid time, expected more than 0 s")))
+            }
         });
         let profile = procedures::profile(profile.as_deref(), on_lost)?;
         let signals = signals.map(|path| SignalTable::read(&path)).transpose();
         let signals =
-            signals.map_err(|e| Failure::usage(e.to_string()).next("ucom help edges shows the form"))?;
+            signals.map_err(|e| Failure::usage(e.to_string()).next("ucom help edges shows the format"))?;
         let listed = inventory.as_deref().filter(|path| path.exists()).map(Inventory::read).transpose();
         let simulated: Option<Arc<Simulated>> = simulated.map(|chain| chain.get().inner.clone());
         let folder = || Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom"));
@@ -251,7 +253,7 @@ impl Chain {
             Some("input") => Some(Buffer::Ci),
             Some("parameter") => Some(Buffer::Par),
             Some(other) => {
-                let text = format!("kind: {other:?} is neither input nor parameter");
+                let text = format!("kind: {other:?} is not valid, expected \"input\" or \"parameter\"");
                 return Err(Failure::usage(text).into());
             }
         };
@@ -320,7 +322,7 @@ impl Chain {
             file.map(Source::File).or_else(|| bytes.map(Source::Bytes))
         };
         let [raw, fill_gaps, name_target, group, start, dry_run, unverified, force, rewrite, check] = flags;
-        let first = source(image).ok_or_else(|| Failure::usage("there is no image"))?;
+        let first = source(image).ok_or_else(|| Failure::usage("the image is missing"))?;
         let (second, profile) = (source(second), &self.profile);
         let any_date = date.0.is_none();
         let read = Read { raw, addresses, fill_gaps, name_target, date: date.0, today: date.1 };

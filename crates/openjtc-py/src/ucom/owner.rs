@@ -169,8 +169,8 @@ impl Owner {
             false => Err(failure(
                 ErrorKind::Usage,
                 "forked",
-                "the chain is that of the process that this one was forked from",
-                "connect in the process that uses it",
+                "the chain belongs to the parent process of this process",
+                "connect in the process that uses the chain",
             )),
         }
     }

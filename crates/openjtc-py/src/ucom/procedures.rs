@@ -41,7 +41,7 @@ pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Fa
         Some("stop-all") => OnLost::StopAll,
         Some(other) => {
             return Err(Failure::usage(format!(
-                "on_lost: {other:?} is none of report, stop-board, stop-all"
+                "on_lost: {other:?} is not valid, expected report, stop-board or stop-all"
             )));
         }
     };
@@ -98,7 +98,7 @@ pub fn init(
     }
     let texts = objects::texts(&report.findings);
     if let Some(kind) = report.failure().filter(|_| check) {
-        return Err(findings(kind, "init", &texts, "doctor() looks for the reason"));
+        return Err(findings(kind, "init", &texts, "find the reason with doctor()"));
     }
     let profile = state.driver.master.profile();
     let value = json!({
@@ -130,7 +130,7 @@ fn bits(names: &[String]) -> Result<Status, Failure> {
     let bit = |name: &String| {
         Status::bit(name).ok_or_else(|| {
             let names: Vec<&str> = Status::NAMES.iter().map(|(name, _)| *name).collect();
-            Failure::usage(format!("there is no bit {name:?}; there are {}", names.join(" ")))
+            Failure::usage(format!("status bit {name:?} does not exist; the bits are {}", names.join(" ")))
         })
     };
     names.iter().try_fold(Status(0), |all, name| Ok(all | bit(name)?))
@@ -146,11 +146,11 @@ pub fn status(
     let (set, clear) = (bits(set)?, bits(clear)?);
     let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
     if both != Status(0) {
-        return Err(Failure::usage(format!("{both}: cannot be set and cleared at once")));
+        return Err(Failure::usage(format!("{both}: a bit cannot be set and cleared in the same call")));
     }
     if mirrors != Status(0) {
-        let text = format!("{mirrors}: mirrors reality and cannot be written");
-        return Err(Failure::usage(text).next("start(), stop() and init() change what these bits show"));
+        let text = format!("{mirrors}: this bit shows a state of the board and cannot be written");
+        return Err(Failure::usage(text).next("use start(), stop() or init() to change this state"));
     }
     let numbers = state.driver.numbers(boards)?;
     let all = match set | clear {
@@ -206,7 +206,7 @@ pub fn reset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Ve
     }
     if reports.ids.is_empty() {
         let text = ["no board reported after the reset".to_owned()];
-        return Err(findings(ErrorKind::NoLink, "no-boards", &text, "doctor() looks for the reason"));
+        return Err(findings(ErrorKind::NoLink, "no-boards", &text, "find the reason with doctor()"));
     }
     Ok(reports.ids.into_iter().collect())
 }
@@ -220,7 +220,7 @@ pub fn repair(
 ) -> Result<Value, Failure> {
     let listed = state.inventory.as_ref().and_then(|i| i.get(board)).map(|known| known.flash_number);
     let flash_number = flash_number.or(listed).ok_or_else(|| {
-        Failure::usage(format!("which board stands at number {board}? no inventory has it"))
+        Failure::usage(format!("the flash number of board {board} is missing: no inventory has this board"))
             .next("pass its flash_number, or an inventory to connect()")
     })?;
     match state.driver.run(Request::Repair { board, flash_number, force })? {

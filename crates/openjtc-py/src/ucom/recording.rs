@@ -103,11 +103,14 @@ impl ChainRecording {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
         if let Some(other) = ending.filter(|e| !known.contains(&e.as_str())) {
-            return Err(Failure::usage(format!("{}: nothing writes .{other} here", path.display()))
-                .next("forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP"));
+            return Err(Failure::usage(format!(
+                "{}: recordings with the ending .{other} are not supported",
+                path.display()
+            ))
+            .next("use the ending .log (candump), .fzi (FZI-CAN) or .mcap (MCAP)"));
         }
         if sink.is_taken() {
-            let busy = Failure::usage("the chain is being recorded already");
+            let busy = Failure::usage("the chain is already being recorded");
             return Err(busy.next("end that recording first"));
         }
         let (ready, opened) = mpsc::channel();
@@ -129,7 +132,7 @@ impl ChainRecording {
         match opened.recv() {
             Ok(None) => {}
             Ok(Some(error)) => return Err(Failure::usage(error)),
-            Err(_) => return Err(failed("its writer has a fault")),
+            Err(_) => return Err(failed("internal error of the writer")),
         }
         sink.set(Some(sender));
         Ok(Self { sink, writer: Mutex::new(Some(writer)), process: Process::this() })
@@ -139,7 +142,7 @@ impl ChainRecording {
         let writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(writer) = writer.filter(|_| self.process.is_this()) else { return Ok(None) };
         self.sink.set(None);
-        let written = writer.join().map_err(|_| failed("its writer has a fault"))?;
+        let written = writer.join().map_err(|_| failed("internal error of the writer"))?;
         written.map(Some).map_err(|e| failed(&e.to_string()))
     }
 }
@@ -152,7 +155,7 @@ impl Drop for ChainRecording {
 }
 
 fn failed(why: &str) -> Failure {
-    Failure::fault("recording", format!("the recording failed: {why}"), "is the disk full?")
+    Failure::fault("recording", format!("the recording failed: {why}"), "check if the disk is full")
 }
 
 fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {

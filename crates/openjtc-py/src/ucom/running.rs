@@ -61,7 +61,7 @@ pub fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failure> {
         // The boards already run, perhaps with enabled outputs. If this returned an error, the caller would believe
         // that they are stopped.
         if let Err(error) = state.driver.run(Request::Admin { board: *board, change, force: true }) {
-            state.driver.note(format!("board {board} may send no texts: {error}"));
+            state.driver.note(format!("board {board} possibly sends no texts: {error}"));
         }
     }
     state.first_outputs(&numbers)?;

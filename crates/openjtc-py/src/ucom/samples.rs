@@ -70,5 +70,5 @@ impl ChainSamples {
 
 fn silent() -> Failure {
     let message = format!("no board sent outputs for {} s: no control loop runs", SILENCE.as_secs());
-    Failure::new(ErrorKind::NoLink, "no-outputs", message).next("run() starts control loops")
+    Failure::new(ErrorKind::NoLink, "no-outputs", message).next("start the control loops with run()")
 }

@@ -96,7 +96,7 @@ pub fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &'stati
 }
 
 fn stopped() -> Failure {
-    failure(ErrorKind::Fault, "cancelled", "a stop came before its turn: it is not done", "")
+    failure(ErrorKind::Fault, "cancelled", "the call was cancelled by a stop before it began", "")
 }
 
 /// Process that created an object. A forked child has the memory of its parent, but none of its threads.
@@ -116,7 +116,7 @@ impl Process {
 
 /// Returns the failure for a fault of the chain's thread.
 pub fn fault() -> Failure {
-    failure(ErrorKind::Fault, "fault", "the thread of the chain has a fault", "connect again")
+    failure(ErrorKind::Fault, "fault", "internal error of the chain's thread", "connect again")
 }
 
 impl Shared {
@@ -217,16 +217,14 @@ impl Shared {
     /// Reports that running boards were stopped because no call came within the deadline. `not_stopped` lists the boards whose stop is
     /// not certain.
     pub fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
-        let mut text = format!(
-            "nothing was asked of the chain for {} s: its boards are stopped",
-            deadline.as_secs_f64()
-        );
+        let mut text =
+            format!("no call was made to the chain for {} s: its boards are stopped", deadline.as_secs_f64());
         if !not_stopped.is_empty() {
             let numbers: Vec<String> = not_stopped.iter().map(u8::to_string).collect();
             text += &format!(", not for certain: board {}", numbers.join(", "));
         }
         self.event(time_s, "deadline", None, text.clone());
-        let next = "ask in time, or connect with a longer deadline_s";
+        let next = "call a method of the chain more often, or connect with a longer deadline_s";
         self.alarms.add(failure(ErrorKind::Fault, "deadline", &text, next));
     }
 

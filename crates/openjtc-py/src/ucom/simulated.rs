@@ -43,7 +43,7 @@ impl Simulated {
         let Simulation { profile, chain, boards, faults, seed } = simulation;
         let config = match &chain {
             Some(path) => ChainConfig::read(path, &profile).map_err(|e| {
-                Failure::usage(e.to_string()).next("ucom help sim shows the form of chain files")
+                Failure::usage(e.to_string()).next("ucom help sim shows the format of chain files")
             })?,
             None => ChainConfig::head(&profile),
         };
@@ -55,7 +55,8 @@ impl Simulated {
             None => Vec::new(),
             Some(path) => {
                 let wrong = |e: &dyn std::fmt::Display| {
-                    Failure::usage(format!("{}: {e}", path.display())).next("ucom help faults shows the form")
+                    Failure::usage(format!("{}: {e}", path.display()))
+                        .next("ucom help faults shows the format")
                 };
                 let text = std::fs::read_to_string(path).map_err(|e| wrong(&e))?;
                 Fault::from_toml(&text).map_err(|e| wrong(&e))?
@@ -79,8 +80,8 @@ impl Simulated {
                 server.turn(LOOK);
             }
         });
-        let url = url.recv().unwrap_or_else(|_| Err("the simulated chain has a fault".into()));
-        let url = url.map_err(|e| Failure::usage(e).next("is a port of 127.0.0.1 free?"))?;
+        let url = url.recv().unwrap_or_else(|_| Err("internal error of the simulated chain".into()));
+        let url = url.map_err(|e| Failure::usage(e).next("check if a port of 127.0.0.1 is free"))?;
         let (faults, thread) = (Mutex::new(sender), Mutex::new(Some(thread)));
         Ok(Self { url, boards, faults, ended, thread, process: Process::this() })
     }
@@ -127,7 +128,7 @@ impl SimulatedChain {
     ) -> Result<Self, Failure> {
         let profile = super::procedures::profile(profile.as_deref(), None)?;
         if boards.is_some_and(|boards| boards > 31) {
-            return Err(Failure::usage("boards: a chain has at most 31"));
+            return Err(Failure::usage("too many boards: a chain has at most 31"));
         }
         let simulation = Simulation { profile, chain, boards, faults, seed };
         let inner = py.detach(|| Simulated::start(simulation))?;
@@ -146,7 +147,7 @@ impl SimulatedChain {
 
     fn fault(&self, line: &str) -> Result<(), Failure> {
         Fault::from_line(line)
-            .map_err(|e| Failure::usage(e.to_string()).next("ucom help faults lists them"))?;
+            .map_err(|e| Failure::usage(e.to_string()).next("ucom help faults lists the faults"))?;
         let sender = self.inner.faults.lock().unwrap_or_else(PoisonError::into_inner);
         sender.send(line.into()).map_err(|_| Failure::usage("the simulated chain has ended"))
     }

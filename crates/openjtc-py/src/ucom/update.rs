@@ -70,14 +70,16 @@ impl Read {
             Some("byte") => Some(AddressUnit::Byte),
             Some("word") => Some(AddressUnit::Word),
             Some(other) => {
-                return Err(Failure::usage(format!("addresses: {other:?} is neither byte nor word")));
+                return Err(Failure::usage(format!(
+                    "addresses: {other:?} is not valid, expected \"byte\" or \"word\""
+                )));
             }
         };
         let gaps = if self.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
         let format = self.raw.then_some(Format::Bin);
         let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
         if self.name_target && !has_header(profile) {
-            let text = "name_target: the name goes into the header, and the profile sends none";
+            let text = "name_target: the name is part of the header, but the profile sends no header";
             return Err(Failure::usage(text));
         }
         let second = second.map(|source| image(source, &options)).transpose()?;
@@ -87,13 +89,13 @@ impl Read {
     /// Returns the flash date in the format of the profile. 0: no header has a date.
     fn day(&self, profile: &Profile) -> Result<u16, Failure> {
         if !has_header(profile) {
-            let text = "date: it goes into the header, and the profile sends none";
+            let text = "date: the date is part of the header, but the profile sends no header";
             return self.date.map_or(Ok(0), |_| Err(Failure::usage(text)));
         }
         let (year, month, day) = self.date.unwrap_or(self.today);
         let form = profile.prog_date;
         form.encode(year, month, day).ok_or_else(|| {
-            let text = format!("{year:04}-{month:02}-{day:02} is no date that prog.date = {form} can hold");
+            let text = format!("{year:04}-{month:02}-{day:02} is not a valid date for prog.date = {form}");
             Failure::usage(text)
         })
     }
@@ -122,18 +124,19 @@ fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
         ImageAdvice::NameRaw => {
-            "are these the raw bytes of a program? name the file .bin, or take any name with raw=True"
+            "if these are the raw bytes of a program, rename the file to .bin or pass raw=True"
         }
         ImageAdvice::Rename => "if these are the raw bytes of a program, rename the file to .bin",
-        ImageAdvice::FillGaps => "fill_gaps=True fills them with FF, if the board may get FF there",
+        ImageAdvice::FillGaps => "if the board may get FF there, fill the gaps with fill_gaps=True",
         ImageAdvice::OtherUnit(AddressUnit::Byte) => {
-            "addresses=\"byte\" if the tool chain counts bytes, fill_gaps=True if the gap is meant"
+            "pass addresses=\"byte\" if the tool chain counts bytes, or fill_gaps=True if the gap is intended"
         }
         ImageAdvice::OtherUnit(AddressUnit::Word) => {
-            "addresses=\"word\" if the tool chain counts words, fill_gaps=True if the gap is meant"
+            "pass addresses=\"word\" if the tool chain counts words, or fill_gaps=True if the gap is intended"
         }
         ImageAdvice::MakeAgain | ImageAdvice::Addresses => {
-            "make the file again with the tool chain; images are Intel HEX, S-record, and raw bytes in a .bin"
+            "build the file again with the tool chain; supported images are Intel HEX, S-record, and raw \
+             bytes in a .bin"
         }
     }
 }
@@ -144,8 +147,9 @@ fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<U
         return match numbers {
             [board] => Ok(vec![UpdateTarget { board: *board, flash_number: Some(flash) }]),
             _ => {
-                let text = format!("flash_number names one board, but {} are meant", numbers.len());
-                Err(Failure::usage(text).next("several take theirs from the inventory that init() makes"))
+                let text =
+                    format!("flash_number selects one board, but {} boards are selected", numbers.len());
+                Err(Failure::usage(text).next("for several boards, use the inventory of init()"))
             }
         };
     }
@@ -169,7 +173,7 @@ fn not_listed(state: &WorkerState, board: u8) -> Failure {
         None => IdentifyError::NoInventory { board, path },
     };
     let mut own = Failure::of(&error);
-    own.next = "init() makes one; or update one board with its flash_number".into();
+    own.next = "create an inventory with init(), or update one board with its flash_number".into();
     own
 }
 
@@ -251,7 +255,8 @@ fn failed(report: &UpdateReport, kind: ErrorKind) -> Failure {
     let Some((board, failure)) = gravest else {
         let (message, next) = report.unproven();
         let next =
-            [next.replace("`rewrite`", "rewrite=True"), "or accept it: unverified=True".into()].join("; ");
+            [next.replace("`rewrite`", "rewrite=True"), "or accept the result with unverified=True".into()]
+                .join("; ");
         return Failure::new(kind, "not-verified", message).next(next);
     };
     let mut own = Failure::of(*failure).message(texts.join("; "));

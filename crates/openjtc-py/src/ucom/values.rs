@@ -172,10 +172,10 @@ pub fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Value, Fa
 fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
     let (code, message) = match age_s {
         None => ("no-outputs", format!("board {board} has sent no outputs: no control loop runs")),
-        Some(age_s) => ("stale", format!("board {board}: the last {what} came {age_s:.1} s ago")),
+        Some(age_s) => ("stale", format!("board {board}: the last {what} is {age_s:.1} s old")),
     };
     Failure::new(ErrorKind::NoLink, code, message)
-        .next("run() starts control loops; doctor() looks at bus and boards")
+        .next("start the control loops with run(), or check bus and boards with doctor()")
         .with(Facts::default().at_board(board))
 }
 

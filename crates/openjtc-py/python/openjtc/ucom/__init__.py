@@ -141,9 +141,9 @@ def connect(
     url = bus if isinstance(bus, str) and simulated is None else ""
     if url.startswith(("http://", "https://")):
         raise UsageError(
-            f"{url}: an agent (ucom serve) has no client here",
+            f"{url}: this package has no client for an agent (ucom serve)",
             "usage",
-            next="name the bus itself while no agent owns it, or use the HTTP interface of the agent",
+            next="give the bus while no agent owns it, or use the HTTP interface of the agent",
         )
     remember = (simulated is None or cache is not None) and cache is not False
     folder = None if cache is None or isinstance(cache, bool) else os.fspath(cache)

@@ -158,7 +158,7 @@ class Board:
 
     def _of_chain(self) -> ValuesByName:
         if self._chain is None:
-            raise AttributeError("this board was made by hand: no chain has it")
+            raise AttributeError("this board object belongs to no chain")
         return self._chain
 
     @classmethod

@@ -37,7 +37,7 @@ def _close(native: _native.Chain) -> None:
 
 def _not_stopped(boards: Iterable[int]) -> str:
     listed = ", ".join(map(str, boards))
-    return f"not stopped for certain: board {listed}; without heartbeats they become safe by themselves"
+    return f"not stopped for certain: board {listed}; without heartbeats the boards become safe by themselves"
 
 
 class Session:
@@ -135,7 +135,7 @@ class Session:
             overwrite: Overwrites an existing file.
         """
         if not overwrite and Path(path).exists():
-            raise UsageError(f"{os.fspath(path)}: is there already", "exists", next="overwrite=True writes over it")
+            raise UsageError(f"{os.fspath(path)} already exists", "exists", next="choose another file, or pass overwrite=True")
         return Recording(self._native.record(os.fspath(path)))
 
     # Names of boards.
@@ -149,7 +149,7 @@ class Session:
     def _number(self, board: int | str) -> int:
         number = self._named(board) if isinstance(board, str) else int(board)
         if number is None or not 0 <= number <= 31:
-            raise UsageError(f"{board!r} is no board: a number 0..31, or a name of the inventory", "usage")
+            raise UsageError(f"{board!r} is not a valid board: expected a number (0 to 31) or a name of the inventory", "usage")
         return number
 
     def _list(self, boards: Boards) -> str:

@@ -206,9 +206,9 @@ class ValuesByName(Session):
         if len(found) == 1:
             return found[0], name
         if not found:
-            raise UsageError(f"no board has a signal {name!r}", "no-edge", next="boards[N].signals lists the names")
+            raise UsageError(f"no board has a signal {name!r}", "no-edge", next="find the names with boards[N].signals")
         listed = ", ".join(f"{number}.{name}" for number in found)
-        raise UsageError(f"several boards have a signal {name!r}", "no-edge", next=f"name one of {listed}")
+        raise UsageError(f"several boards have a signal {name!r}", "no-edge", next=f"use one of {listed}")
 
     def _given(self, values: Mapping[str, Settable]) -> list[tuple[int | None, str, str]]:
         def one(name: str, value: Settable) -> tuple[int | None, str, str]:

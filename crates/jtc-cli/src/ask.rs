@@ -8,13 +8,13 @@ use std::io::{BufRead, IsTerminal, Write};
 pub fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {
         Failure::new(ErrorKind::Refused, "not-confirmed-by-person", message)
-            .next(format!("nothing was sent; {option} answers yes"))
+            .next(format!("nothing was sent; use {option} to confirm without a question"))
     };
     if !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {
-        return Err(refused(format!("{question}: nobody can be asked without a terminal")));
+        return Err(refused(format!("{question}: confirmation needs a terminal")));
     }
     let mut stderr = std::io::stderr();
-    write!(stderr, "{question}: type yes to go on: ")?;
+    write!(stderr, "{question}: type yes to continue: ")?;
     stderr.flush()?;
     let mut answer = String::new();
     std::io::stdin().lock().read_line(&mut answer)?;

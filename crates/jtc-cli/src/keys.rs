@@ -22,8 +22,8 @@ pub const HELP: &str = "keys: space pauses, s stops, Ctrl-C ends";
 pub const HELP_WITH_SPEED: &str = "keys: space pauses, s stops, + - speed, Ctrl-C ends";
 
 /// Message if the speed cannot be changed, with the next step.
-pub const NO_SPEED: &str = "this controller has no command to change the speed of a motion: s stops it, and `jtc traj run FILE \
-                            --speed PCT` runs it at another";
+pub const NO_SPEED: &str = "this controller cannot change the speed of a motion: press s to stop it, then \
+    use `jtc traj run FILE --speed PCT`";
 
 /// Returns the strongest request of the keys pressed since the last call.
 pub fn wish(keys: &mut Keys) -> Option<Wish> {

@@ -22,7 +22,7 @@ pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Resul
 pub fn refused(arm: &str, differences: &[Difference], out: &Output) -> Failure {
     let error = CheckError::DeviceLimits { arm: arm.to_owned(), differences: differences.to_vec() };
     let message = format!(
-        "{arm}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent",
+        "{arm}: {} of this arm cannot be sent to the controller, which uses its own; nothing was sent",
         values(differences.len())
     );
     listed(&Failure { message, ..Failure::of(&error) }, differences, out)
@@ -41,7 +41,8 @@ pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Ve
         values_differ(differences.len())
     );
     let failure = Failure::new(ErrorKind::Refused, "other-arm", message).next(next!(
-        "{} gives the controller this arm, `jtc arm pull -o FILE` reads the one that it has, which counts where --arm is left out",
+        "{} sends this arm to the controller; `jtc arm pull -o FILE` reads the controller's arm, which is \
+         used without --arm",
         ArmPush
     ));
     Err(listed(&failure, &differences, out))

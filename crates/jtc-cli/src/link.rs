@@ -55,19 +55,18 @@ impl LinkArgs {
         let Some(agent) = owner_of(&name) else {
             if let Some(policy) = policy.filter(|policy| *policy != "continue") {
                 let what = format!(
-                    "--when-gone {policy} needs an agent: over {name} a motion goes on without this program"
+                    "--when-gone {policy} needs an agent: over {name} a motion continues without this program"
                 );
                 return Err(Failure::nothing_sent(Failure::usage(what))
-                    .next(format!("`jtc serve --port {name}` is one")));
+                    .next(format!("start an agent: `jtc serve --port {name}`")));
             }
             return Ok(SerialPort::open(&name, self.baud).map(|port| Box::new(port) as LinkPort));
         };
         let port = AgentPort::open(&agent.url, &self.options(Some(&agent), policy, with_token)?)?;
         if !is_same_port(&port.hello().port, &name) {
-            let what = format!("{}: the agent there has {}, not {name}", agent.url, port.hello().port);
-            return Err(
-                Failure::nothing_sent(Failure::usage(what)).next("name the agent with --port http://…")
-            );
+            let what = format!("{}: this agent owns {}, not {name}", agent.url, port.hello().port);
+            return Err(Failure::nothing_sent(Failure::usage(what))
+                .next("give the address of the agent with --port http://…"));
         }
         Ok(Ok(Box::new(port)))
     }
@@ -96,12 +95,12 @@ impl LinkArgs {
     pub fn own(&self) -> Result<SerialPort, Failure> {
         let name = self.name()?;
         if is_agent(&name) {
-            let what = format!("{name} is the address of an agent, and no port that another could own");
-            return Err(Failure::usage(what).next("name a serial port; `jtc ports` lists them"));
+            let what = format!("{name} is the address of an agent, but a serial port is needed");
+            return Err(Failure::usage(what).next("give a serial port; `jtc ports` lists the ports"));
         }
         if let Some(agent) = owner_of(&name) {
             return Err(Failure::from(PortError::Busy { path: name })
-                .next(format!("an agent owns it: `--port {}` uses it", agent.url)));
+                .next(format!("an agent owns the port: use `--port {}`", agent.url)));
         }
         // Other programs stop the arm through the agent.
         Ok(SerialPort::open_without_door(&name, self.baud)?)

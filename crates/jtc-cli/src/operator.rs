@@ -59,10 +59,10 @@ impl<'a> Operator<'a> {
             let (message, hint) = if its_moving.load(Ordering::Relaxed) {
                 (
                     "ended at once: THE ARM MAY BE MOVING",
-                    "`jtc traj stop` stops it on its path; the emergency stop always",
+                    "`jtc traj stop` stops the arm on its path; the emergency stop always stops it",
                 )
             } else {
-                ("ended at once; this command moves nothing any more", "")
+                ("ended at once; this command moves nothing more", "")
             };
             ended_at_once(its_out, message, hint)
         })?;
@@ -96,7 +96,8 @@ impl<'a> Operator<'a> {
             // The keys are shown below the bar.
             Ok(()) if !self.out.is_json() => {}
             Err(Some((columns, rows))) => self.out.note(format_args!(
-                "{}: the progress bar needs {} columns and {} rows, the terminal has {columns} and {rows}",
+                "{}: the progress bar needs {} columns and {} rows, but the terminal has {columns} and \
+                 {rows}",
                 self.keys(),
                 LEAST.0,
                 LEAST.1
@@ -129,14 +130,14 @@ impl<'a> Operator<'a> {
         {
             let before = self.announced.replace(status.trajectory);
             match (status.trajectory == TrajectoryState::Pause, &self.keys) {
-                (true, Some(_)) => self.out.note("paused; space goes on"),
+                (true, Some(_)) => self.out.note("paused; press space to resume"),
                 (false, Some(_)) => self.out.note("moving"),
                 // The motion begins.
                 (_, None) if before.is_none() => {}
                 // Another program has paused the motion, or the controller did after a timeout without frames of this
                 // program (J-59).
                 (true, None) => {
-                    self.out.note("paused; `jtc traj resume` goes on, `jtc traj stop` ends the motion");
+                    self.out.note("paused; `jtc traj resume` resumes the motion, `jtc traj stop` ends it");
                 }
                 (false, None) => self.out.note("moving"),
             }

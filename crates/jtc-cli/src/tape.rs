@@ -27,7 +27,7 @@ impl Tape {
         let on_disk = file.try_clone().map_err(|e| output.failure(e))?;
         let out = *out;
         let live = LiveRecorder::begin(file, output.path(), info, move |e| {
-            out.note(format!("jtc: {e}; nothing more is recorded, {goes_on}"));
+            out.note(format!("jtc: {e}; no more data are recorded, {goes_on}"));
         });
         match live {
             Ok(live) => Ok(Self { name: output.name(), live, on_disk }),

@@ -32,8 +32,8 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let sim = Sim::start(&FAST).held();
     let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
     assert!(
-        output.err.contains("no later place of it (trajectory Stop")
-            || output.err.contains("no later place of it (trajectory Null"),
+        output.err.contains("no later position (trajectory Stop")
+            || output.err.contains("no later position (trajectory Null"),
         "{}",
         output.err
     );
@@ -66,7 +66,7 @@ fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     cli_kit::testing::signal(&run, "-INT");
     run.wait_with_output().unwrap();
     let refused = sim.jtc(&["traj", "replay", &record, "--approach"]).ends(4);
-    assert!(refused.err.contains(" --measured` the part that was measured"), "{}", refused.err);
+    assert!(refused.err.contains(" --measured` runs the measured part"), "{}", refused.err);
     assert!(refused.err.contains("jtc traj continue "), "{}", refused.err);
     let value = sim.json(&["traj", "replay", &record, "--approach", "--measured"], 0);
     assert_eq!(value["outcome"], "finished");
@@ -120,7 +120,7 @@ fn options_without_a_meaning_are_refused() {
         assert!(refused.err.contains("out.csv`"), "{}", refused.err);
         assert!(!std::path::Path::new(&path(out)).exists());
     }
-    assert!(jtc(&["plan", &path("w.csv"), "-o", "-"]).ends(2).err.contains("- is no file"));
+    assert!(jtc(&["plan", &path("w.csv"), "-o", "-"]).ends(2).err.contains("- is not a file"));
     jtc(&["plan", &path("w.csv"), "-o", &path("out.csv")]).ends(0);
     for quaternion in ["0,0,0,0", "0,0,0,2"] {
         std::fs::write(
@@ -132,7 +132,7 @@ fn options_without_a_meaning_are_refused() {
         assert!(refused.err.contains("the quaternion has the length"), "{}", refused.err);
     }
     let words = ["move", "--to", "home", "--deg", "--port", "/dev/null"];
-    assert!(jtc(&words).ends(2).err.contains("--deg is for joint positions"));
+    assert!(jtc(&words).ends(2).err.contains("--deg applies only to joint positions"));
     let words = ["teach", "record", &path("t.csv"), "--tolerance", "0.1", "--port", "/dev/null"];
     assert!(jtc(&words).ends(2).err.contains("--waypoints"));
 }
@@ -165,8 +165,9 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
         // A recording with the stop contains the final position of the arm. A recording that ends before the stop does
         // not.
-        let stands = output.err.contains("and the arm stands there: it goes on from there");
-        assert!(stands || signal == "-KILL" && output.err.contains("no later place of it"), "{}", output.err);
+        let stands =
+            output.err.contains("and the arm is at rest there: the motion continues from that position");
+        assert!(stands || signal == "-KILL" && output.err.contains("no later position"), "{}", output.err);
         let value = output.json();
         assert_eq!(value["outcome"], "finished");
         let executed = value["executed_s"].as_f64().unwrap();
@@ -185,7 +186,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
     sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
     let output = sim.jtc(&["traj", "continue", &whole]).ends(2);
-    assert!(output.err.contains("does not hold the whole trajectory"), "{}", output.err);
+    assert!(output.err.contains("does not contain the whole trajectory"), "{}", output.err);
     let output = sim.jtc(&["traj", "continue", &whole, "--trajectory", &other, "--record", &rest]).ends(4);
     assert!(output.err.contains("nothing is left of it"), "{}", output.err);
     assert!(!std::path::Path::new(&rest).exists());
@@ -205,7 +206,7 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     sim.jtc(&["recover"]).ends(0);
     sim.jtc(&["move", "--to", "0,0,0,0,0,0"]).ends(0);
     let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-    assert!(output.err.contains("an approach leads there"), "{}", output.err);
+    assert!(output.err.contains("after an approach, the motion continues from there"), "{}", output.err);
     let value = output.json();
     let phases: Vec<&str> =
         value["runs"].as_array().unwrap().iter().map(|r| r["phase"].as_str().unwrap()).collect();
@@ -239,7 +240,7 @@ fn the_runs_that_are_left_are_run() {
     // second run and the third run are executed.
     sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]).ends(0);
     let output = sim.jtc(&["--json", "traj", "continue", &run]).ends(0);
-    assert!(output.err.contains("then the whole trajectory is run once"), "{}", output.err);
+    assert!(output.err.contains("then the whole trajectory runs once"), "{}", output.err);
     let value = output.json();
     assert_eq!(value["runs_finished"], 2, "{value}");
     assert!((value["verdict"]["duration_s"].as_f64().unwrap() - 2.0).abs() < 1e-6, "{value}");
@@ -250,6 +251,6 @@ fn the_runs_that_are_left_are_run() {
     cli_kit::testing::signal(&child, "-INT");
     child.wait_with_output().unwrap();
     let output = sim.jtc(&["--json", "traj", "continue", &csv, "--trajectory", &file]).ends(0);
-    assert!(output.err.contains("does not hold how often"), "{}", output.err);
+    assert!(output.err.contains("does not contain the number of runs"), "{}", output.err);
     assert_eq!(output.json()["runs_finished"], 1);
 }

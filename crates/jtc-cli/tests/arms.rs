@@ -133,7 +133,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     for words in [
         "left out: ",
         "joint grip: revolute: is held at 0",
-        "proposed: in no URDF",
+        "proposed: starting values that a URDF does not contain",
         "pid.kp",
         "next: jtc arm check",
     ] {
@@ -217,7 +217,7 @@ fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     let path = path.to_str().unwrap();
     let output = jtc(&["arm", "check", path]).ends(4);
     assert!(output.out.contains("✗ joint 1") && output.out.contains("Kd 350"), "{}", output.out);
-    assert!(!output.out.contains("a controller takes this arm"), "{}", output.out);
+    assert!(!output.out.contains("a controller accepts this arm"), "{}", output.out);
     let value = jtc(&["--json", "arm", "check", path]).ends(4).json();
     assert_eq!((value["ok"].as_bool(), &value["rotor_margins"]), (Some(false), &serde_json::Value::Null));
     let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");

@@ -64,7 +64,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     assert_eq!(names(&refused), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
     assert_eq!(refused["error"]["code"], "other-arm");
     let named = sim.jtc(&["traj", "run", &file]).ends(0).err;
-    assert!(named.contains("checked for the arm of the controller, another"), "{named}");
+    assert!(named.contains("checked with the arm of the controller, another"), "{named}");
 
     // The pulled arm is equal to the pushed arm.
     let pulled = sim.path("pulled.toml");
@@ -112,7 +112,7 @@ fn j57_the_speed_of_a_motion_changes_while_it_runs() {
     let whole = sim.json(&["traj", "run", &file], 0)["recorded_s"].as_f64().unwrap();
     assert_eq!(sim.json(&["traj", "speed", "50"], 0)["speed_percent"], 50.0);
     let run = sim.jtc(&["--json", "traj", "run", &file]).ends(0);
-    assert!(run.err.contains("speed override is 50 %"), "{}", run.err);
+    assert!(run.err.contains("speed override of the controller is 50 %"), "{}", run.err);
     let executed = run.json()["recorded_s"].as_f64().unwrap();
     // The lower speed does not apply to the approach, which takes as long as before.
     assert!(executed > 1.6 * whole && executed < 2.1 * whole, "{whole} s became {executed} s");
@@ -200,7 +200,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     drop(sim);
     std::fs::write(kept, "no arm").unwrap();
     let refused = jtc(&["sim", "--serial", "/nowhere/tty", "--store", kept]).ends(2);
-    assert!(refused.err.contains("holds no stored arm"), "{}", refused.err);
+    assert!(refused.err.contains("the file contains no stored arm"), "{}", refused.err);
 }
 
 /// The simulated controller gets a user's own arm from its memory, like a board.

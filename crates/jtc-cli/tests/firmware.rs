@@ -231,7 +231,7 @@ mod with_a_board {
             command.env("OPENJTC_FIRMWARE", dir.path("installed")).args(words(&board, &drive, &new));
             let mut terminal = Terminal::new(1_000, 30);
             let mut child = terminal.start(&command);
-            terminal.until_it_shows("type yes to go on");
+            terminal.until_it_shows("type yes to continue");
             meanwhile();
             std::thread::sleep(Duration::from_millis(200));
             terminal.press("yes\n");
@@ -250,7 +250,7 @@ mod with_a_board {
                     status.gripper = Some(jtc_wire::GripperStatus { pump: 1, ..Default::default() });
                 });
             },
-            "meanwhile the board reports something else",
+            "the report of the board has changed in the meantime",
         );
         // The drive is unmounted and its folder stays. Then another drive is mounted there.
         let page = Path::new(&drive).join("MBED.HTM");

@@ -166,7 +166,7 @@ fn j71_params_push_waits_for_the_trial_of_its_gains() {
     let mut push = push.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
     let told = BufReader::new(push.stderr.take().expect("a pipe")).lines();
     let mut told = told.map(|line| line.expect("text"));
-    assert!(told.any(|line| line.contains("on trial")));
+    assert!(told.any(|line| line.contains("tries the gains")));
     sim.write_line("push 5 38 0.5");
     let output = push.wait_with_output().expect("it ends");
     let failure: Value = serde_json::from_slice(&output.stdout).expect("JSON");

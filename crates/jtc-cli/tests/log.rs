@@ -78,7 +78,8 @@ fn j56_a_log_of_another_arm_asks_for_its_file() {
     let recording = sim.path("fault.mcap");
     let fetched = sim.jtc(&["log", "fetch", "-o", &recording]).ends(0).out;
     assert!(
-        fetched.contains("only what was measured is known") && fetched.contains("--arm FILE"),
+        fetched.contains("only the measured values of these ticks are known")
+            && fetched.contains("--arm FILE"),
         "{fetched}"
     );
     let unknown = jtc(&["--json", "log", "replay", &recording]).json();

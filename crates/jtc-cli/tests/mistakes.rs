@@ -81,7 +81,7 @@ fn mistakes_in_options_are_named_with_what_helps() {
         (&["plan", &waypoints, "-o", &out, "--speed", "-5"], 2, "speed -5 % is not within 1..100 %"),
         (&["plan", &bytes, "-o", &out], 2, "no text (its bytes are no UTF-8)"),
         (&["plan", &degrees, "-o", &out, "--deg"], 2, "leave --deg out"),
-        (&["traj", "speed", "-3"], 2, "a speed override of -3 % is outside 5..100"),
+        (&["traj", "speed", "-3"], 2, "speed override -3 % is out of range (5 to 100 %)"),
         (&["traj", "check", &waypoints, "--speed", "300"], 2, "column t (time in s) is missing"),
         (&["traj", "continue", "none.mcap"], 2, "check the name"),
         (&["traj", "continue", &waypoints], 2, "jtc traj run FILE --record"),

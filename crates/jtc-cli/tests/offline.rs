@@ -160,9 +160,9 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
     std::fs::write(&old, "precious").unwrap();
     let run = |more: &[&str]| jtc(&[&["traj", "run", &file, "--port", "/nowhere/tty"], more].concat());
     let output = run(&["--record", &old]).ends(4);
-    assert!(output.err.contains("there already") && output.err.contains("--overwrite"), "{}", output.err);
+    assert!(output.err.contains("already exists") && output.err.contains("--overwrite"), "{}", output.err);
     let output = run(&["--record", &file, "--overwrite"]).ends(4);
-    assert!(output.err.contains("uses itself"), "{}", output.err);
+    assert!(output.err.contains("already uses"), "{}", output.err);
     run(&["--record", &path("no/where.mcap")]).ends(2);
     run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--overwrite"]).ends(4);
     // Overwriting is allowed, but the port does not exist. The old file stays unchanged, and no empty file is left.
@@ -213,7 +213,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     std::fs::write(out.join("picture.svg"), "precious").unwrap();
     let output = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
     assert!(
-        output.err.contains("report.html is there already") && output.err.contains("--overwrite"),
+        output.err.contains("report.html already exists") && output.err.contains("--overwrite"),
         "{}",
         output.err
     );

@@ -141,9 +141,9 @@ fn j60_a_paused_motion_goes_on_with_another_payload_only_if_it_can() {
     assert!(refused.err.contains("torque over its limit: joint 2"), "{}", refused.err);
     assert!(refused.err.contains("nothing was sent"), "{}", refused.err);
     let refused = sim.jtc(&["traj", "resume", "--trajectory", &other]).ends(4);
-    assert!(refused.err.contains("the arm is not where"), "{}", refused.err);
+    assert!(refused.err.contains("the arm is not at that point"), "{}", refused.err);
     let slower = sim.jtc(&["traj", "resume", "--trajectory", &far, "--speed", "50"]).ends(4);
-    assert!(slower.err.contains("the arm is not where"), "{}", slower.err);
+    assert!(slower.err.contains("the arm is not at that point"), "{}", slower.err);
     assert_eq!(sim.json(&["status"], 0)["trajectory"], "Pause");
     sim.jtc(&["payload", "set", "--mass", "0.2", "--com", "0,0,0.1"]).ends(0);
     let resumed = sim.json(&["traj", "resume", "--trajectory", &far], 0);

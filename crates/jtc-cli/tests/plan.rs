@@ -248,7 +248,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     jtc(&["plan", &good, "-o", &out]).ends(0);
     let output = jtc(&["plan", &good, "-o", &out]).ends(4);
     assert!(
-        output.err.contains("out.csv is there already") && output.err.contains("--overwrite"),
+        output.err.contains("out.csv already exists") && output.err.contains("--overwrite"),
         "{}",
         output.err
     );
@@ -288,7 +288,7 @@ fn the_report_names_what_binds_when() {
     assert!(text.contains("What binds when") && text.contains("planned, not run"));
     let bound = &value["binding"][0];
     assert!(text.contains(&format!("\"plan\":[{bound}")), "{bound}");
-    assert!(text.contains("What binds for how long") && text.contains("[\"joint 6\","));
+    assert!(text.contains("Limiting constraints and their time") && text.contains("[\"joint 6\","));
     assert!(!text.contains("src=\"http") && text.contains("set_position_rad"));
     // The page already exists, so no file is written.
     let other = dir.path("other.csv");

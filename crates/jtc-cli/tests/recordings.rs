@@ -30,7 +30,7 @@ fn the_simulator_records_each_millisecond() {
         sim.jtc(&["traj", "run", &file]).ends(0);
         // The recording was already started, so the file exists and is not overwritten.
         let output = jtc(&["sim", "--record", &record]).ends(4);
-        assert!(output.err.contains("is there already"), "{}", output.err);
+        assert!(output.err.contains("already exists"), "{}", output.err);
         // Data younger than 0.2 s may be missing.
         until("1201 places", || jtc(&["traj", "info", &record]).err.contains("at 1201 places"));
         assert_eq!(sim.end("-KILL").0, -1);
@@ -149,7 +149,7 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
         (value["outcome"].as_str(), value["error"]["code"].as_str()),
         (Some("finished"), Some("output-lost"))
     );
-    assert!(output.err.contains("nothing more is recorded, the motion goes on"), "{}", output.err);
+    assert!(output.err.contains("no more data are recorded, the motion continues"), "{}", output.err);
     // The other output file is not affected.
     assert_eq!(value["files"], serde_json::json!([page]));
 }

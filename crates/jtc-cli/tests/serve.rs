@@ -41,7 +41,7 @@ fn another_terminal_looks_and_stops_while_one_runs() {
         assert!(runs.try_wait().expect("a child").is_none(), "it ended before it ran");
     }
     let denied = agent.jtc(&["gripper", "on"]).ends(4);
-    assert!(denied.err.contains("has commanded this arm"), "{}", denied.err);
+    assert!(denied.err.contains("has held the lease of this arm"), "{}", denied.err);
     agent.jtc(&["traj", "stop"]).ends(0);
     let ended = runs.wait_with_output().expect("it ends");
     let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");

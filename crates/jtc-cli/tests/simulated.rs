@@ -35,7 +35,7 @@ fn a_port_that_is_served_is_not_taken_over() {
     let to = std::fs::read_link(&sim.port).unwrap();
     let output = jtc(&["sim", "--serial", sim.port.to_str().unwrap()]).ends(2);
     assert!(
-        output.err.contains("another simulator") && output.err.contains("another path"),
+        output.err.contains("another running simulator") && output.err.contains("another path"),
         "{}",
         output.err
     );
@@ -230,11 +230,12 @@ fn a_fault_on_the_approach_is_recorded_and_named() {
         "{value}"
     );
     assert_eq!(value["failure"]["joint"], 3, "{value}");
-    assert!(value["error"]["message"].as_str().unwrap().starts_with("on the approach"), "{value}");
+    assert!(value["error"]["message"].as_str().unwrap().starts_with("during the approach"), "{value}");
     assert!(std::fs::read_to_string(&page).unwrap().contains("<title>FAILED: "));
     let recording = std::fs::read_to_string(&record).unwrap();
     assert!(
-        recording.lines().count() > 5 && recording.contains("\n# outcome: fault\n# reason: on the approach")
+        recording.lines().count() > 5
+            && recording.contains("\n# outcome: fault\n# reason: during the approach")
     );
 }
 
@@ -383,7 +384,7 @@ fn the_support_of_the_arm_is_chosen() {
         (&[][..], "note: simulated holding brakes", false, false),
         (&["--support", "brakes"], "note: simulated holding brakes", false, false),
         (&["--support", "stand"], "note: a stand carries the simulated arm until", false, true),
-        (&["--support", "none"], "note: nothing carries the simulated arm", true, true),
+        (&["--support", "none"], "note: nothing supports the simulated arm", true, true),
     ] {
         // The payload is needed, because friction alone would hold the upright arm.
         let options = [&["--speed", "max", "--payload", "3,0.2,0.2,0.2"], options].concat();

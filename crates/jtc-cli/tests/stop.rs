@@ -113,7 +113,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let mut other = command();
     other.env("XDG_RUNTIME_DIR", cell.0.dir.path()).args(["traj", "stop", "--port", real.to_str().unwrap()]);
     let stopped = run(other, &[], "").ends(0);
-    let words = format!("stopped: the arm stands; jtc run {file}, process {}, has ", child.id());
+    let words = format!("stopped: the arm is at rest; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
     // The message tells which requests the program may still make.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
@@ -200,7 +200,7 @@ fn teaching_is_ended_and_the_arm_is_held() {
     let file = cell.0.path("taught.csv");
     let child = cell.start(&["teach", "record", &file], |line| line.contains("\"teaching\""));
     let stopped = cell.jtc(&["stop"]).ends(0);
-    assert!(stopped.out.contains("stopped: the arm stands; jtc teach record"), "{}", stopped.out);
+    assert!(stopped.out.contains("stopped: the arm is at rest; jtc teach record"), "{}", stopped.out);
     ends(child, 5);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
     // A direct Stop also ends teaching.
@@ -360,7 +360,7 @@ fn a_program_that_does_not_answer_is_named() {
     let silent = cell.jtc(&["stop"]).ends(3);
     let words = format!("the program that has this port (process {}) did not answer within 3 s", child.id());
     assert!(silent.err.contains(&words) && silent.err.contains("emergency stop"), "{}", silent.err);
-    assert!(silent.err.contains("the Stop was sent and is not confirmed"), "{}", silent.err);
+    assert!(silent.err.contains("the Stop was sent, but is not confirmed"), "{}", silent.err);
     assert!(!silent.err.contains("nothing was sent"), "{}", silent.err);
     signal(&child, "-CONT");
     child.kill().unwrap();
@@ -409,7 +409,7 @@ fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     let mut stop = command();
     stop.env("XDG_RUNTIME_DIR", cell.0.dir.path()).env("TMPDIR", cell.0.dir.path()).args(["halt"]);
     let stopped = run(stop, &[], "").ends(0);
-    assert!(stopped.out.starts_with("stopped: the arm stands; jtc traj run"), "{}", stopped.out);
+    assert!(stopped.out.starts_with("stopped: the arm is at rest; jtc traj run"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 

@@ -103,7 +103,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     terminal.until("the bar", |p| p.text().contains("% of 12.0 s") && p.text().contains("space pauses"));
     // Ctrl-S does not block a command whose stop key is active.
     terminal.press("\u{13} ");
-    terminal.until_it_shows("paused; space goes on");
+    terminal.until_it_shows("paused; press space to resume");
     terminal.press(" ");
     terminal.until("the motion goes on", |p| p.text().matches("moving").count() >= 3);
     terminal.press("-");

@@ -50,13 +50,14 @@ pub enum BenchCommand {
 }
 
 fn joint(text: &str) -> Result<(Joint, f64), String> {
-    let (joint, angle) =
-        text.split_once('=').ok_or_else(|| format!("the angle of joint {text} is missing: {text}=0"))?;
+    let (joint, angle) = text
+        .split_once('=')
+        .ok_or_else(|| format!("the angle of joint {text} is missing: write {text}=0"))?;
     let joint = joint.trim().parse().ok().and_then(Joint::from_number);
     let angle = angle.trim().parse::<f64>().ok().filter(|angle| angle.is_finite());
     match (joint, angle) {
         (Some(joint), Some(angle)) => Ok((joint, angle)),
-        (None, _) => Err("joints are 1 to 6".into()),
-        (_, None) => Err("the angle is no number".into()),
+        (None, _) => Err("not a valid joint: expected 1 to 6".into()),
+        (_, None) => Err("the angle is not a number".into()),
     }
 }

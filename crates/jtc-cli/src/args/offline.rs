@@ -86,7 +86,7 @@ fn gravity(text: &str) -> Result<[f64; 3], String> {
     let count = text.split(',').count();
     match <[f64; 3]>::try_from(values) {
         Ok(values) if count == 3 => Ok(values),
-        _ => Err("three numbers with commas between them, as 0,0,-9.81".into()),
+        _ => Err("not a valid vector: expected three numbers with commas, for example 0,0,-9.81".into()),
     }
 }
 

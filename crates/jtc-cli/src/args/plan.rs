@@ -156,7 +156,7 @@ fn target(text: &str) -> Result<Target, String> {
     }
     let joints = numbers(text)?.try_into().map_err(|all: Vec<f64>| {
         let count = all.len();
-        format!("{count} numbers, not 6: one for each joint, with commas between them and without blanks")
+        format!("{count} numbers, not 6: expected one number per joint, with commas and without spaces")
     })?;
     Ok(Target::Joints(joints))
 }
@@ -164,7 +164,7 @@ fn target(text: &str) -> Result<Target, String> {
 /// Six numbers with commas between them.
 fn flange_pose(text: &str) -> Result<[f64; 6], String> {
     numbers(text)?.try_into().map_err(|all: Vec<f64>| {
-        format!("{} numbers, not 6: x, y, z in m, roll, pitch and yaw, with commas between them", all.len())
+        format!("{} numbers, not 6: expected x, y, z in m, then roll, pitch and yaw, with commas", all.len())
     })
 }
 

@@ -48,9 +48,9 @@ fn check(file: &Path, out: &Output) -> Result<(), Failure> {
     out.result(&value, || {
         format!("{name}: arm {}\n{}", arm.name, as_text(&checked.findings))
             + if refused {
-                "refused: a controller does not take this arm"
+                "refused: a controller does not accept this arm"
             } else {
-                "a controller takes this arm"
+                "a controller accepts this arm"
             }
     });
     if refused { Err(Failure::shown(ErrorKind::Refused)) } else { Ok(()) }

@@ -15,7 +15,7 @@ pub fn bench(command: &BenchCommand, out: &Output) -> Result<(), Failure> {
             let mut absent = [None; JOINTS];
             for &(joint, angle) in joints {
                 if absent[joint.index()].is_some() {
-                    return Err(Failure::usage(format!("{joint} is given twice; nothing was sent")));
+                    return Err(Failure::usage(format!("{joint} is listed twice; nothing was sent")));
                 }
                 absent[joint.index()] = Some(if *deg { angle.to_radians() } else { angle });
             }
@@ -34,7 +34,7 @@ fn set(absent: &[Option<f64>; JOINTS], link: &LinkArgs, out: &Output) -> Result<
     let mut session = link.session()?;
     session.set_absent(absent).map_err(refused)?;
     out.result(&as_json(absent), || {
-        format!("{}\nnext: jtc recover; jtc doctor names what is wrong", as_text(absent))
+        format!("{}\nnext: jtc recover; jtc doctor shows the problems", as_text(absent))
     });
     Ok(())
 }
@@ -43,10 +43,11 @@ fn refused(error: Error) -> Failure {
     let failure = Failure::of(&error);
     match error {
         Error::Link(LinkError::Refused { code: DataStatus::NotAllowed, .. }) => failure.next(
-            "joints are set absent without torque only: `jtc disable` (an arm without brakes falls), then again; nothing was changed",
+            "joints can be set absent only without torque: `jtc disable` (an arm without brakes falls), then \
+             try again; nothing was changed",
         ),
         Error::Link(LinkError::Refused { code: DataStatus::IncorrectValue, .. }) => {
-            failure.next("angles are in rad, -6.2832 to 6.2832 (`--deg` for degrees); nothing was changed")
+            failure.next("give angles in rad, -6.2832 to 6.2832 (`--deg` for degrees); nothing was changed")
         }
         _ => failure,
     }

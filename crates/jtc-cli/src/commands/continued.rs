@@ -23,8 +23,8 @@ pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
     let inputs = [Some(&args.run), args.trajectory.as_ref(), args.arm.as_ref()];
     let course = Course {
         execute: args.execute.clone(),
-        name: format!("rest of {}", stem(&args.run)),
-        words: format!("the rest of {}", args.run.display()),
+        name: format!("remainder of {}", stem(&args.run)),
+        words: format!("the remainder of {}", args.run.display()),
         inputs: inputs.into_iter().flatten().cloned().collect(),
         arm_named: args.arm.is_some(),
         approach: true,
@@ -58,8 +58,8 @@ impl Left {
         let asked = args.repeat.or(info.and_then(|info| info.runs));
         if asked.is_none() {
             out.note(
-                "note: the recording does not hold how often the motion was to be run: the rest of one run is run. \
-                 --repeat N names how often it was to be run",
+                "note: the recording does not contain the number of runs, so only the interrupted run is \
+                 completed. Use --repeat N to set the number of runs",
             );
         }
         let finished = recording.runs_finished(&first, &then);
@@ -88,8 +88,11 @@ impl Left {
         if self.runs > 0 {
             let times = if self.runs == 1 { "once".to_owned() } else { format!("{} times", self.runs) };
             out.note(match rest {
-                Some(_) => format!("then the whole trajectory is run {times}, as was asked for"),
-                None => format!("the run that was broken off came to its end; the whole trajectory is run {times}, as was asked for"),
+                Some(_) => format!("then the whole trajectory runs {times}, as requested"),
+                None => format!(
+                    "the interrupted run had already finished; the whole trajectory runs {times}, as \
+                     requested"
+                ),
             });
             // The runs after the remainder are checked before the arm moves.
             let verdict = job.verdict(&self.then, None, UploadOptions::default());
@@ -111,9 +114,11 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
     }
     let held = recording.info.as_ref().and_then(|info| info.commanded.as_deref());
     held.cloned().ok_or_else(|| {
-        let message = format!("{} does not hold the whole trajectory; nothing was sent", args.run.display());
+        let message =
+            format!("{} does not contain the whole trajectory; nothing was sent", args.run.display());
         Failure::usage(message).next(format!(
-            "`jtc traj continue {} --trajectory FILE` names the trajectory that was run; recordings in MCAP hold it themselves",
+            "give the trajectory of the run: `jtc traj continue {} --trajectory FILE`; only MCAP recordings \
+             contain it",
             typed(&args.run)
         ))
     })
@@ -132,14 +137,20 @@ fn place(
     let of_path = format!("{} of {:.3} s of its path", seconds(on.ms), whole.duration_s());
     out.note(match on {
         Resumption { shown: true, .. } => {
-            format!("the controller went on by itself to {of_path}, and the arm stands there: it goes on from there")
+            format!(
+                "the controller continued to {of_path} without this program, and the arm is at rest there: \
+                 the motion continues from that position"
+            )
         }
         Resumption { stands: true, .. } => {
-            format!("the recording shows the run up to {of_path}, and the arm stands there: it goes on from there")
+            format!(
+                "the recording shows the run up to {of_path}, and the arm is at rest there: the motion \
+                 continues from that position"
+            )
         }
         _ => format!(
-            "the recording shows the run up to {of_path}, and the controller no later place of it (trajectory {}, at {}): an approach \
-             leads there, and it goes on from there",
+            "the recording shows the run up to {of_path}, and the controller reports no later position \
+             (trajectory {}, at {}): after an approach, the motion continues from there",
             status.trajectory,
             seconds(status.point)
         ),

@@ -31,7 +31,7 @@ pub fn decode(out: &Output) -> Result<(), Failure> {
     }
     if frames == 0 {
         return Err(Failure::usage("no frame of this protocol in the input")
-            .next("hex (9B 0E 00 06 A3 47), a capture, or the raw bytes of a serial line"));
+            .next("pass hex (9B 0E 00 06 A3 47), a capture, or the raw bytes of a serial line"));
     }
     Ok(())
 }

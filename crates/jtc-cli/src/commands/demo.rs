@@ -54,7 +54,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let info = run_report::info(&Arm::avena(), "simulator", "Six joints, ten seconds", 0);
     let mut tapes = Vec::new();
     for file in [&mut mcap, &mut csv] {
-        tapes.push(Tape::begin(file, &info, "the demo goes on", out)?);
+        tapes.push(Tape::begin(file, &info, "the demo continues", out)?);
     }
     let run = execute(args.speed, info, tapes.iter().map(Tape::sink).collect(), &progress, out)?;
     let facts = [
@@ -62,8 +62,8 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
         Facts {
             title: "Simulated arm".into(),
             rows: vec![
-                ("Masses, of what the controller believes".into(), run.masses.clone()),
-                ("Friction, of what the controller believes".into(), run.frictions.clone()),
+                ("Masses, relative to the controller's model".into(), run.masses.clone()),
+                ("Friction, relative to the controller's model".into(), run.frictions.clone()),
                 ("Seed".into(), SEED.to_string()),
             ],
         },
@@ -89,9 +89,10 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     });
     out.result(&value, || {
         format!(
-            "\n{}\n{}\n{:.1} s of simulated time in {:.1} s\n\nlook at it:\n  {}   the report: open it in a browser\n  {}   \
-             for Foxglove, PlotJuggler, Rerun\n  {}   for spreadsheets and scripts\nnext: jtc sim --serial /tmp/jtc   and then   \
-             jtc status --port /tmp/jtc",
+            "\n{}\n{}\n{:.1} s of simulated time in {:.1} s\n\nresults:\n  {}   the report: \
+             open it in a browser\n  {}   for Foxglove, PlotJuggler, Rerun\n  {}   \
+             for spreadsheets and scripts\n\
+             next: jtc sim --serial /tmp/jtc   and then   jtc status --port /tmp/jtc",
             run_report::figures(&summary),
             run_report::link_line(&run.upload, &run.link),
             run.link.time_s,
@@ -211,7 +212,7 @@ fn execute(
         link,
         baud,
         masses: masses.join(", "),
-        frictions: "drawn within ±20 %".into(),
+        frictions: "random within ±20 %".into(),
     })
 }
 

@@ -14,9 +14,7 @@ pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
     let arm = named_arm::load(args.arm.as_deref())?;
     named_arm::note_warnings(&arm, out);
     if args.rotors && arm.rotors_given.contains(&false) {
-        out.note(
-            "note: the arm file does not give every rotor inertia: 0 counts for those that it leaves out",
-        );
+        out.note("note: the arm file does not give every rotor inertia: the missing ones count as 0");
     }
     let gravity = args.gravity.unwrap_or_else(|| arm.config().gravity);
     let dynamics = Dynamics::new(&arm.model, gravity);
@@ -72,7 +70,7 @@ fn numbers(line: &str, what: DynamicsKind) -> Result<Vec<f64>, String> {
     if values.len() == need || (what == DynamicsKind::Mass && values.len() == 3 * JOINTS) {
         Ok(values)
     } else {
-        Err(format!("{} numbers, not {need}", values.len()))
+        Err(format!("{} numbers in the line, expected {need}", values.len()))
     }
 }
 

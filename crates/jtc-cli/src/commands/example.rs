@@ -18,10 +18,10 @@ pub fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
     let Some(example) = Example::named(name) else {
         let names: Vec<&str> = EXAMPLES.iter().map(|e| e.name).collect();
         return Err(Failure::usage(format!(
-            "there is no example \"{name}\"; there are {}",
+            "example \"{name}\" does not exist; the examples are {}",
             names.join(", ")
         ))
-        .next("`jtc example` shows what they are"));
+        .next("`jtc example` describes the examples"));
     };
     let dir = args.dir.as_deref().unwrap_or(".".as_ref());
     std::fs::create_dir_all(dir).map_err(|e| Failure::usage(format!("{}: {e}", dir.display())))?;
@@ -40,7 +40,7 @@ fn list(out: &Output) {
         let rows: Vec<Vec<String>> =
             EXAMPLES.iter().map(|e| [e.name, e.file, e.what].map(str::to_owned).to_vec()).collect();
         format!(
-            "{}\njtc example NAME writes one; jtc help files is the page about the forms of files",
+            "{}\njtc example NAME writes an example; jtc help files describes the file formats",
             table(&["name", "file", "what"], &rows)
         )
     });

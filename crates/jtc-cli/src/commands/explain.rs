@@ -20,8 +20,10 @@ pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     }
     let found = find(code);
     if found.is_empty() {
-        return Err(Failure::usage(format!("nothing is known about \"{code}\""))
-            .next("`jtc explain` lists every code; a number may carry its family, as data:7 or can:0x100"));
+        return Err(Failure::usage(format!("no page explains \"{code}\"")).next(
+            "`jtc explain` lists every code; a number can have its family in front, for example data:7 or \
+             can:0x100",
+        ));
     }
     let value = json!({ "pages": found.iter().map(|p| as_json(p)).collect::<Vec<_>>() });
     out.result(&value, || found.iter().map(|p| format!("{p}\n")).collect::<Vec<_>>().join("\n"));
@@ -44,7 +46,7 @@ fn list(out: &Output) {
         };
         let rows: Vec<Vec<String>> = pages().map(row).collect();
         format!(
-            "{}\njtc explain CODE shows what a code means, what causes it and what to do",
+            "{}\njtc explain CODE shows the meaning of a code, its cause and the remedy",
             table(&["name", ">code"], &rows)
         )
     });

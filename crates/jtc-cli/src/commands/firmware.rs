@@ -51,10 +51,11 @@ fn list(out: &Output) -> Result<(), Failure> {
             }
         }
         if drives.is_empty() {
-            text += "no drive of an ST-LINK is mounted\nnext: connect the board's CN1; then udisksctl mount -b /dev/sdX, or --drive DIR";
+            text += "no ST-LINK drive is mounted\nnext: connect the board's CN1; then udisksctl mount -b \
+                    /dev/sdX, or --drive DIR";
         }
         for drive in &drives {
-            let board = drive.board().map_or("a board that it does not name", |(name, _)| name);
+            let board = drive.board().map_or("unknown board", |(name, _)| name);
             text += &format!("drive {}: {board}\n", drive.path.display());
             if let Some(failure) = drive.failure() {
                 text += &format!("  FAIL.TXT: {failure}\n");
@@ -95,8 +96,14 @@ fn image(
 fn board_of(drive: &Drive, catalogue: &Catalogue) -> Result<String, Failure> {
     let fits = |board: &&String| drive.fit(board) == Fit::Same && !board.ends_with("-ldo");
     catalogue.images.iter().map(|image| &image.board).find(fits).cloned().ok_or_else(|| {
-        let what = format!("{}: which image? No installed one is named by this drive", drive.path.display());
-        Failure::usage(what).next("`--board NAME` or `--image FILE`; `jtc firmware list` shows both")
+        let what = format!(
+            "{}: no image selected, and no installed image fits the board of this drive",
+            drive.path.display()
+        );
+        Failure::usage(what).next(
+            "select one with `--board NAME` or `--image FILE`; `jtc firmware list` shows the boards and \
+             images",
+        )
     })
 }
 
@@ -122,14 +129,16 @@ fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<Str
     match &link.port {
         Some(url) if url.contains("://") => {
             let what = format!(
-                "{url} is an address, and the board is asked over its serial port itself; nothing was sent"
+                "{url} is the address of an agent, but this command needs the serial port of the board; \
+                 nothing was sent"
             );
-            Err(Failure::usage(what).next("end the agent that owns the port, and name the port, or none"))
+            Err(Failure::usage(what)
+                .next("end the agent that owns the port, then give the serial port, or leave out --port"))
         }
         Some(port) => Ok(Some(port.clone())),
         None if has_own || !needed => Ok(None),
         None => only_port().map(Some).map_err(|failure| {
-            let hint = format!("{}; --no-read-back goes without a port", failure.next);
+            let hint = format!("{}; --no-read-back needs no port", failure.next);
             Failure::nothing_sent(failure).next(hint)
         }),
     }
@@ -173,7 +182,10 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         drive.path.display()
     ));
     if !image.is_whole() {
-        out.note("no firmware.json beside the file lists it: that it is not cut short cannot be proved before it is written");
+        out.note(
+            "no firmware.json in the folder lists this file, so an incomplete file cannot be detected before \
+             it is written",
+        );
     }
 
     let before = lines.look()?;
@@ -185,7 +197,10 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         before.own_info().find_map(|info| compare(&image, info).ok()).filter(|_| !args.again)
     {
         out.result(&result(&image, &drive, line.as_ref(), false, Some(program)), || {
-            format!("the board runs this image already ({program}); nothing was written\nnext: --again flashes it all the same")
+            format!(
+                "the board already runs this image ({program}); nothing was written\nnext: --again flashes \
+                 it anyway"
+            )
         });
         return Ok(());
     }
@@ -198,7 +213,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     may_flash(&image, &drive, &now, permissions)?;
     if let Some(other) = now.to_confirm(&image).filter(|now| !args.yes && question.as_ref() != Some(now)) {
         return Err(FirmwareError::Changed {
-            what: format!("meanwhile the board reports something else: {other}"),
+            what: format!("the report of the board has changed in the meantime: {other}"),
         }
         .into());
     }
@@ -223,7 +238,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         out.result(&value, || not_proved(seen, written.doubt.as_deref()));
         return Ok(());
     };
-    out.note("copied; the ST-LINK writes it into the flash, and the board starts");
+    out.note("copied; the ST-LINK writes the image to the flash, then the board starts");
     // The port of the board may come back under another name.
     let mut again = || {
         let own = places.ports_of(&drive).into_iter().next();
@@ -281,19 +296,19 @@ fn stored_arm(before: Option<bool>, after: bool) -> &'static str {
 
 fn proved(verification: &Verification, (port, same_device): &Line, stored_before: Option<bool>) -> String {
     let device = match same_device {
-        Some(true) => "is of the same USB device as the drive",
-        Some(false) => "is of another USB device than the drive: is it the board that was flashed?",
-        None => "may be of another board than the drive: the system does not say",
+        Some(true) => "belongs to the same USB device as the drive",
+        Some(false) => "belongs to another USB device than the drive: check that it is the flashed board",
+        None => "may belong to another board than the drive: the system does not report this",
     };
     let arm = match stored_arm(stored_before, verification.stored_arm()) {
         "lost" => "\nthe stored arm is lost; next: jtc arm push FILE --store",
-        "kept" => "\nthe stored arm is still there",
+        "kept" => "\nthe stored arm is unchanged",
         _ => "",
     };
     format!(
-        "the board runs {} on {}; what it reads in its flash is the image: {} ({:.0} s)\n\
-         {port}, over which it was asked, {device}{arm}\n\
-         next: cycle the power once where this firmware is new on the board, then jtc doctor",
+        "the board runs {} on {}; its flash contains the image: {} ({:.0} s)\n\
+         the port {port} of this check {device}{arm}\n\
+         next: if this firmware is new on the board, cycle the power once, then jtc doctor",
         verification.info.firmware_and_revision(),
         verification.info.board,
         verification.program,
@@ -303,8 +318,10 @@ fn proved(verification: &Verification, (port, same_device): &Line, stored_before
 
 fn not_proved(seen: DriveAfter, doubt: Option<&str>) -> String {
     let doubt = doubt
-        .map_or(String::new(), |doubt| format!(" (at the end of the copying the system reported: {doubt})"));
-    format!("copied, and not proved: {seen}{doubt}\nnext: jtc firmware verify, over the board's serial port")
+        .map_or(String::new(), |doubt| format!(" (at the end of the copy the system reported: {doubt})"));
+    format!(
+        "copied, but not verified: {seen}{doubt}\nnext: jtc firmware verify, over the board's serial port"
+    )
 }
 
 fn verify(args: &ImageArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {

@@ -55,7 +55,8 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     }
     if !not_asked.is_empty() {
         out.note(format_args!(
-            "jtc: not asked, no program of this user has it: {}; `jtc stop --port PATH` stops an arm there",
+            "jtc: no Stop was sent to {}, because no program of this user has that port open; `jtc stop \
+             --port PATH` stops an arm there",
             not_asked.join(", ")
         ));
     }
@@ -112,7 +113,7 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         }
         Reached::Holder(answer, _) => {
             let message = format!(
-                "nothing is executed that could be paused (state {}, trajectory {}); {}",
+                "no motion to pause (state {}, trajectory {}); {}",
                 answer.state,
                 answer.trajectory,
                 holder(&answer)
@@ -216,7 +217,7 @@ impl Stopped {
     fn words(&self) -> String {
         let holder = self.holder.as_ref().map_or(String::new(), |answer| format!("; {}", holder(answer)));
         if self.moved {
-            return format!("stopped: the arm stands{holder}");
+            return format!("stopped: the arm is at rest{holder}");
         }
         format!("nothing was moving: state {}, trajectory {}{holder}", self.state, self.trajectory)
     }
@@ -234,7 +235,7 @@ impl Stopped {
 
 fn holder(answer: &Answer) -> String {
     format!(
-        "{}, process {}, has {}: what it requested before is void, and it may request a new motion after 3 s",
+        "{}, process {}, has {}: its earlier requests are void, and it may request a new motion after 3 s",
         answer.program, answer.pid, answer.port
     )
 }
@@ -284,15 +285,19 @@ impl NotHalted {
         }
         let what = match self.sent {
             Sent::Nothing => {
-                "nothing was sent: if the arm is moving, press the emergency stop (where `jtc traj run` has the port, space pauses and s \
-                 stops there)"
+                "nothing was sent: if the arm is moving, press the emergency stop (if `jtc traj run` has the \
+                 port, press space there to pause or s to stop)"
                     .to_owned()
             }
             Sent::Unconfirmed => {
-                format!("the {name} was sent and is not confirmed: if the arm is moving, press the emergency stop")
+                format!(
+                    "the {name} was sent, but is not confirmed: if the arm is moving, press the emergency \
+                     stop"
+                )
             }
             Sent::Confirmed => format!(
-                "the controller has confirmed the {name}, but no status shows that the arm stands: if it moves, press the emergency stop"
+                "the controller has confirmed the {name}, but no status shows that the arm is at rest: if \
+                 the arm moves, press the emergency stop"
             ),
         };
         let next = self.failure.next.to_string();
@@ -391,7 +396,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
             None => reached = reach(&link, Halt::Stop, true),
         }
     }
-    let message = "one program after the other opens the port of the arm";
+    let message = "the port of the arm is busy: other programs open it one after the other";
     let failure = Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(halt::still_moving_help());
     Err(NotHalted::after(Sent::Confirmed, failure))
 }
@@ -412,7 +417,7 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                     return reach(link, Halt::Stop, true);
                 }
                 if start.elapsed() >= CHANGES_OWN_HANDS {
-                    let message = "the program that had the port has ended, and its port is not found";
+                    let message = "the program that used the port has ended, and the port was not found";
                     let failure = Failure::new(ErrorKind::NoLink, "port", message);
                     return Err(failure.next("`jtc stop --port PATH` stops the arm at its port").into());
                 }

@@ -29,8 +29,8 @@ pub fn help(args: &HelpArgs, out: &Output) -> Result<(), Failure> {
         let pages = PAGES.iter().filter(|_| n == 0).map(|(name, _)| (*name).to_owned());
         let list = known.iter().cloned().chain(pages).collect::<Vec<_>>().join(", ");
         at = at.find_subcommand_mut(word).ok_or_else(|| {
-            Failure::usage(format!("there is no help about \"{word}\""))
-                .next(format!("there is help about {list}"))
+            Failure::usage(format!("no help page about \"{word}\""))
+                .next(format!("help pages exist for {list}"))
         })?;
     }
     let text = at.render_long_help().to_string();

@@ -102,7 +102,7 @@ fn as_text(info: &Info) -> String {
 fn recorder(state: LogState) -> String {
     match state {
         LogState::Error | LogState::Reset => {
-            format!("{state}: jtc log fetch reads it, jtc log clear begins anew")
+            format!("{state}: jtc log fetch reads the log, jtc log clear restarts the recorder")
         }
         state => state.to_string(),
     }
@@ -157,7 +157,7 @@ fn without_extensions(s: &Status) -> String {
         "a controller without extensions: it does not report its firmware, its arm or its limits\n\
          state:     {}\n\
          missing:   {missing}\n\
-         next: jtc status; limits, gravity and rotor inertia are those built into it",
+         next: jtc status; the limits, gravity and rotor inertia are built into the controller",
         s.state
     )
 }
@@ -166,7 +166,7 @@ fn without_extensions(s: &Status) -> String {
 pub fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     if !yes {
-        confirm("the arm loses its torque: without holding brakes it falls", "--yes")?;
+        confirm("the arm loses its torque: an arm without holding brakes falls", "--yes")?;
     }
     session.disable()?;
     let status = session.wait_for("Init without torque", DISABLED, |s| {

@@ -149,8 +149,8 @@ impl Job {
         let Ok(planned) = self.planner(friction.as_ref()).anew(&self.loaded.trajectory) else { return };
         let Ok(at_speed) = plan::at_speed(&planned.trajectory, self.speed) else { return };
         out.note(format!(
-            "note: as it was measured the motion is not within the limits ({why}): its way is planned anew, at most {} rad beside it, in \
-             {:.2} s instead of {:.2} s",
+            "note: the measured motion violates the limits ({why}), so its path was planned again: at most \
+            {} rad away, in {:.2} s instead of {:.2} s",
             Planner::ASIDE,
             planned.trajectory.duration_s(),
             self.loaded.trajectory.duration_s()
@@ -164,7 +164,7 @@ impl Job {
     pub fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> Next {
         if self.made {
             return format!(
-                "`jtc status` shows where the arm is; `jtc {}` plans it anew from there",
+                "check the position of the arm with `jtc status`; `jtc {}` plans again from there",
                 self.words
             )
             .into();
@@ -172,11 +172,12 @@ impl Job {
         if verdict.suspicion() == Suspicion::Degrees && self.passes_as_degrees() {
             let words = &self.words;
             let columns = match self.loaded.form {
-                Form::Csv => "; for good, name its columns q1_deg..q6_deg",
+                Form::Csv => "; or rename the columns of the file to q1_deg..q6_deg",
                 _ => "",
             };
             return format!(
-                "the positions look like degrees, and as such they pass: `jtc traj check {words} --deg`{columns}"
+                "the positions look like degrees, and pass the check in degrees: `jtc traj check {words} \
+                --deg`{columns}"
             )
             .into();
         }
@@ -184,8 +185,9 @@ impl Job {
         if self.loaded.form == Form::Recording && ends_in_motion {
             let words = &self.words;
             return format!(
-                "the recording shows a part of a motion: `jtc traj continue {words} --trajectory FILE` runs the rest of that file, `jtc traj \
-                 replay {words} --measured` the part that was measured, from rest to rest"
+                "the recording is incomplete: `jtc traj continue {words} --trajectory FILE` runs the \
+                remainder of that file, `jtc traj replay {words} --measured` runs the measured part, from \
+                rest to rest"
             )
             .into();
         }
@@ -266,8 +268,8 @@ impl Job {
         let parts = self.left_out();
         (!parts.is_empty()).then(|| {
             format!(
-                "torques are computed without {}, which the file of arm {} does not give: the arm needs more. A copy of \
-                 arms/avena.toml with the numbers of this arm gives all, by --arm",
+                "torques are computed without {}: the file of arm {} does not give these values, so the arm \
+                needs more torque. Copy arms/avena.toml, enter the values of this arm, and pass the copy with --arm",
                 parts.join(" and "),
                 self.arm.name
             )

@@ -28,7 +28,7 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     if let Some(rate) = rate
         && !rate.is_finite()
     {
-        return Err(Failure::usage(format!("{rate} is no rate; nothing was sent")));
+        return Err(Failure::usage(format!("{rate} is not a valid rate; nothing was sent")));
     }
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;
@@ -49,7 +49,7 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     if let Some(joint) = args.joint.and_then(|joint| Joint::from_number(joint.into()))
         && labels::is_absent(&begin, joint.index())
     {
-        let message = format!("{joint} is set absent, and there is nothing to move");
+        let message = format!("{joint} is set absent and cannot be moved");
         return Err(Failure::new(ErrorKind::Refused, "absent-joints", message)
             .next("`jtc bench show` shows which joints are absent"));
     }
@@ -155,11 +155,11 @@ fn with_keys(
     over: impl Fn(&Session<LinkPort>) -> bool,
 ) -> Result<(), Failure> {
     let Some(mut keys) = Keys::listen() else {
-        return Err(Failure::usage("without a terminal there are no keys; nothing was sent").next(
-            "`jtc jog JOINT RATE` moves one joint for as long as the command lives, as `jtc jog 3 0.1`",
+        return Err(Failure::usage("jogging with keys needs a terminal; nothing was sent").next(
+            "`jtc jog JOINT RATE` moves one joint while the command runs, for example `jtc jog 3 0.1`",
         ));
     };
-    out.note("1..6 joint, hold ← or → to move it, ↑ ↓ rate, q ends");
+    out.note("1..6 select a joint, hold ← or → to move it, ↑ ↓ change the rate, q ends");
     let mut held = Held { joint: Joint::ALL[0], rate: first_rate(session)?, moving: None };
     let (mut shown, mut moved) = (String::new(), false);
     while !over(session) && !keys.gone() {
@@ -195,10 +195,12 @@ fn refused(error: Error) -> Failure {
     match &error {
         Error::Link(LinkError::Refused { state, trajectory, code, .. }) => {
             let next = match code {
-                DataStatus::IncorrectValue => "the rate is above the joint's velocity limit: `jtc arm show`",
-                _ if *state != ControllerState::HoldPos => "joints are jogged in HoldPos: `jtc recover`",
+                DataStatus::IncorrectValue => {
+                    "the rate is above the velocity limit of the joint: see `jtc arm show`"
+                }
+                _ if *state != ControllerState::HoldPos => "jogging needs the state HoldPos: `jtc recover`",
                 _ if *trajectory == TrajectoryState::Pause => "a trajectory is paused: `jtc traj stop` first",
-                _ => "the arm is not held at rest yet: `jtc status`",
+                _ => "the arm is not at rest yet: see `jtc status`",
             };
             failure.next(next)
         }

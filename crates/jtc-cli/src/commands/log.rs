@@ -42,7 +42,7 @@ impl Files {
         if let Some(file) = file
             && Format::of(file)? != Format::Mcap
         {
-            let message = format!("{}: a log is written as an .mcap file", file.display());
+            let message = format!("{}: not a valid name for a log, expected an .mcap file", file.display());
             return Err(Failure::usage(message));
         }
         let inputs: Vec<&Path> = arm.into_iter().collect();
@@ -63,7 +63,7 @@ impl Read {
             Some(arm) => {
                 let image = arm.image().map_err(Failure::usage)?.ok_or_else(|| {
                     Failure::usage(format!(
-                        "{}: gains or friction are missing; name a whole arm file",
+                        "{}: gains or friction are missing; give a complete arm file",
                         arm.name
                     ))
                 })?;
@@ -101,7 +101,7 @@ impl Read {
         let verdict = match &replayed.difference {
             None => "no difference".to_owned(),
             Some(difference) => format!(
-                "the first that differs is {} ({:.3} s), state {}: the replay gives {}",
+                "the first difference is at tick {} ({:.3} s), state {}: the replay gives {}",
                 difference.tick,
                 difference.tick as f64 * 1e-3,
                 difference.state,
@@ -112,25 +112,29 @@ impl Read {
             vec![format!("{} ticks, {} replayed, {verdict}", replayed.ticks.len(), replayed.same)];
         if replayed.difference.is_some() {
             lines.push(format!(
-                "a replay is exact with a program of the same version only: this is jtc {}, the log is of {}",
+                "a replay is exact only with the same version: this is jtc {}, the log is from {}",
                 env!("CARGO_PKG_VERSION"),
                 self.0.log.device
             ));
         }
         if replayed.broken {
-            lines.push("the log holds a state that no controller reaches; the replay ends there".to_owned());
+            lines.push(
+                "the log contains a state that no controller can reach; the replay ends there".to_owned(),
+            );
         }
         if replayed.unsure > 0 {
             lines.push(format!(
-                "{} ticks behind a frame that is not in the log (too long, or parameters): they may differ from what was",
+                "{} ticks follow a frame that is not in the log (too long, or parameters): their replay may \
+                 differ from reality",
                 replayed.unsure
             ));
         }
         if replayed.other_arm > 0 {
             let arms: Vec<String> = replayed.arms.iter().map(|arm| hash(*arm)).collect();
             lines.push(format!(
-                "{} ticks are of an arm with hash {}, the one at hand has {}: only what was measured is known of them\n\
-                 next: name the file of that arm with --arm FILE",
+                "{} ticks are from an arm with hash {}, but the present arm has hash {}: only the measured \
+                 values of these ticks are known\n\
+                 next: give the file of that arm with --arm FILE",
                 replayed.other_arm,
                 arms.join(", "),
                 hash(Hash::of_image(&self.0.log.arm)),
@@ -138,7 +142,8 @@ impl Read {
         }
         if replayed.other_points > 0 {
             lines.push(format!(
-                "{} ticks are along a trajectory that is not in the controller any more: only what was measured is known of them",
+                "{} ticks are on a trajectory that the controller no longer has: only the measured values of \
+                 these ticks are known",
                 replayed.other_points
             ));
         }
@@ -162,7 +167,7 @@ impl Read {
             ("replay".to_owned(), self.extent().join("; ")),
         ];
         vec![
-            Facts { title: "What happened".into(), rows: rows.collect() },
+            Facts { title: "Events".into(), rows: rows.collect() },
             Facts { title: "Log".into(), rows: about.to_vec() },
         ]
     }
@@ -204,9 +209,9 @@ fn fetch(files: Files, arm: Option<&Path>, link: &LinkArgs, out: &Output) -> Res
     let read = Read::new(log, arm, &link.name()?)?;
     if read.0.replayed.ticks.is_empty() {
         let message =
-            "the flight recorder holds nothing yet: it was cleared, or the controller has just started";
+            "the flight recorder is still empty: it was cleared, or the controller has just started";
         let failure = Failure::new(ErrorKind::Device, "empty-log", message);
-        return Err(failure.next("`jtc log fetch` again after a second"));
+        return Err(failure.next("repeat `jtc log fetch` after 1 s"));
     }
     let names = read.write(files)?;
     let mut value = read.as_json();
@@ -220,7 +225,7 @@ fn fetch(files: Files, arm: Option<&Path>, link: &LinkArgs, out: &Output) -> Res
             LogState::Error | LogState::Reset => {
                 text + "\nthe recorder has stopped and keeps this log; next: jtc log clear, then jtc recover"
             }
-            _ => text + "\nthe recorder goes on recording",
+            _ => text + "\nthe recorder continues to record",
         }
     });
     Ok(())
@@ -231,7 +236,7 @@ fn clear(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let before = session.log_status()?.state;
     session.clear_log()?;
     out.result(&json!({ "cleared": true, "before": before.name() }), || {
-        "the log is cleared; the flight recorder records anew".to_owned()
+        "the log is cleared; the flight recorder records again".to_owned()
     });
     Ok(())
 }

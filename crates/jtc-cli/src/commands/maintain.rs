@@ -38,7 +38,7 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
             format!("cleared; state {}", s.state.name())
         } else {
             let next = labels::next_step(&s).plain(FrontEnd::Command);
-            format!("still there: {}\nnext: {next}", labels::errors_line(&s))
+            format!("errors remain: {}\nnext: {next}", labels::errors_line(&s))
         }
     });
     if s.errors == 0 { Ok(()) } else { Err(Failure::shown(ErrorKind::Device)) }
@@ -57,8 +57,10 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     if args.defaults && arm.is_some() {
-        return Err(Failure::usage("--arm and --defaults name two sets of numbers")
-            .next("name one: nothing was sent"));
+        return Err(Failure::usage(
+            "--arm and --defaults cannot be combined: each selects a set of parameters; nothing was sent",
+        )
+        .next("use only one of the two options"));
     }
     let parameters = match arm {
         Some(arm) => RecoverParameters::Arm {
@@ -73,8 +75,8 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen_with(move || {
         ended_at_once(
             its_out,
-            "ended at once, on the way back to HoldPos",
-            "`jtc status` shows where the controller is",
+            "ended at once, during the recovery to HoldPos",
+            "`jtc status` shows the state of the controller",
         )
     })?;
     let mut session = args.link.session()?;
@@ -98,9 +100,9 @@ pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
             limits::refused(&arm, &differences, out)
         }
         Error::Cancelled => {
-            let during = steps.last().map_or("its start", String::as_str);
-            Failure { message: format!("cancelled, after: {during}"), ..Failure::of(&e) }
-                .next("the rest of the way was not gone: `jtc status`, then `jtc recover` again")
+            let during = steps.last().map_or("start", String::as_str);
+            Failure { message: format!("cancelled after the step: {during}"), ..Failure::of(&e) }
+                .next("the recovery is incomplete: `jtc status`, then `jtc recover` again")
         }
         _ => not_itself(e),
     })?;
@@ -121,7 +123,7 @@ fn not_itself(e: Error) -> Failure {
         return failure;
     }
     failure.next(
-        "what causes the error is still there: release the emergency stop, look at power, cable and drive of what is named, then \
-         `jtc doctor`; `jtc explain CODE` explains each error",
+        "the cause of the error remains: release the emergency stop, check power, cable and drive of the \
+         named joint or gripper, then `jtc doctor`; `jtc explain CODE` explains each error",
     )
 }

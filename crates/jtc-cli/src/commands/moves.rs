@@ -17,8 +17,9 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         return Err(Failure::nothing_sent(PlanError::Speed { percent, most: 100.0 }));
     }
     if args.deg && matches!(args.to, Some(Target::Pose(_))) {
-        let message = "--deg is for joint positions and poses of the flange, and the unit of a named pose is known; nothing was sent";
-        return Err(Failure::usage(message).next("leave --deg out"));
+        let message = "--deg applies only to joint positions and poses of the flange, not to a named pose; \
+            nothing was sent";
+        return Err(Failure::usage(message).next("leave out --deg"));
     }
     let (name, option) = match (&args.to, &args.to_flange) {
         (Some(Target::Pose(name)), _) => (name.clone(), "--to"),

@@ -76,21 +76,26 @@ fn push(
         let sent: Vec<&str> = pushed.iter().map(|p| p.parameter.name()).collect();
         let mut text = format!("sent: {}\n", sent.join(", "));
         if tried {
-            text += "the new gains have held the arm for two seconds: they stay\n";
+            text += "the new gains held the arm for 2 s and stay in use\n";
         }
         if !kept.is_empty() {
-            text += &format!("not sent, as the controller was given before: {}\n", kept.join(", "));
+            text += &format!("not sent, kept from before: {}\n", kept.join(", "));
         }
         if read.arm.is_some() {
-            let whose =
-                if differences.is_empty() { "the same as in the file" } else { "other ones, listed above" };
-            text += &format!("in no frame: {NOT_CARRIED}; the controller uses its own, {whose}\n");
+            let whose = if differences.is_empty() {
+                "which are equal to the file"
+            } else {
+                "which differ, as listed above"
+            };
+            text += &format!(
+                "not part of the protocol: {NOT_CARRIED}; the controller uses its own values, {whose}\n"
+            );
             if !not_given.is_empty() {
-                text += &format!("not given by the file, so not compared: {}\n", not_given.join(", "));
+                text += &format!("not in the file, so not compared: {}\n", not_given.join(", "));
             }
         }
         text += &if missing.is_empty() {
-            format!("all parameters given; {}", labels::waiting_for(&status))
+            format!("the controller has all parameters; {}", labels::waiting_for(&status))
         } else {
             format!("still missing: {}", missing.join(", "))
         };
@@ -101,7 +106,7 @@ fn push(
 
 /// Waits for the result of the trial of new gains on an arm under torque. Returns `true` if the gains were tried.
 pub(super) fn await_trial(session: &mut Session<LinkPort>, out: &Output) -> Result<bool, Failure> {
-    Ok(session.await_trial(|| out.note("the gains are on trial for two seconds"))?)
+    Ok(session.await_trial(|| out.note("the controller tries the gains for 2 s"))?)
 }
 
 /// Refuses gains that do not keep the arm stable. The check uses the arm of the files, or else the controller's arm.

@@ -29,9 +29,9 @@ fn set(payload: &Payload, link: &LinkArgs, out: &Output) -> Result<(), Failure> 
     value["before"] = as_json(&before);
     out.result(&value, || {
         if before == *payload {
-            return format!("{}\nas it was before", as_text(payload));
+            return format!("{}\nunchanged", as_text(payload));
         }
-        format!("{}\nbefore: {}\nit comes into the torque over 0.5 s", as_text(payload), words(&before))
+        format!("{}\nbefore: {}\nthe controller adds its torque over 0.5 s", as_text(payload), words(&before))
     });
     Ok(())
 }

@@ -17,12 +17,16 @@ use super::{named_arm, run_report};
 use crate::args::PlanArgs;
 
 /// Message for a blend without corners to round.
-const NO_LINES: &str = "--blend-m rounds the corners between lines and arcs, and this motion has none: give --line, or a column `leg`";
+const NO_LINES: &str = "--blend-m has no effect: it rounds corners between lines and arcs, and this motion \
+    has no lines or arcs; use --line, or a column `leg`";
 
 /// Plans a trajectory, checks it, and writes it.
 pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     if !(-40.0..=120.0).contains(&args.temperature) {
-        return Err(Failure::usage(format!("--temperature {} °C is outside -40..120", args.temperature)));
+        return Err(Failure::usage(format!(
+            "--temperature is out of range: {} °C, expected -40 to 120 °C",
+            args.temperature
+        )));
     }
     readable(&args.out)?;
     let arm = named_arm::load(args.arm.as_deref())?;
@@ -78,8 +82,8 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
 fn off_the_line(aside: Aside) -> String {
     let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
     format!(
-        "between waypoints {} and {to} the flange leaves the straight line by up to {mm:.1} mm: legs are straight in joint space; `--line`, \
-         or `line` in a column `leg`, keeps it on the line",
+        "between waypoints {} and {to} the flange leaves the straight line by up to {mm:.1} mm: legs are \
+         straight in joint space; use `--line`, or `line` in a column `leg`, to keep the flange on the line",
         to - 1
     )
 }
@@ -89,15 +93,16 @@ fn readable(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if ["mcap", "yaml", "yml", "json", "toml", "urdf", "xml", "html"].contains(&ending.as_str()) {
         let message = format!(
-            "{}: a plan is written as CSV, and .{ending} is the ending of another form",
+            "{}: a plan is written as CSV, but .{ending} is the ending of another format",
             out.display()
         );
         let name = typed(&out.with_extension("csv"));
-        return Err(Failure::usage(message).next(format!("name a file with the ending .csv: `-o {name}`")));
+        return Err(Failure::usage(message).next(format!("use a file with the ending .csv: `-o {name}`")));
     }
     if out.as_os_str() == "-" {
-        let message = "- is no file: the trajectory is written to a file, and its figures to standard output";
-        return Err(Failure::usage(message).next("name a file with the ending .csv: `-o motion.csv`"));
+        let message = "the output - is not a file: the command writes the trajectory to a file, and its \
+            figures to standard output";
+        return Err(Failure::usage(message).next("use a file with the ending .csv: `-o motion.csv`"));
     }
     Ok(())
 }
@@ -143,7 +148,10 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
             ]
         };
         let rows: Vec<Vec<String>> = Joint::ALL.iter().map(row).collect();
-        let page = args.report.as_deref().map_or(String::new(), |page| format!("\n{}   open it in a browser", page.display()));
+        let page = args
+            .report
+            .as_deref()
+            .map_or(String::new(), |page| format!("\n{}   open it in a browser", page.display()));
         let arm = named_arm::typed_option(args.arm.as_deref());
         format!(
             "{}: {waypoints} waypoints, {:.3} s, {} points every {} ms\n{}{}next: jtc traj run {}{arm} --approach{page}",
@@ -190,7 +198,10 @@ fn margin_words(planned: &Planned, percent: f64) -> String {
     let asked = format!("{percent} % of each limit");
     match planned.verdict.margin {
         Some(left) => {
-            format!("{asked}; left: {:.1} % ({} at {:.3} s)", left.percent, left.joint, left.time_s)
+            format!(
+                "requested {asked}; remaining: {:.1} % ({} at {:.3} s)",
+                left.percent, left.joint, left.time_s
+            )
         }
         None => asked,
     }
@@ -204,9 +215,9 @@ fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> S
         ("Duration", format!("{:.3} s", trajectory.duration_s())),
         ("Points", format!("{} every {} ms", trajectory.points.len(), trajectory.step_ms)),
         ("Blend", format!("{} {}, lines {} m", args.blend, if args.deg { "°" } else { "rad" }, args.blend_m)),
-        ("Speed", format!("{} % of what the limits allow", args.speed)),
+        ("Speed", format!("{} % of the limits", args.speed)),
         ("Payload", super::payload::words(&planner.config.payload)),
-        ("Torque", format!("by the model, with the friction at {} °C", args.temperature)),
+        ("Torque", format!("by the arm model, with friction at {} °C", args.temperature)),
         ("Torque margin", margin_words(planned, args.margin.percent)),
     ];
     let notes = planned.notes.iter().map(|note| ("Note", note.clone()));
@@ -214,7 +225,7 @@ fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> S
     let of_joint = |joint: Joint| (joint.to_string(), binds(&planned.binding, joint));
     let facts = [
         Facts { title: "Plan".into(), rows: rows.collect() },
-        Facts { title: "What binds for how long".into(), rows: Joint::ALL.map(of_joint).into() },
+        Facts { title: "Limiting constraints and their time".into(), rows: Joint::ALL.map(of_joint).into() },
     ];
     let digest = Digest::of(&planner.samples(trajectory));
     let plan = Some(&planned.binding[..]);

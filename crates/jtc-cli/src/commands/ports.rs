@@ -21,12 +21,16 @@ pub fn ports(out: &Output) -> Result<(), Failure> {
         .collect();
     out.result(&json!({ "ports": rows }), || {
         if ports.is_empty() {
-            return "no serial port found\nplug the adapter in, or start a simulated controller: jtc sim --serial /tmp/jtc".into();
+            return "no serial port found\nconnect the adapter, or start a simulated controller: jtc sim \
+                   --serial /tmp/jtc"
+                .into();
         }
         let mut text = String::new();
         for p in &ports {
             let kind = match &p.kind {
-                PortKind::Usb { vendor, product, description, .. } => format!("USB {vendor:04x}:{product:04x} {description}"),
+                PortKind::Usb { vendor, product, description, .. } => {
+                    format!("USB {vendor:04x}:{product:04x} {description}")
+                }
                 PortKind::Pci => "built in".into(),
                 PortKind::Bluetooth => "Bluetooth".into(),
                 PortKind::Unknown => String::new(),

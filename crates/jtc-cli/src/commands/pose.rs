@@ -38,7 +38,7 @@ fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output)
     let saved = arm.poses.get(name).copied().unwrap_or(position);
     // A pose outside the limits is still saved, because the limits may be wrong.
     if let Err(outside) = arm.pose(name) {
-        out.note(format!("warning: {outside}: no motion leads there"));
+        out.note(format!("warning: {outside}: the arm cannot move there"));
     }
     out.result(&json!({ "name": name, "file": file, "position_rad": saved }), || {
         let cells = saved.map(|v| format!("{v:.4}")).join(", ");
@@ -56,7 +56,7 @@ fn list(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
     out.result(&json!({ "file": file, "arm": arm.name, "poses_rad": arm.poses }), || {
         if arm.poses.is_empty() {
             return format!(
-                "{}: arm {} has no poses; jtc pose save NAME --arm {} saves where the arm is",
+                "{}: arm {} has no poses; jtc pose save NAME --arm {} saves the present pose",
                 file.display(),
                 arm.name,
                 typed(file)

@@ -29,7 +29,7 @@ pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     }
     if recording.ending.lost_samples > 0 {
         let (file, lost) = (args.file.display(), recording.ending.lost_samples);
-        out.note(format!("note: {file}: {lost} samples are missing, which the disk did not take in time"));
+        out.note(format!("note: {file}: {lost} samples are missing, because the disk was too slow"));
     }
     let name = stem(&args.file);
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;

@@ -21,10 +21,8 @@ pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     let state = session.fresh_status()?.state;
     if reset_takes_torque(nodes, state)? && !args.yes {
-        let question = format!(
-            "the arm has torque ({}), and a reset of {names} can take it away: the arm may fall",
-            state
-        );
+        let question =
+            format!("the arm has torque ({}), and a reset of {names} can remove it: the arm may fall", state);
         confirm(&question, "--yes")?;
     }
     session.reset(nodes)?;
@@ -40,8 +38,8 @@ fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
     let joints = args.joints.iter().fold(0, |mask, joint| mask | 1 << (joint - 1));
     let nodes = if args.all { ALL } else { joints | if args.gripper { GRIPPER } else { 0 } };
     if nodes == 0 {
-        return Err(Failure::usage("which nodes? Nothing was sent")
-            .next("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`"));
+        return Err(Failure::usage("no node selected; nothing was sent")
+            .next("select nodes with `jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`"));
     }
     Ok(nodes)
 }
@@ -52,9 +50,12 @@ fn of_mask(text: &str) -> Failure {
         Some(hex) => u8::from_str_radix(hex, 16).ok(),
         None => text.parse().ok(),
     };
-    let failure = Failure::usage(format!("\"{text}\" names no joints: nodes have names, nothing was sent"));
+    let failure = Failure::usage(format!(
+        "\"{text}\" does not select nodes: expected --joints, --gripper or --all; nothing was sent"
+    ));
     let Some(mask) = value.filter(|mask| *mask != 0 && mask & !ALL == 0) else {
-        return failure.next("`jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`");
+        return failure
+            .next("select nodes with `jtc reset --joints 1,3` (counted from 1), `--gripper`, or `--all`");
     };
     let joints: Vec<String> = Joint::ALL
         .into_iter()
@@ -68,7 +69,7 @@ fn of_mask(text: &str) -> Failure {
     if mask & GRIPPER != 0 {
         options.push("--gripper".to_owned());
     }
-    let as_mask = format!("`jtc reset {}` resets what the bit mask {text} meant", options.join(" "));
+    let as_mask = format!("`jtc reset {}` resets the nodes of the bit mask {text}", options.join(" "));
     match text.parse::<u8>() {
         Ok(joint @ 1..=6) => {
             failure.next(format!("`jtc reset --joints {joint}` resets joint {joint}; {as_mask}"))

@@ -29,7 +29,7 @@ pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     }
     session.resume()?;
     let value = json!({ "command": "resume", "accepted": true, "checked": job.is_some() });
-    out.result(&value, || "going on".to_owned());
+    out.result(&value, || "motion resumed".to_owned());
     Ok(())
 }
 
@@ -53,12 +53,14 @@ fn check_rest(
     let (joint, away) = furthest_joint(&place, &here);
     if beyond || away > job.config.start_tolerance_rad {
         let message = format!(
-            "the motion is paused at {paused_s:.3} s of its path, and the arm is not where {} is then ({joint} is {:.3} rad away); \
-             nothing was sent",
+            "the motion is paused at {paused_s:.3} s, but the arm is not at that point of {} ({joint} is \
+             {:.3} rad away); nothing was sent",
             job.words, away
         );
-        return Err(Failure::new(ErrorKind::Refused, "other-trajectory", message)
-            .next("name the trajectory that is paused, with the --speed that it was run at; `jtc traj stop` ends it"));
+        return Err(Failure::new(ErrorKind::Refused, "other-trajectory", message).next(
+            "give the trajectory of the paused motion and its --speed, or end the motion with `jtc traj \
+             stop`",
+        ));
     }
     let friction = job.arm.friction();
     job.planner(friction.as_ref()).rest(&job.trajectory, status.point, None).map(drop).map_err(|why| {
@@ -72,8 +74,8 @@ fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Re
     let payload = session.payload()?;
     if session.has_extensions() {
         out.note(format!(
-            "note: not checked: whether what remains of the motion is within the limits with the present settings and payload ({}); \
-             --trajectory FILE names the motion and checks that",
+            "note: the remainder of the motion is not checked against the present settings and payload ({}); \
+             use --trajectory FILE to check it",
             super::payload::words(&payload)
         ));
     }

@@ -120,8 +120,9 @@ fn match_device(
             if course.arm_named {
                 limits::same_arm(&job.arm, &has, accepted, out)?;
             } else {
-                let name = if has.name == job.arm.name { "as it is set" } else { info.arm.as_str() };
-                out.note(format!("note: checked for the arm of the controller, {name}"));
+                let name =
+                    if has.name == job.arm.name { "with its present settings" } else { info.arm.as_str() };
+                out.note(format!("note: checked with the arm of the controller, {name}"));
                 job.arm = has;
             }
         }
@@ -183,7 +184,7 @@ fn drive(
     let speed = session.speed()?;
     if speed < 1.0 {
         out.note(format!(
-            "note: the controller's speed override is {:.0} %: `jtc traj speed 100` ends it",
+            "note: the speed override of the controller is {:.0} %: `jtc traj speed 100` resets it",
             speed * 100.0
         ));
     }

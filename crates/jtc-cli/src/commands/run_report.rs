@@ -82,7 +82,7 @@ pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
 pub fn motion_line(s: &Status) -> String {
     let what = match s.trajectory.known() {
         Some(TrajectoryState::Stop) => "stopped",
-        Some(TrajectoryState::Pause) => "paused; space goes on",
+        Some(TrajectoryState::Pause) => "paused; press space to resume",
         Some(TrajectoryState::Execute) => "moving",
         Some(TrajectoryState::Finish) => "finished",
         Some(TrajectoryState::Null | TrajectoryState::TransNullToStop) | None => "not moving",

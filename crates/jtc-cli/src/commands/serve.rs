@@ -34,8 +34,8 @@ const STOPPING: Duration = Duration::from_secs(5);
 /// Serves the port until SIGINT or SIGTERM. Then stops a motion on its path before it ends.
 pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let token_file = args.link.token_file.clone().or_else(default_token_file).ok_or_else(|| {
-        Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
-            .next("name one with --token-file FILE")
+        Failure::usage("no folder for a token file: neither XDG_STATE_HOME nor HOME is set")
+            .next("choose a file with --token-file FILE")
     })?;
     let stop = Stop::listen()?;
     let log = CommandLog::open(args.command_log.as_deref(), args.command_log_limit, log_failure(out));
@@ -52,7 +52,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
         Failure::usage(format!("{}: {error}", args.listen))
-            .next("another agent may listen there: name another address with --listen")
+            .next("another agent may use this address: choose another one with --listen")
     })?;
     let listen = listener.local_addr()?;
     let modbus = listen_modbus(args)?;
@@ -92,10 +92,15 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     // Without the registration every command can still get the address as an option.
     let registration = register(&registered).ok().flatten();
     if !listen.ip().is_loopback() && tls.is_none() {
-        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it, or --tls-cert and --tls-key");
+        out.note(
+            "note: tokens and commands are sent over the network without encryption: use --tls-cert and \
+             --tls-key, or a network that you trust",
+        );
     }
     if let Some(at) = modbus_at {
-        out.note(format!("note: Modbus knows no tokens: whoever may connect to {at} may command the arm"));
+        out.note(format!(
+            "note: Modbus has no tokens: every client that can connect to {at} can command the arm"
+        ));
     }
     let asked =
         Announced { are_new, link: args.link_with_token, on_terminal: std::io::stderr().is_terminal() };
@@ -130,7 +135,8 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     }
     match gone {
         Some(why) => {
-            Err(Failure::new(ErrorKind::NoLink, "port", why).next("plug it in again, then `jtc ports`"))
+            Err(Failure::new(ErrorKind::NoLink, "port", why)
+                .next("connect the device again, then `jtc ports`"))
         }
         None => Ok(()),
     }
@@ -141,13 +147,13 @@ fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
     let Some(at) = args.modbus else { return Ok(None) };
     if !at.ip().is_loopback() && args.modbus_allow.is_empty() {
         return Err(Failure::usage(format!(
-            "--modbus {at}: nobody else than this computer could connect there"
+            "--modbus {at}: --modbus-allow is missing, so only this computer could connect"
         ))
-        .next("name who may with --modbus-allow, an address or a network: Modbus knows no tokens"));
+        .next("give the allowed addresses or networks with --modbus-allow: Modbus has no tokens"));
     }
     let listener = TcpListener::bind(at).map_err(|error| {
         Failure::usage(format!("--modbus {at}: {error}"))
-            .next("name another port: 502, that of Modbus, is for administrators on most systems")
+            .next("choose another port: on most systems only administrators can use 502, the port of Modbus")
     })?;
     Ok(Some(listener))
 }
@@ -182,7 +188,8 @@ fn come_to_rest(line: &Line, out: &Output) -> bool {
 /// Opens the directory for recordings. This is done before any other step.
 fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     Prepared::open(dir, limit).map_err(|error| {
-        Failure::usage(format!("{}: {error}", dir.display())).next("name another directory with --record DIR")
+        Failure::usage(format!("{}: {error}", dir.display()))
+            .next("choose another directory with --record DIR")
     })
 }
 
@@ -194,7 +201,10 @@ fn keep_policies(
     out: &Output,
 ) -> Result<Option<(Keeper, Found)>, Failure> {
     let Some(state) = host_kit::user_folder("XDG_STATE_HOME", ".local/state") else {
-        out.note("warning: neither XDG_STATE_HOME nor HOME is set: if this agent is killed, nobody's policy acts on what moves");
+        out.note(
+            "warning: neither XDG_STATE_HOME nor HOME is set: if this agent is killed, no policy is applied \
+             to a moving arm",
+        );
         return Ok(None);
     };
     // The port is stored under its given name, because a device may get another number when it is connected again.
@@ -227,7 +237,7 @@ fn notices(log: &Arc<Mutex<CommandLog>>, out: &Output, kind: &'static str) -> Bo
 fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + use<> {
     let out = *out;
     move |error| {
-        out.note(format!("the log of commands cannot be written: {error}; commands are taken all the same"));
+        out.note(format!("the log of commands cannot be written: {error}; commands still work"));
     }
 }
 

@@ -8,12 +8,13 @@ use crate::args::SimArgs;
 /// about a stand, and about an arm without support.
 #[cfg(unix)]
 const BRAKES: &str =
-    "note: simulated holding brakes keep the arm up after an error; the known drives have none";
+    "note: simulated holding brakes hold the arm after an error; the known drives have no brakes";
 #[cfg(unix)]
-const STAND: &str = "note: a stand carries the simulated arm until all its drives were enabled once; after that it falls without torque, as with \
-                     the known drives";
+const STAND: &str = "note: a stand carries the simulated arm until all drives were enabled once; after that \
+    the arm falls without torque, as with the known drives";
 #[cfg(unix)]
-const NOTHING: &str = "note: nothing carries the simulated arm: without torque it falls, also before its drives are first enabled";
+const NOTHING: &str = "note: nothing supports the simulated arm: it falls without torque, also before its \
+    drives are first enabled";
 
 /// Serves a simulated controller until SIGINT or SIGTERM.
 #[cfg(unix)]
@@ -69,7 +70,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     };
     let tap = args.bus.as_deref().map(bus).transpose()?;
     let info = run_report::info(&arm, "simulator", "", 0);
-    let begin = |mut file: OutputFile| Tape::begin(&mut file, &info, "the simulation goes on", out);
+    let begin = |mut file: OutputFile| Tape::begin(&mut file, &info, "the simulation continues", out);
     let tape = file.map(begin).transpose()?;
     let time_s = Server::new(world, pty, tap, Typed::listen())
         .recorded(tape.as_ref().map(Tape::sink))
@@ -81,10 +82,10 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     let name = tape.name().to_owned();
     tape.finish(&Ending {
         outcome: "ended".into(),
-        reason: "the simulator was ended".into(),
+        reason: "the simulator has ended".into(),
         ..Ending::default()
     })?;
-    out.note(format!("{name}: {time_s:.1} s, each millisecond of it"));
+    out.note(format!("{name}: {time_s:.1} s, with every millisecond"));
     Ok(())
 }
 
@@ -93,11 +94,11 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
 fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
     let unreadable = |what: String| {
         Failure::usage(format!("{}: {what}", path.display()))
-            .next("name another file; `jtc arm push --store` writes it")
+            .next("choose another file; the simulator writes it after `jtc arm push --store`")
     };
     match std::fs::read(path) {
         Ok(image) if jtc_wire::ArmImage::parse(&image).is_some() => Ok(Some(image)),
-        Ok(_) => Err(unreadable("holds no stored arm".into())),
+        Ok(_) => Err(unreadable("the file contains no stored arm".into())),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(unreadable(e.to_string())),
     }
@@ -118,8 +119,9 @@ fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
 fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
     let parsed: can_link::CanUrl = url.parse().map_err(Failure::usage)?;
     if matches!(parsed, can_link::CanUrl::Socketcand { .. }) {
-        let what =
-            format!("{url}: the joint bus is CAN FD, and the socketcand protocol has classic frames only");
+        let what = format!(
+            "{url}: the joint bus is CAN FD, but the socketcand protocol supports only classic frames"
+        );
         return Err(Failure::usage(what)
             .next("use --bus multicast:239.74.163.2:43113, which python-can joins as udp_multicast"));
     }
@@ -131,6 +133,6 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
 /// Returns an error, because pseudo-terminals exist only on Unix.
 #[cfg(not(unix))]
 pub fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
-    Err(Failure::usage("jtc sim needs pseudo-terminals, which this system does not have")
-        .next("jtc demo runs everywhere"))
+    Err(Failure::usage("jtc sim needs pseudo-terminals, but this system has none")
+        .next("use jtc demo, which needs no pseudo-terminal"))
 }

@@ -19,10 +19,12 @@ pub fn simulated(
     let arm = named_arm::load(path)?;
     named_arm::note_warnings(&arm, out);
     if arm.friction().is_none() {
-        out.note("note: the arm file gives no friction: that of the default arm is simulated");
+        out.note("note: the arm file gives no friction: the simulator uses the friction of the default arm");
     }
     if arm.rotors_given.contains(&false) {
-        out.note("note: the arm file does not give every rotor inertia: 0 is simulated for those that it leaves out");
+        out.note(
+            "note: the arm file does not give every rotor inertia: the simulator uses 0 for the missing ones",
+        );
     }
     let stored = match (kept, path) {
         (None, Some(path)) => arm.image().map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?,

@@ -146,7 +146,7 @@ fn text(s: &Status, reactions: Option<&Reactions>) -> String {
             format!(
                 "gripper   {}   pump {}   vacuum 1 {}, 2 {}\n",
                 gripper_state(s),
-                if g.pump != 0 { "runs" } else { "stands" },
+                if g.pump != 0 { "on" } else { "off" },
                 is(g.pressure1),
                 is(g.pressure2),
             )

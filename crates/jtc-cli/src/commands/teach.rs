@@ -33,16 +33,19 @@ pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
         TeachCommand::Record { file, overwrite, link, duration, waypoints, tolerance } => {
             let tolerance = tolerance.unwrap_or(TOLERANCE);
             if *waypoints && !(1e-6..=1.0).contains(&tolerance) {
-                let message =
-                    format!("a tolerance of {tolerance} rad is outside 0.000001..1; nothing was sent");
-                return Err(Failure::usage(message).next("0.01 rad is half a degree"));
+                let message = format!(
+                    "tolerance is out of range: {tolerance} rad, expected 0.000001 to 1 rad; nothing was sent"
+                );
+                return Err(Failure::usage(message)
+                    .next("choose a tolerance in this range; 0.01 rad is about half a degree"));
             }
             if *waypoints && file.exists() && !file.is_file() {
                 let message = format!(
-                    "{} is no file, and waypoints are known at the end only; nothing was sent",
+                    "{} is not a regular file, but waypoints can be written only at the end; nothing was \
+                     sent",
                     file.display()
                 );
-                return Err(Failure::usage(message).next("name a file, or leave --waypoints out"));
+                return Err(Failure::usage(message).next("choose a regular file, or leave out --waypoints"));
             }
             let output = OutputFile::open(file, overwrite.overwrite, &[]).map_err(Failure::nothing_sent)?;
             record(output, link, *duration, waypoints.then_some(tolerance), out)
@@ -129,8 +132,10 @@ fn record(
 
 /// Returns the failure if another program has ended teaching.
 fn taught_no_more(status: &Status) -> Failure {
-    let message = format!("another program ended teaching: state {}; the recording ends there", status.state);
-    Failure::new(ErrorKind::Fault, "not-teaching", message).next("`jtc teach record FILE` starts a new one")
+    let message =
+        format!("another program ended teaching: state {}; the recording ends at this point", status.state);
+    Failure::new(ErrorKind::Fault, "not-teaching", message)
+        .next("`jtc teach record FILE` starts a new recording")
 }
 
 /// Handles Ctrl-C. The first one requests the end. The second one ends the command at once and reports the state at
@@ -144,12 +149,13 @@ fn stop_at_once_with(
         let (teaching, begun) = (teaching.load(Ordering::Relaxed), begun.load(Ordering::Relaxed));
         let message = match (teaching, begun) {
             (true, true) => {
-                "ended at once; the file holds the motion up to here. The controller stays in Teaching: the arm can be moved by hand"
+                "ended at once; the file contains the motion up to this point. The controller stays in \
+                 Teaching: the arm can be moved by hand"
             }
             (true, false) => {
                 "ended at once, nothing was recorded; the controller stays in Teaching: the arm can be moved by hand"
             }
-            (false, true) => "ended at once; the file holds the motion",
+            (false, true) => "ended at once; the file contains the motion",
             (false, false) => "ended at once, nothing was recorded",
         };
         ended_at_once(out, message, if teaching { "`jtc teach off` holds the arm" } else { "" })

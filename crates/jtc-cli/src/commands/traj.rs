@@ -37,8 +37,9 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
 fn replay(args: &RunArgs, measured: bool, out: &Output) -> Result<(), Failure> {
     let recorded = if measured { Loaded::load_measured(&args.file) } else { Loaded::load(&args.file, None) }?;
     if recorded.form != Form::Recording {
-        let message = format!("{} is no recording of a run", args.file.display());
-        return Err(Failure::usage(message).next(format!("`jtc traj run {}` runs it", typed(&args.file))));
+        let message = format!("{} is not a recording of a run", args.file.display());
+        return Err(Failure::usage(message)
+            .next(format!("`jtc traj run {}` runs this trajectory", typed(&args.file))));
     }
     let load = |out: &Output| {
         let mut job = Job::of(recorded, &args.file, &args.check, out)?;
@@ -55,8 +56,9 @@ fn speed(percent: Option<f64>, link: &LinkArgs, out: &Output) -> Result<(), Fail
     if let Some(percent) = percent
         && !(5.0..=100.0).contains(&percent)
     {
-        let message = format!("a speed override of {percent} % is outside 5..100; nothing was sent");
-        return Err(Failure::usage(message).next("`jtc traj pause` brings the arm to rest on its path"));
+        let message = format!("speed override {percent} % is out of range (5 to 100 %); nothing was sent");
+        return Err(Failure::usage(message)
+            .next("choose a speed in this range; `jtc traj pause` pauses the arm on its path"));
     }
     let mut session = link.session()?;
     if let Some(percent) = percent {
@@ -73,7 +75,8 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
     let differences = job.arm.device_differences(&Config::avena());
     if !differences.is_empty() {
         out.note(format!(
-            "note: {} settings of this arm are in no frame, and controllers without extensions have others built in; `jtc traj run` lists them",
+            "note: {} settings of this arm cannot be sent to a controller without extensions, which has \
+             other built-in values; `jtc traj run` lists them",
             differences.len()
         ));
     }

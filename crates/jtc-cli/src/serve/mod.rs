@@ -91,9 +91,9 @@ impl Server {
         {
             *kept = number;
             match host_kit::write_atomically(file, image) {
-                Ok(()) => eprintln!("jtc: arm number {number} is kept in {}", file.display()),
+                Ok(()) => eprintln!("jtc: arm number {number} is stored in {}", file.display()),
                 Err(e) => {
-                    eprintln!("jtc: {}: {e}; the stored arm lasts as long as this simulator", file.display())
+                    eprintln!("jtc: {}: {e}; the stored arm is lost when this simulator ends", file.display())
                 }
             }
         }

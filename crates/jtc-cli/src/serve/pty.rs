@@ -36,7 +36,7 @@ impl fmt::Display for PtyError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             PtyError::Taken { path, what } => {
-                write!(f, "{}: {what} is there; it is not replaced, choose another path", path.display())
+                write!(f, "{}: the path is in use: {what}; choose another path", path.display())
             }
             PtyError::Io { what, source } => write!(f, "{what}: {source}"),
         }
@@ -198,7 +198,7 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
         Ok(meta) if !meta.is_symlink() => taken("a file"),
         Ok(_) => match fs::read_link(path) {
             Ok(to) if !to.starts_with("/dev/pts") && path.exists() => taken("a link to something else"),
-            Ok(to) if serves(&to) => taken("the port of another simulator, which still runs,"),
+            Ok(to) if serves(&to) => taken("the port of another running simulator"),
             _ => Ok(()),
         },
     }

@@ -67,7 +67,11 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         );
         assert!(found["by"].as_str().is_some_and(|by| by.contains("jtc traj")), "{found}");
         // The request was sent before any client was served.
-        let taken = [("continue", "it goes on"), ("pause", "a Pause was sent"), ("stop", "a Stop was sent")];
+        let taken = [
+            ("continue", "the motion continues"),
+            ("pause", "a Pause was sent"),
+            ("stop", "a Stop was sent"),
+        ];
         let taken = taken.iter().find(|taken| taken.0 == policy).expect("a policy").1;
         assert!(done(&found).starts_with(taken), "{found}");
         let left = match policy {
@@ -81,7 +85,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             // The motion can be resumed, so the policy is also stored for the agent after this one.
             is_left(&cell, policy, "motion");
             let found = next(&mut cell);
-            assert_eq!(done(&found), "it stays paused");
+            assert_eq!(done(&found), "the motion stays paused");
             assert_eq!(trajectory(&cell.rests(REST)), "Pause");
             cell.done(&["traj", "resume"]);
             cell.until("Finish", |status| trajectory(status) == "Finish");
@@ -109,7 +113,7 @@ fn each_other_phase_follows_the_policy_when_the_agent_is_killed_and_another_come
                 is_left(&cell, "stop", "upload");
                 let found = next(&mut cell);
                 run.ends_without_link();
-                assert_eq!((&found["of"], done(&found)), (&json!("upload"), "nothing moves any more"));
+                assert_eq!((&found["of"], done(&found)), (&json!("upload"), "the arm no longer moves"));
                 assert!(is_held(&cell.rests(REST)));
             }
             "pause" => {

@@ -27,10 +27,15 @@ pub(super) fn push(
     named_arm::note_warnings(&arm, out);
     let set = arm.parameter_set();
     if !set.missing().is_empty() {
-        let message =
-            format!("{}: the file gives no {}; nothing was sent", arm.name, set.missing().join(", no "));
-        return Err(Failure::usage(message)
-            .next("`jtc arm import` proposes starting values for a URDF, `jtc arm check FILE` names what is missing"));
+        let message = format!(
+            "{}: values missing in the file: {}; nothing was sent",
+            arm.name,
+            set.missing().join(", ")
+        );
+        return Err(Failure::usage(message).next(
+            "list the missing values with `jtc arm check FILE`, or get starting values for a URDF with `jtc \
+             arm import`",
+        ));
     }
     set.check()?;
     arm.check_gains()?;
@@ -40,7 +45,7 @@ pub(super) fn push(
     }
     let report = |part: ArmPart<'_>| match part {
         ArmPart::Settings(count) => out.note(format!("{count} settings")),
-        ArmPart::Name => out.note("the name of the arm"),
+        ArmPart::Name => out.note("name of the arm"),
         ArmPart::Parameter(report) => out.note(sent(report)),
     };
     let (pushed, stored) = if store {
@@ -56,11 +61,15 @@ pub(super) fn push(
         "stored_number": stored, "differences": [],
     });
     out.result(&value, || {
-        let line = format!("the controller has arm {}, hash {}: read back, nothing differs", arm.name, hash(now));
+        let line =
+            format!("the controller has arm {}, hash {}: read back without differences", arm.name, hash(now));
         match stored {
-            None => format!("{line}\nnext: jtc arm push --store keeps it over a loss of power"),
+            None => format!(
+                "{line}\nnext: jtc arm push --store stores it in the controller for the next power-on"
+            ),
             Some(number) => format!(
-                "{line}\nstored, number {number}; the controller is in Init\nnext: jtc recover --defaults puts the stored arm in use"
+                "{line}\nstored, number {number}; the controller is in Init\nnext: jtc recover --defaults \
+                 activates the stored arm"
             ),
         }
     });
@@ -76,11 +85,13 @@ fn sent(p: &PushReport) -> String {
 fn refused(error: Error, arm: &Arm) -> Failure {
     let failure = Failure::of(&error);
     match error {
-        Error::Link(LinkError::Refused { request: jtc_wire::FrameType::SetSettings, code, .. }) => match code {
+        Error::Link(LinkError::Refused { request: jtc_wire::FrameType::SetSettings, code, .. }) => match code
+        {
             jtc_wire::DataStatus::NotAllowed => failure.next(
-                "settings change without torque only: `jtc disable` (an arm without brakes falls), then push again; nothing was changed",
+                "settings can change only without torque: `jtc disable` (an arm without brakes falls), then \
+                 push again; nothing was changed",
             ),
-            _ => failure.next("`jtc arm check FILE` names the value; nothing was changed"),
+            _ => failure.next("find the value with `jtc arm check FILE`; nothing was changed"),
         },
         Error::Extension(_) => failure,
         _ => Failure { message: format!("{}: {}", arm.name, failure.message), ..failure },
@@ -96,8 +107,10 @@ fn without_extensions(
     out: &Output,
 ) -> Result<(), Failure> {
     if store {
-        let message = "this controller has no extensions: it keeps no arm; nothing was sent";
-        return Err(Failure::new(ErrorKind::Refused, "no-extension", message).next("push without --store"));
+        let message = "this controller has no extensions and cannot store an arm; nothing was sent";
+        return Err(
+            Failure::new(ErrorKind::Refused, "no-extension", message).next("push the arm without --store")
+        );
     }
     let differences = limits::accept(arm, &Config::avena(), accept.accept_device_limits, out)?;
     let pushed = session.push(&arm.parameter_set(), |p| out.note(sent(p)))?;
@@ -105,7 +118,7 @@ fn without_extensions(
         "arm": arm.name, "hash": null, "parts": pushed, "stored_number": null, "differences": differences,
     });
     out.result(&value, || {
-        format!("friction, gains and model of {} sent; this controller cannot be read back", arm.name)
+        format!("friction, gains and model of {} were sent; this controller cannot report them", arm.name)
     });
     Ok(())
 }
@@ -139,13 +152,13 @@ pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Fai
     let equal = differences.is_empty();
     out.result(&json!({ "equal": equal, "differences": differences, "complete": known }), || {
         let mut text = if equal {
-            format!("nothing differs: the controller has arm {}", arm.name)
+            format!("no differences: the controller has arm {}", arm.name)
         } else {
             format!("{}\n{}", limits::values_differ(differences.len()), as_table(&differences))
         };
         if !known {
-            text += "\nthis controller has no extensions: compared with the settings that its kind is known to have; friction, \
-                     gains and model cannot be read";
+            text += "\nthis controller has no extensions: only its built-in settings were compared; \
+                    friction, gains and model cannot be read";
         }
         text.trim_end().to_owned()
     });

@@ -30,7 +30,8 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
         let mut text = format!("{name}: arm {}\njoints: {}\n", arm.name, joints.join(", "));
         text += &format!("base: link {}; flange: {}\n", arm.link_names[0], arm.flange_name);
         text += &changes(&arm.warnings);
-        text += "proposed: in no URDF, starting values by rule, marked in the file\n";
+        text += "proposed: starting values that a URDF does not contain, computed by rule and marked in the \
+                file\n";
         text += &indented(&as_table(&proposed));
         for rule in rules {
             text += &format!("  {}: {}\n", rule.name, rule.rule);

@@ -19,19 +19,24 @@ pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(),
         "flange": arm.flange_name, "poses_rad": arm.poses, "friction_table": arm.table.is_some(), "warnings": arm.warnings, "values": values,
     });
     out.result(&value, || {
-        let numbered = Joint::ALL.iter().zip(&arm.joint_names).map(|(j, name)| format!("{} {name}", j.number()));
+        let numbered =
+            Joint::ALL.iter().zip(&arm.joint_names).map(|(j, name)| format!("{} {name}", j.number()));
         let joints: Vec<String> = numbered.collect();
         let mut text = format!("{name}: arm {}\njoints: {}\n", arm.name, joints.join(", "));
         text += &gravity(&values);
         text += &format!("\n{}", by_joint(&values));
-        let marks = [(Source::Proposed, "* proposed, nobody has measured or looked it up"), (Source::Default, "d not in the file, the default counts")];
+        let marks = [
+            (Source::Proposed, "* proposed: not measured, and not from a data sheet"),
+            (Source::Default, "d default: the file does not give this value"),
+        ];
         for (source, words) in marks {
             if values.iter().any(|v| v.joint.is_some() && v.from == source) {
                 text += &format!("{words}\n");
             }
         }
         if arm.table.is_some() {
-            text += "friction tables are in the file, too; the polynomial counts unless --friction table asks for them\n";
+            text += "the file also has friction tables; the polynomial is used unless --friction table \
+                    selects the tables\n";
         }
         let unit = |name: &str| values.iter().find(|v| v.name == name).map_or("", |v| v.unit);
         text += &format!("\n{}", frames(&values, arm, unit("origin_rpy_rad.roll")));
@@ -39,7 +44,10 @@ pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(),
         if !arm.poses.is_empty() {
             text += &format!("\n{}", poses(arm, deg));
         }
-        text + &format!("\nsettings of the controller; an arm file may give them in [settings]\n{}", of_controller(&values))
+        text + &format!(
+            "\nsettings of the controller; an arm file can set them in [settings]\n{}",
+            of_controller(&values)
+        )
     });
     Ok(())
 }

@@ -170,7 +170,7 @@ impl View {
             (None, Some(time)) => (vec![silence(time)], Vec::new(), "jtc doctor".into()),
             (Some(s), Some(time)) => {
                 let moving = if s.is_executing() { "; THE ARM MAY BE MOVING" } else { "" };
-                let cause = format!("{}, what was received before is not shown{moving}", silence(time));
+                let cause = format!("{}, older values are not shown{moving}", silence(time));
                 (vec![cause], Vec::new(), "jtc doctor".into())
             }
             (Some(s), None) => {

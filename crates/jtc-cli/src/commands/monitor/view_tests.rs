@@ -103,7 +103,7 @@ fn no_cause_is_cut_and_none_vanishes() {
         let next =
             "next: jtc recover --arm FILE, or --defaults for the arm that is built into the controller";
         assert!(first.contains(&causes[0]) && first.contains(next), "{size:?}\n{first}");
-        assert!(first.contains("more, below") && first.contains("↑↓ 1-"), "{size:?}\n{first}");
+        assert!(first.contains("more below") && first.contains("↑↓ 1-"), "{size:?}\n{first}");
         let all = joined(&scrolled(&mut view, size));
         for cause in &causes {
             assert!(all.contains(cause), "{size:?}: {cause}");

@@ -33,11 +33,11 @@ pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Fail
 
 /// Returns the failure of the path to the first point. The trajectory itself is valid.
 fn refused(why: &str, file: &str) -> Failure {
-    let message =
-        format!("the straight way from where the arm stands to the first point of {file} is refused: {why}");
+    let message = format!("the straight path from the arm to the first point of {file} is refused: {why}");
     let hint = format!(
-        "nothing moved, and {file} itself passed: bring the arm nearer to its first point (`jtc traj info {file}` shows it), by hand \
-         with `jtc teach on` and `jtc teach off`, or with a trajectory of your own around what is in the way"
+        "nothing moved, and {file} itself passed its check: bring the arm nearer to the first point (`jtc \
+         traj info {file}` shows it), by hand with `jtc teach on` and `jtc teach off`, or with a trajectory \
+         around the obstacle"
     );
     Failure::new(ErrorKind::Refused, "approach", message).next(hint)
 }

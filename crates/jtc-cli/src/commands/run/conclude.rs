@@ -75,9 +75,9 @@ pub fn conclude(
     let summary = digest.summary(&info);
     let (phase, verdict) = (last.phase, last.checked.verdict());
     let (upload, outcome) = (last.upload, last.outcome);
-    let where_ = if phase == Phase::Approach { " on the approach to the first point" } else { "" };
+    let where_ = if phase == Phase::Approach { " during the approach to the first point" } else { "" };
     let reason = match &outcome {
-        Ok(_) if cut => format!("ended between two runs, {} were done", done.runs + 1),
+        Ok(_) if cut => format!("ended between two runs, after {} runs", done.runs + 1),
         Ok(_) => where_.trim_start().to_owned(),
         Err(e) if where_.is_empty() => e.to_string(),
         Err(e) => format!("{}: {e}", where_.trim_start()),
@@ -172,8 +172,7 @@ fn each_run(runs: &[Value], left_out: usize) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
-    let before =
-        if left_out > 0 { format!("{left_out} motions were finished before these\n") } else { String::new() };
+    let before = if left_out > 0 { format!("{left_out} earlier motions finished\n") } else { String::new() };
     before + &table(&["worst joint", "", ">s", ">RMS mrad", ">max mrad", ">share %"], &rows)
 }
 
@@ -199,6 +198,6 @@ mod tests {
         let number = |i: usize| runs[i]["run"].as_u64();
         assert_eq!((number(1000), number(999), number(998)), (Some(2002), Some(2001), None));
         assert_eq!(number(0), Some(1335));
-        assert!(each_run(&runs, done.left_out).starts_with("2001 motions were finished before these\n"));
+        assert!(each_run(&runs, done.left_out).starts_with("2001 earlier motions finished\n"));
     }
 }

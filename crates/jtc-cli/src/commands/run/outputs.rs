@@ -31,7 +31,7 @@ impl Outputs {
 
     /// Begins the recording. If it was begun before, it starts again with an empty file.
     pub fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
-        self.record.as_mut().map(|file| Tape::begin(file, info, "the motion goes on", out)).transpose()
+        self.record.as_mut().map(|file| Tape::begin(file, info, "the motion continues", out)).transpose()
     }
 
     /// Completes all files. The loss of one file does not affect the other. Returns the names of the complete files,

@@ -273,5 +273,5 @@ pub fn cancelled(during: &str) -> Failure {
 /// Returns the failure if an output cannot be written before the arm has moved.
 fn not_started(failure: Failure) -> Failure {
     Failure { message: format!("{}; the motion was not started", failure.message), ..failure }
-        .next("make room or name another place, and run again")
+        .next("free disk space or choose another place, then run again")
 }

@@ -242,7 +242,7 @@ class Robot(Connected):
         # The number of Stops is read before any step that takes time, so that a Stop in the meantime cancels the
         # motion.
         asked = self._link.asked()
-        name = f"move to {to if isinstance(to, str) else 'a place'}"
+        name = f"move to {to if isinstance(to, str) else 'a position'}"
         options = options_of(asked, name, False, speed, 1, record, overwrite, accept_device_limits)
 
         def begin() -> Motion:

@@ -42,7 +42,7 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
         let error = &output.json()["error"];
         let message = error["message"].as_str().unwrap();
         assert!(message.starts_with(&format!("{variable}={value} is set")), "{words:?}: {error}");
-        assert!(error["hint"].as_str().unwrap().starts_with("type --"), "{words:?}: {error}");
+        assert!(error["hint"].as_str().unwrap().starts_with("use --"), "{words:?}: {error}");
     }
     for (variable, value) in
         [("JTC_DEG", "1"), ("JTC_PAYLOAD", "2"), ("JTC_BLEND", "0.1"), ("JTC_TEMPERATURE", "5")]
@@ -91,7 +91,7 @@ fn no_variable_acts() {
     ignored("JTC_OCCURRED", "1", &["clear", "--port", &port], 0);
     // The variable has another name now.
     let output = ignored("JTC_OUT", &dir, &["example", "no-such-example"], 2);
-    assert!(output.err.contains("type --out or JTC_EXAMPLE_DIR"), "{}", output.err);
+    assert!(output.err.contains("use --out or JTC_EXAMPLE_DIR"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(existing).unwrap(), "mine");
     assert_eq!(sim.json(&["status"], 0)["state"], "HoldPos");
 }

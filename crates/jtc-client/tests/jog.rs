@@ -40,7 +40,7 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
         assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
         assert!(error["value"].as_f64().is_some_and(|late| late >= 700.0), "{error}");
         assert_eq!(error["limit"], 500.0, "{error}");
-        assert!(error["next"].as_str().is_some_and(|next| next.contains("too slow")), "{error}");
+        assert!(error["next"].as_str().is_some_and(|next| next.contains("faster connection")), "{error}");
         std::thread::sleep(Duration::from_millis(100));
     }
     let (now_ms, after) = seen(&served);

@@ -92,7 +92,7 @@ fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
         let error = &output.json()["error"];
         let message = error["message"].as_str().unwrap();
         assert!(message.starts_with(&format!("{variable}={value} is set")), "{words:?}: {error}");
-        assert!(error["hint"].as_str().unwrap().starts_with("type --"), "{error}");
+        assert!(error["hint"].as_str().unwrap().starts_with("use --"), "{error}");
         assert_eq!(peer.all(50), [""; 0], "{words:?}");
     }
     // If the user types the option, the variable has no effect. `stop` is never refused.

@@ -138,7 +138,8 @@ impl Worker {
     /// Checks that the thread belongs to this process, not to its parent before a fork. In a forked process the locks may be held for ever.
     fn is_here(&self) -> Result<(), Failure> {
         if self.is_foreign() {
-            return Err(closed().next("the process that opened it has it: connect in this one, too"));
+            return Err(closed()
+                .next("the connection belongs to the process that opened it: connect in this process, too"));
         }
         Ok(())
     }

@@ -33,12 +33,12 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     );
     assert!((joint["position_rad"].as_f64().unwrap() - angle).abs() < 1e-6);
     let doctor = sim.jtc(&["doctor"]).ends(0).out;
-    assert!(doctor.contains("joint 3 is set absent"), "{doctor}");
+    assert!(doctor.contains("joint 3 is marked as absent"), "{doctor}");
 
     // Motions and teaching are refused. The other joints can be jogged, but joint 3 cannot.
     let file = sim.file("motion.csv", &motion(0.1));
     let refused = sim.jtc(&["traj", "run", &file]).ends(4).err;
-    assert!(refused.contains("joint 3: set absent") && refused.contains("jtc bench present"), "{refused}");
+    assert!(refused.contains("joint 3: marked as absent") && refused.contains("jtc bench present"), "{refused}");
     let refused = sim.jtc(&["teach", "on"]).ends(1).err;
     assert!(refused.contains("absent"), "{refused}");
     let refused = sim.jtc(&["jog", "3", "0.1", "--duration", "0.2"]).ends(4).err;
@@ -73,7 +73,7 @@ fn j53_a_drive_that_answers_at_an_absent_joint_is_named() {
     sim.jtc(&["bench", "absent", "2=0"]).ends(0);
     std::thread::sleep(std::time::Duration::from_millis(200));
     let doctor = sim.jtc(&["doctor"]).ends(1).out;
-    assert!(doctor.contains("joint 2 is set absent, and its drive answers"), "{doctor}");
+    assert!(doctor.contains("joint 2 is marked as absent, but its drive answers"), "{doctor}");
     sim.jtc(&["bench", "present"]).ends(0);
     let sim = sim.held();
     let status = sim.json(&["status"], 0);

@@ -96,7 +96,7 @@ fn from_power_up_to_a_recorded_motion() {
     // J-34: without a pause there is no motion to resume.
     let output = sim.jtc(&["traj", "resume"]).ends(4);
     assert!(
-        output.err.contains("nothing is paused") && output.err.contains("trajectory Finish"),
+        output.err.contains("no motion is paused") && output.err.contains("trajectory Finish"),
         "{}",
         output.err
     );

@@ -105,9 +105,9 @@ fn link(seen: &Observation, all: &mut Findings) {
     if seen.bytes == 0 {
         all.add(
             Problem,
-            format!("no byte came in {:.1} s", seen.time_s),
-            "controller off, wrong port, or receive wire open",
-            "check power and cable, then `jtc ports`",
+            format!("no byte received in {:.1} s", seen.time_s),
+            "the controller is off, the port is wrong, or the receive wire is open",
+            "check power and cable, then run `jtc ports`",
         );
         return;
     }
@@ -115,15 +115,15 @@ fn link(seen: &Observation, all: &mut Findings) {
         match seen.other_baud {
             Some(rate) => all.add(
                 Problem,
-                format!("{} bytes came at {baud}, but no frame in them", seen.bytes),
-                format!("the controller speaks at {rate} Bd"),
-                format!("`--baud {rate}`"),
+                format!("{} bytes received at {baud}, but they contain no frame", seen.bytes),
+                format!("the controller sends at {rate} Bd"),
+                format!("use `--baud {rate}`"),
             ),
             None => all.add(
                 Problem,
-                format!("{} bytes came at {baud}, but no frame in them", seen.bytes),
+                format!("{} bytes received at {baud}, but they contain no frame", seen.bytes),
                 "wrong rate, or another device at this port",
-                next!("{} with the rate of the controller (it starts with 115200)", DoctorAtRate),
+                next!("try {} with the rate of the controller (115200 Bd after a start)", DoctorAtRate),
             ),
         }
         return;
@@ -133,17 +133,17 @@ fn link(seen: &Observation, all: &mut Findings) {
     if seen.bad_bytes > 175 && bad > 0.001 {
         all.add(
             Warning,
-            format!("{:.1} % of the bytes belong to no frame", bad * 100.0),
-            "a bad cable, no common earth, or a rate that is a little off",
-            "another cable, or a lower rate",
+            format!("{:.1} % of the received bytes are not part of a frame", bad * 100.0),
+            "a bad cable, no common ground, or a rate that is slightly wrong",
+            "use another cable or a lower rate",
         );
     }
     let rate = seen.statuses as f64 / seen.time_s.max(1e-3);
     if rate < 15.0 && seen.time_s >= 0.5 {
         all.add(
             Warning,
-            format!("only {rate:.0} statuses per second, 25 are usual"),
-            "bytes are lost on the way, or this computer is busy",
+            format!("only {rate:.0} statuses per second, expected 25"),
+            "the line loses bytes, or this computer is busy",
             next!("{} shows the link", Monitor),
         );
     } else {
@@ -152,9 +152,9 @@ fn link(seen: &Observation, all: &mut Findings) {
     if seen.confirmed == Some(false) {
         all.add(
             Problem,
-            "the controller speaks, but does not answer",
-            "the wire towards the controller is open, or another program sends at the same time",
-            "check the transmit wire; `fuser -v PORT` names other programs",
+            "the controller sends statuses, but does not answer requests",
+            "the transmit wire to the controller is open, or another program sends at the same time",
+            "check the transmit wire; `fuser -v PORT` lists the programs that use the port",
         );
     }
 }
@@ -165,19 +165,19 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     for joint in joints {
         let state = s.joints[joint.index()].state;
         if state == NodeState::START {
-            let what = format!("{joint} is set absent");
+            let what = format!("{joint} is marked as absent");
             all.add(
                 Severity::Warning,
                 what,
-                "no motion is executed, no teaching",
-                next!("{} ends it, without torque", BenchPresent),
+                "the controller refuses motions and teaching",
+                next!("{} marks all joints as present; the torque must be off", BenchPresent),
             );
         } else {
             all.add(
                 Severity::Problem,
-                format!("{joint} is set absent, and its drive answers ({})", state.name()),
-                "either it is there, or a drive has the wrong number",
-                next!("{}, then {}; or take the drive off the bus", BenchPresent, Recover),
+                format!("{joint} is marked as absent, but its drive answers ({})", state.name()),
+                "the joint is present, or another drive has its node number",
+                next!("{}, then {}; or disconnect the drive from the bus", BenchPresent, Recover),
             );
         }
     }
@@ -201,7 +201,7 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
         all.add(
             Severity::Problem,
             format!("{joint}: the encoder has jumped"),
-            "no trajectory is executed until its drive was reset",
+            "the controller executes no trajectory until the drive is reset",
             held_stop::after_encoder_jump(),
         );
     }
@@ -221,8 +221,8 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
         all.add(
             Problem,
             "the safety input is low",
-            "emergency stop pressed, or its wire broken (it is pulled down)",
-            next!("make the cell safe, release it, then {}", Recover),
+            "the emergency stop is pressed, or its wire is broken (the input has a pull-down)",
+            next!("make the cell safe, release the emergency stop, then {}", Recover),
         );
     }
     for flag in labels::can_flags(s.can_current) {
@@ -230,7 +230,7 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
             Problem,
             format!("joint bus: {flag}"),
             "supply or cable of this node",
-            next!("{} when it is back", Recover),
+            next!("restore the connection, then {}", Recover),
         );
     }
     for (j, joint) in s.joints.iter().enumerate() {
@@ -241,15 +241,10 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
                 continue;
             }
             if s.is_held_stop() {
-                let why = "held stop: the arm met something, or its model lacks a load";
+                let why = "held stop: the arm met an obstacle, or its model lacks a load";
                 all.add(Problem, what, why, next!("remove the cause or set the payload, then {}", Clear));
             } else {
-                all.add(
-                    Problem,
-                    what,
-                    "",
-                    next!("{}, after the trajectory or the model was corrected", Recover),
-                );
+                all.add(Problem, what, "", next!("correct the trajectory or the model, then {}", Recover));
             }
         }
         for word in
@@ -271,7 +266,12 @@ fn errors(s: &Status, told: bool, all: &mut Findings) {
         }
     }
     if s.state == ControllerState::Error && !all.has_problem() {
-        all.add(Problem, "an error is latched whose cause is gone", labels::errors_line(s), Action::Recover);
+        all.add(
+            Problem,
+            "an error is latched, but its cause has ended",
+            labels::errors_line(s),
+            Action::Recover,
+        );
     }
 }
 
@@ -281,13 +281,9 @@ fn set_up(s: &Status, all: &mut Findings) {
     if !missing.is_empty() {
         all.add(
             Problem,
-            format!("not given yet: {}", missing.join(", ")),
-            "the controller waits for it in Init",
-            next!(
-                "{}, or {} if the arm is the one that is built into the controller",
-                ParamsPush,
-                UseDefaults
-            ),
+            format!("parameters not given yet: {}", missing.join(", ")),
+            "the controller waits for these parameters in Init",
+            next!("{}, or {} for the arm that is built into the controller", ParamsPush, UseDefaults),
         );
     }
     for n in labels::nodes_in(s.node_init) {
@@ -297,20 +293,22 @@ fn set_up(s: &Status, all: &mut Findings) {
             (None, None) => (NodeState::START, 0),
         };
         let why = match (state, warnings & warning::POSITION_NOT_ACCURATE != 0) {
-            _ if labels::is_silent(s, n) => "it does not answer",
-            (NodeState::START, _) => "it has not answered yet, or it starts",
-            (_, true) => "its position is not accurate yet",
-            (NodeState::INIT, _) => "its configuration was not accepted yet",
-            (state, _) if state.is_fault() => "it is in its fault state",
-            (state, _) if state.is_transition() => "it is changing its state (the first enable takes 4 s)",
-            _ => "it is being brought up",
+            _ if labels::is_silent(s, n) => "the node does not answer",
+            (NodeState::START, _) => "the node has not answered yet, or is starting",
+            (_, true) => "the position of the node is not accurate yet",
+            (NodeState::INIT, _) => "the node has not accepted its configuration yet",
+            (state, _) if state.is_fault() => "the node is in its fault state",
+            (state, _) if state.is_transition() => {
+                "the node is changing its state (the first enable takes 4 s)"
+            }
+            _ => "the controller is bringing up the node",
         };
         let what = format!("{} is not ready ({})", labels::node(n), state.name());
         all.add(
             if s.is_coming_up() { Problem } else { Warning },
             what,
             why,
-            next!("wait 10 s; then {}", Recover),
+            next!("wait 10 s, then {}", Recover),
         );
     }
     if s.errors == 0 && s.jtc_init == 0 && s.node_init == 0 {
@@ -327,7 +325,12 @@ fn temperatures(s: &Status, all: &mut Findings) {
         // A byte of 200 or more is a negative temperature.
         if (HOT..200).contains(&joint.temperature) {
             let what = format!("{}: bearing at {} °C", labels::node(j), joint.temperature);
-            all.add(Severity::Warning, what, "long motion at high torque", next!("let it cool; {}", Monitor));
+            all.add(
+                Severity::Warning,
+                what,
+                "long motion at high torque",
+                next!("let the joint cool; {} shows its temperature", Monitor),
+            );
         }
     }
 }
@@ -358,7 +361,7 @@ mod tests {
     #[test]
     fn silence_and_a_wrong_rate_are_told_apart() {
         let silent = Observation { time_s: 2.0, ..Default::default() };
-        assert!(text(&silent).contains("no byte came"));
+        assert!(text(&silent).contains("no byte received"));
         let noise = Observation { bytes: 500, bad_bytes: 500, baud: Some(9_600), ..silent };
         assert!(text(&noise).contains("wrong rate"));
         let found = Observation { other_baud: Some(921_600), ..noise };

@@ -10,8 +10,8 @@ use crate::labels;
 /// Returns the next step after an encoder has jumped (J-35).
 pub fn after_encoder_jump() -> Next {
     next!(
-        "support the arm, {}, compare the joint with its marks, {}, then {}; if it comes again, the encoder, its cable or the setting \
-         `velocity_full_scale_rad_s` is wrong",
+        "support the arm, {}, compare the joint with its marks, {}, then {}; if the fault returns, check the encoder, its cable and the setting \
+         `velocity_full_scale_rad_s`",
         Disable,
         ResetJoint,
         RecoverWithArm

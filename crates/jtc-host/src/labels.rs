@@ -35,7 +35,7 @@ pub fn request(request: FrameType) -> &'static str {
         FrameType::FrictionPolynomialUseDefault => "the default friction polynomial",
         FrameType::ResetCanDevices => "resetting nodes",
         FrameType::GripperControl => "switching the pump",
-        FrameType::GetInfo | FrameType::Info => "who the device is",
+        FrameType::GetInfo | FrameType::Info => "reading the identity of the device",
         FrameType::GetSettings | FrameType::Settings => "reading the settings",
         FrameType::SetSettings => "changing the settings",
         FrameType::SetName => "naming the arm",
@@ -250,8 +250,10 @@ pub fn waiting_for(s: &Status) -> String {
 
 /// Returns the next step after a held stop, beginning with the action `cause` that removes its cause.
 pub(crate) fn after_removing(cause: &str) -> Next {
-    let then =
-        next!(", wait until the arm stands, then {}: it is held, and nothing is executed until then", Clear);
+    let then = next!(
+        ", wait until the arm is at rest, then {}; until then the controller holds the arm and executes no motion",
+        Clear
+    );
     Next::from(cause.to_owned()).then(then)
 }
 
@@ -269,21 +271,23 @@ pub fn next_step(s: &Status) -> Next {
     } else if s.errors != 0 || s.state == ControllerState::Error {
         Action::Recover.into()
     } else if s.jtc_init != 0 {
-        next!("{}, or {} if the arm is the one that is built into the controller", ParamsPush, UseDefaults)
+        next!("{}, or {} for the arm that is built into the controller", ParamsPush, UseDefaults)
     } else if s.is_coming_up() && s.node_init != 0 {
-        next!("{} looks at the nodes that are not ready", Doctor)
+        next!("{} examines the nodes that are not ready", Doctor)
     } else if s.state == ControllerState::Teaching {
         Action::TeachOff.into()
     } else if s.is_executing() {
         next!("{} ends the motion", Stop)
     } else if s.state == ControllerState::HoldPos && !absent(s).is_empty() {
-        let then =
-            next!(" moves a joint that is there; {} ends the work on a bench, without torque", BenchPresent);
+        let then = next!(
+            " moves a joint that is present; {} ends the work on a bench while the torque is off",
+            BenchPresent
+        );
         Next::typed(Action::Jog, "jtc jog JOINT RATE").then(then)
     } else if s.state == ControllerState::HoldPos {
         next!("{} moves the arm", TrajRun)
     } else {
-        next!("{} shows how it goes on", Monitor)
+        next!("{} shows the progress", Monitor)
     }
 }
 

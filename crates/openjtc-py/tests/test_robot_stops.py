@@ -296,7 +296,7 @@ def test_a_stop_is_written_first_of_all(wire: Wire):
         until(lambda: wire.stops() > before, 1.0)
         stopping.join()
         waiting.join()
-        assert isinstance(stopping.error, openjtc.NoLinkError) and "stop was sent" in stopping.error.message
+        assert isinstance(stopping.error, openjtc.NoLinkError) and "Stop was sent" in stopping.error.message
         wire.is_silent = False
 
 

@@ -16,7 +16,7 @@ pub enum CheckError {
     Refused(Box<Verdict>),
     /// The arm file and the controller have different values for settings that are not sent with friction, gains and arm
     /// model (J-55).
-    #[error("{arm}: {} of this arm cannot be given to the controller, which uses its own; nothing was sent ({})", values(differences.len()), listed(differences))]
+    #[error("{arm}: {} of this arm cannot be sent to the controller, which uses its own; nothing was sent ({})", values(differences.len()), listed(differences))]
     DeviceLimits {
         /// Name of the arm.
         arm: String,
@@ -43,10 +43,8 @@ impl Diagnose for CheckError {
             Self::DeviceLimits { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "device-limits",
-                next!("a controller with extensions takes the whole arm by {}; ", ArmPush)
-                    .then(format!(
-                        "for others no frame carries {NOT_CARRIED}: they belong into the firmware. "
-                    ))
+                next!("a controller with extensions accepts the whole arm with {}; ", ArmPush)
+                    .then(format!("for other controllers, set {NOT_CARRIED} in the firmware. "))
                     .then(next!(
                         "If its own values are safe for this arm, {} accepts them",
                         AcceptDeviceLimits

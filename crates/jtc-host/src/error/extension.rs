@@ -15,7 +15,7 @@ pub enum ExtensionError {
     #[error("the arm of the device changed while it was read")]
     Changed,
     /// The device does not have an arm that this program can read.
-    #[error("the arm of the device: {why}")]
+    #[error("the arm of the device cannot be read: {why}")]
     NoArm {
         /// Fault of the device's arm.
         why: String,
@@ -37,7 +37,7 @@ pub enum ExtensionError {
         differences: Vec<Difference>,
     },
     /// An arm can be stored only while the torque is off, because storing changes the parameters that hold the arm.
-    #[error("the arm cannot be stored in {state}; nothing was sent")]
+    #[error("the arm cannot be stored in the state {state}; nothing was sent")]
     Powered {
         /// State of the device.
         state: Code<ControllerState>,
@@ -52,9 +52,7 @@ pub enum ExtensionError {
         why: String,
     },
     /// A joint cannot hold the payload in the present pose (J-60).
-    #[error(
-        "a payload of {mass} kg takes {torque:.1} N·m of {joint} where the arm stands, and its limit is {limit} N·m"
-    )]
+    #[error("a payload of {mass} kg needs {torque:.1} N·m at {joint} in the present pose, limit {limit} N·m")]
     TooHeavy {
         /// Mass of the payload, kg.
         mass: f64,
@@ -66,9 +64,7 @@ pub enum ExtensionError {
         limit: f64,
     },
     /// The payload cannot change while a motion runs (J-60).
-    #[error(
-        "the payload is not changed while the arm moves by command (state {state}, trajectory {trajectory})"
-    )]
+    #[error("the payload cannot change during a motion (state {state}, trajectory {trajectory})")]
     PayloadInMotion {
         /// State of the controller at that time.
         state: Code<ControllerState>,
@@ -98,64 +94,60 @@ impl Diagnose for ExtensionError {
             Self::Changed => Diagnosis::new(
                 ErrorKind::Device,
                 "arm-changed",
-                "is another host giving it an arm? Try again",
+                "another host may have sent an arm; try again",
             ),
             Self::NoArm { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "no-arm",
-                next!("its firmware is of another version: {}; {} gives it an arm", Info, ArmPush),
+                next!("the firmware of the device has another version: {}; {} sends an arm", Info, ArmPush),
             ),
             Self::Incomplete { .. } => Diagnosis::new(
                 ErrorKind::Usage,
                 "incomplete-arm",
-                next!("{} names what is missing; nothing was sent", ArmCheck),
+                next!("{} lists the missing parts; nothing was sent", ArmCheck),
             ),
             Self::Differs { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "other-arm",
-                next!("{} lists every value; {} gives the controller this arm", ArmDiff, ArmPush),
+                next!("{} lists every difference; {} sends this arm to the controller", ArmDiff, ArmPush),
             ),
             Self::Powered { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "powered",
                 next!(
-                    "an arm is stored while it has no torque: {}, then push again; an arm without brakes falls",
+                    "an arm can be stored only while the torque is off: {}, then push again; an arm without brakes falls",
                     Disable
                 ),
             ),
             Self::Setting(_) => Diagnosis::new(
                 ErrorKind::Usage,
                 "setting",
-                "docs/settings.md has all settings with their ranges; nothing was changed",
+                "docs/settings.md lists all settings with their ranges; nothing was changed",
             ),
             Self::NoBody { .. } => Diagnosis::new(
                 ErrorKind::Usage,
                 "no-body",
-                "mass in kg, centre of mass in m from the flange, inertia in kg·m² about that centre; nothing was changed",
+                "give the mass in kg, the centre of mass in m from the flange, and the inertia in kg·m² about that centre; nothing was changed",
             ),
             Self::TooHeavy { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "too-heavy",
                 next!(
-                    "nothing was changed. Is the mass in kg and the centre of mass in m, along the axes of the flange? Else move the \
-                     arm to a pose that takes less, by {}, or take less on",
+                    "nothing was changed. Check that the mass is in kg and the centre of mass in m, along the axes of the flange. Otherwise move \
+                     the arm with {} to a pose that needs less torque, or reduce the payload",
                     Jog
                 ),
             ),
             Self::PayloadInMotion { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "in-motion",
-                next!(
-                    "nothing was changed; {} brings a motion to rest, {} shows what goes on",
-                    Pause,
-                    Status
-                ),
+                next!("nothing was changed; {} brings the arm to rest, {} shows the state", Pause, Status),
             ),
             Self::NotStored { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "not-stored",
                 next!(
-                    "the arm is in use until the device is switched off; `jtc info` shows its memory, {} tries again",
+                    "the arm is in use until the device is switched off; `jtc info` shows the state of the memory, {} tries again",
                     ArmStore
                 ),
             ),

@@ -65,8 +65,8 @@ pub enum LinkError {
 
 fn received(bytes: u64) -> String {
     match bytes {
-        0 => "no byte came".into(),
-        n => format!("{n} bytes came, but no frame in them"),
+        0 => "no byte received".into(),
+        n => format!("{n} bytes received, but they contain no frame"),
     }
 }
 
@@ -77,7 +77,8 @@ impl Diagnose for LinkError {
             Self::Port(e) => e.diagnosis(),
             Self::NoLink { bytes: 0, .. } => no_link(
                 "no-link",
-                "check cable and power of the controller, then `jtc doctor`; is it the right one of `jtc ports`?".into(),
+                "check cable and power of the controller, then run `jtc doctor`; `jtc ports` lists all ports"
+                    .into(),
             ),
             Self::NoLink { baud, .. } => {
                 let baud = baud.map_or("none".into(), |b| b.to_string());
@@ -88,18 +89,18 @@ impl Diagnose for LinkError {
                 )
             }
             Self::NotConfirmed { .. } => {
-                no_link("not-confirmed", next!("the line towards the controller loses bytes: {}", Doctor))
+                no_link("not-confirmed", next!("the line to the controller loses bytes: {}", Doctor))
             }
             Self::NoExtension { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "no-extension",
-                "its firmware knows the protocol of existing devices only; `jtc info` shows what could be found out",
+                "the firmware of this device supports only the protocol of existing devices; `jtc info` shows the details that are known",
             ),
             Self::Denied { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "not-sent",
                 next!(
-                    "{} shows the state, and the agent shows who commands; a Stop and a Pause are taken from everyone",
+                    "{} shows the state, and the agent shows the lease holder; the agent accepts Stop and Pause from every client",
                     Status
                 ),
             ),
@@ -110,8 +111,8 @@ impl Diagnose for LinkError {
                         if *code == DataStatus::IncorrectValue =>
                     {
                         Some(next!(
-                            "a number is beyond its bounds, or a joint of this arm is too light for the gains that the controller has \
-                             ({}), or a joint cannot hold this arm where it stands, with its payload: {}, {}",
+                            "a number is beyond its bounds, or a joint of this arm is too light for the gains in the controller (check with {}). Or \
+                             a joint cannot hold this arm with its payload in the present pose: {}, {}",
                             ArmCheck,
                             PayloadShow,
                             PayloadClear
@@ -121,8 +122,8 @@ impl Diagnose for LinkError {
                         if *code == DataStatus::IncorrectValue =>
                     {
                         Some(next!(
-                            "a gain is beyond its bounds, or a joint is too light for it ({}); while the arm is held, also a Kp that \
-                             hardly holds it, and an integral that cannot hold any more what it holds",
+                            "a gain is beyond its bounds, or a joint is too light for it (check with {}). While the arm is held, the controller \
+                             also refuses a Kp that hardly holds the arm, and an integral that holds less than now",
                             ArmCheck
                         ))
                     }
@@ -130,13 +131,13 @@ impl Diagnose for LinkError {
                         if *code == DataStatus::NotAllowed =>
                     {
                         Some(Next::from(
-                            "the cause is still there, a joint still yields, or the arm still moves: free it, wait until it stands, then \
-                             again",
+                            "the cause is still present, a joint still yields, or the arm still moves: free the arm, wait until it is at rest, then \
+                             try again",
                         ))
                     }
                     FrameType::SetSettings | FrameType::SetName if *code == DataStatus::NotAllowed => {
                         Some(next!(
-                            "settings change without torque only: {}, then again; an arm without brakes falls. Nothing was changed",
+                            "settings can change only while the torque is off: {}, then try again. An arm without brakes falls. Nothing was changed",
                             Disable
                         ))
                     }
@@ -144,8 +145,8 @@ impl Diagnose for LinkError {
                         if *code == DataStatus::NotAllowed && *state == ControllerState::HoldPos =>
                     {
                         Some(next!(
-                            "{} ends a paused trajectory, {} a held stop. Where neither is there, gravity leaves nothing of a joint's \
-                             torque limit for this direction: jog it the other way, or take payload off",
+                            "{} ends a paused trajectory, {} ends a held stop. Otherwise gravity needs the whole torque limit of a joint in this \
+                             direction: jog the other way, or remove payload",
                             Stop,
                             Clear
                         ))
@@ -184,7 +185,7 @@ fn after_refused_execution(
     use TrajectoryState::*;
     if trajectory == Pause && is_place(code) {
         return Some(next!(
-            "the arm was moved since it was paused: resume needs each joint where it paused, to 0.02 rad. {}, then {}",
+            "the arm was moved after the Pause: Resume requires each joint within 0.02 rad of its paused position. {}, then {}",
             Stop,
             TrajRunWithApproach
         ));
@@ -192,8 +193,8 @@ fn after_refused_execution(
     let loaded = state == ControllerState::HoldPos && trajectory.is_in(&[Stop, Finish]);
     if loaded && code == DataStatus::IncorrectValue {
         return Some(next!(
-            "the trajectory in the controller breaks a limit, or a bearing is outside the temperatures of the friction table: {} \
-             shows the joint and what has occurred. Check the file: {}",
+            "the trajectory in the controller exceeds a limit, or a bearing temperature is outside the friction table: {} shows the joint and its \
+             errors. Check the file: {}",
             Status,
             TrajCheck
         ));
@@ -202,7 +203,7 @@ fn after_refused_execution(
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then(|| {
         next!(
-            "nothing is being executed, so there is nothing to pause or stop; after a held stop {} comes first. {} shows the state",
+            "no trajectory is running, so the controller cannot pause or stop it; after a held stop, {} first. {} shows the state",
             Clear,
             Status
         )
@@ -219,7 +220,7 @@ fn is_place(code: DataStatus) -> bool {
 pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> Next {
     match (code, state.known()) {
         (DataStatus::NotAllowed, Some(ControllerState::Start | ControllerState::Init)) => {
-            next!("the controller is not ready yet: {} names what is missing", Doctor)
+            next!("the controller is not ready yet: {} names the cause", Doctor)
         }
         (DataStatus::NotAllowed, Some(ControllerState::Error)) => {
             next!("the controller is in Error: {}", Recover)
@@ -227,7 +228,8 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> N
         (DataStatus::NotAllowed, Some(ControllerState::Teaching)) => next!("{} first", TeachOff),
         (DataStatus::NotAllowed, _) => {
             next!(
-                "{} shows the state; {} ends a trajectory, {} a held stop. No motion and no teaching where joints are set absent",
+                "{} shows the state; {} ends a trajectory, {} ends a held stop. If a joint is marked as absent, the controller refuses motions and \
+                 teaching",
                 Status,
                 Stop,
                 Clear
@@ -235,8 +237,8 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> N
         }
         (DataStatus::StartPositionMismatch, _) => {
             next!(
-                "the arm is not at the first point: {} moves it there first. Where it is, a torque limit leaves too little for the \
-                 rest of the way: begin in another pose, or take payload off",
+                "the arm is not at the first point: {} moves it there first. If it is already there, a torque limit leaves too little for the \
+                 remaining distance: begin in another pose, or remove payload",
                 TrajRunWithApproach
             )
         }

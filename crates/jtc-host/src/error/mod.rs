@@ -89,11 +89,13 @@ impl Diagnose for Error {
             Self::Frame(_) => Diagnosis::new(
                 ErrorKind::Usage,
                 "frame",
-                next!("{} and `jtc params show` show what the file holds", TrajCheck),
+                next!("{} and `jtc params show` show the contents of the file", TrajCheck),
             ),
-            Self::Cancelled => {
-                Diagnosis::new(ErrorKind::Fault, "cancelled", next!("{} shows where the arm is", Status))
-            }
+            Self::Cancelled => Diagnosis::new(
+                ErrorKind::Fault,
+                "cancelled",
+                next!("{} shows the position of the arm", Status),
+            ),
         }
     }
 

@@ -14,7 +14,7 @@ pub enum MotionError {
     /// Execution was requested for a trajectory that this session did not upload, or that the controller has lost since. No frame
     /// was sent.
     #[error(
-        "the controller does not hold this trajectory: it was not uploaded, another one was since, or an error made the controller forget it; nothing was sent"
+        "the controller does not have this trajectory: it was not uploaded, another upload replaced it, or an error deleted it; nothing was sent"
     )]
     NotUploaded,
     /// Resume was requested, but no motion is paused.
@@ -26,7 +26,7 @@ pub enum MotionError {
         trajectory: Code<TrajectoryState>,
     },
     /// The remainder of a paused motion no longer passes the check; no frame was sent.
-    #[error("what remains of the motion from {:.3} s on is refused with the present settings and payload: {why}; nothing was sent", f64::from(*point) * 1e-3)]
+    #[error("the remainder of the motion from {:.3} s fails the check with the present settings and payload: {why}; nothing was sent", f64::from(*point) * 1e-3)]
     RestRefused {
         /// Index of the 1 ms point at which the motion is paused.
         point: u32,
@@ -34,7 +34,7 @@ pub enum MotionError {
         why: Box<PlanError>,
     },
     /// The motion did not end as requested.
-    #[error("the run was ended at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, labels::errors_line(status))]
+    #[error("the run ended early at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, labels::errors_line(status))]
     RunFault {
         /// Index of the 1 ms point at which the motion ended.
         point: u32,
@@ -78,13 +78,13 @@ fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> St
 /// Returns the next step after a held stop in a motion.
 fn after_held_stop(cause: Option<&StopCause>) -> Next {
     let remedy = match cause.map(|cause| cause.kind) {
-        None => "remove what the arm met, or set its payload".to_owned(),
+        None => "remove the obstacle, or set the payload".to_owned(),
         // No trajectory can continue before the drive is reset.
         Some(StopKind::EncoderJump) => return held_stop::after_encoder_jump(),
         Some(kind) => held_stop::remedy(kind),
     };
     let then = next!(
-        "; then {}. {} goes on if each joint still stands within 0.02 rad of the path; otherwise {}, then {}",
+        "; then {}. {} continues the motion if each joint is still within 0.02 rad of the path; otherwise {}, then {}",
         Clear,
         Resume,
         Stop,
@@ -97,21 +97,21 @@ fn after_held_stop(cause: Option<&StopCause>) -> Next {
 fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     match last {
         Some(s) if s.trajectory == TrajectoryState::Pause => format!(
-            "The trajectory was paused at point {}: the arm should stand there, but nothing confirms it any more",
+            "The trajectory was paused at point {}: the arm should be at rest there, but no status confirms this",
             s.point
         ),
         Some(s) if s.is_executing() => format!(
-            "THE ARM MAY BE MOVING: at the last status it was at point {} ({:.3} s) of its trajectory, and {}",
+            "THE ARM MAY BE MOVING: in the last status it was at point {} ({:.3} s) of its trajectory, and {}",
             s.point,
             f64::from(s.point) * 1e-3,
             if stop_sent {
-                "a stop was sent; whether it arrived is not known"
+                "a Stop was sent, but not confirmed"
             } else {
-                "the controller goes on without this program"
+                "the controller continues without this program"
             }
         ),
-        _ if stop_sent => "THE ARM MAY BE MOVING: a stop was sent; whether it arrived is not known".into(),
-        _ => "THE ARM MAY BE MOVING: whether the command arrived is not known".into(),
+        _ if stop_sent => "THE ARM MAY BE MOVING: a Stop was sent, but not confirmed".into(),
+        _ => "THE ARM MAY BE MOVING: the command was sent, but not confirmed".into(),
     }
 }
 
@@ -119,9 +119,9 @@ fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
 /// is at rest.
 fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
     if trajectory == TrajectoryState::Execute {
-        "nothing is paused yet: the motion is still slowing down after a pause, or nobody paused it"
+        "no motion is paused yet: the motion is still slowing down after a Pause, or no client paused it"
     } else {
-        "nothing is paused: resume would start a motion, not go on with one"
+        "no motion is paused: Resume would start a motion instead of continuing one"
     }
 }
 
@@ -134,13 +134,16 @@ impl Diagnose for MotionError {
             Self::NotUploaded => (
                 ErrorKind::Refused,
                 "not-uploaded",
-                next!("check it again from the pose of the arm, upload it, then execute it: {}", TrajRun),
+                next!(
+                    "check the trajectory again from the present pose, upload it, then execute it: {}",
+                    TrajRun
+                ),
             ),
             Self::NotPaused { trajectory, .. } => (
                 ErrorKind::Refused,
                 "not-paused",
                 if *trajectory == TrajectoryState::Execute {
-                    next!("a pause takes up to half a second: {} again once {} shows Pause", Resume, Status)
+                    next!("a Pause takes up to half a second: {} again when {} shows Pause", Resume, Status)
                 } else {
                     next!("{} checks a trajectory and starts it", TrajRun)
                 },
@@ -149,7 +152,7 @@ impl Diagnose for MotionError {
                 ErrorKind::Refused,
                 "rest-refused",
                 next!(
-                    "{} shows what the controller computes with, {} corrects it; {} ends the motion",
+                    "{} shows the payload that the controller uses, {} corrects it; {} ends the motion",
                     PayloadShow,
                     PayloadSet,
                     Stop
@@ -158,13 +161,13 @@ impl Diagnose for MotionError {
             Self::RunFault { .. } => (
                 ErrorKind::Fault,
                 "run-fault",
-                next!("{} shows what is wrong, {} leads back to HoldPos", Status, Recover),
+                next!("{} shows the error, {} returns the controller to HoldPos", Status, Recover),
             ),
             Self::LinkLost { .. } => (
                 ErrorKind::NoLink,
                 "link-lost",
                 next!(
-                    "press the emergency stop if it must stand; or restore the link, then {} and {}",
+                    "press the emergency stop if the arm must stop; or restore the link, then {} and {}",
                     Stop,
                     Status
                 ),

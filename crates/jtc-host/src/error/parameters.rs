@@ -32,13 +32,13 @@ pub enum ParametersError {
         next: Next,
     },
     /// The controller needs parameters, but the caller gave no source for them.
-    #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
+    #[error("the controller lacks parameters: {}; nothing was sent", missing.join(", "))]
     NoSource {
         /// Missing parameters.
         missing: Vec<&'static str>,
     },
     /// An arm file lacks parameters that a controller needs.
-    #[error("{arm}: {} missing; parts of another arm are not filled in, nothing was sent", missing.join(", "))]
+    #[error("{arm}: {} missing, and parts of another arm cannot replace them; nothing was sent", missing.join(", "))]
     IncompleteArm {
         /// Name of the arm.
         arm: String,
@@ -54,19 +54,18 @@ impl Diagnose for ParametersError {
             Self::BeyondBounds { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "beyond-bounds",
-                "such a number would throw or drop the arm: correct the file (`jtc params show FILE`); what the controller had before \
-                 is unchanged",
+                "this number could throw or drop the arm: correct the file (`jtc params show FILE`). The parameters in the controller are unchanged",
             ),
             Self::Unstable { next, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "unstable-gains",
-                next.clone().then(next!("; {} lists all of it", ArmCheck)),
+                next.clone().then(next!("; {} lists all problems", ArmCheck)),
             ),
             Self::NoSource { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "no-parameters",
                 next!(
-                    "{} gives the numbers of your arm; {} those of the arm that is built into the controller, when it is that one",
+                    "{} sends the parameters of your arm; {} uses those of the arm that is built into the controller, if yours is that arm",
                     RecoverWithArm,
                     RecoverWithDefaults
                 ),
@@ -74,8 +73,8 @@ impl Diagnose for ParametersError {
             Self::IncompleteArm { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "incomplete-arm",
-                "a URDF holds neither friction nor gains: `jtc arm import` makes an arm file of it and proposes both; else copy \
-                 arms/avena.toml and put in all numbers of this arm, or name all files with `jtc params push`",
+                "a URDF has neither friction nor gains: `jtc arm import` makes an arm file from it and proposes both. Otherwise copy \
+                 arms/avena.toml and enter all numbers of this arm, or name all files with `jtc params push`",
             ),
         }
     }

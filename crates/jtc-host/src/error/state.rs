@@ -43,7 +43,8 @@ pub enum StateError {
     /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the drive's speed has another scale. The
     /// controller executes no trajectory until the drives have been configured again.
     #[error(
-        "{}: the position is not to be trusted, because the encoder has jumped or its speed does not fit; no trajectory is executed until its drive was reset",
+        "{}: the position is not reliable, because the encoder has jumped or the speed of the drive does not match; the controller executes no \
+         trajectory until the drive is reset",
         labels::joints(joints)
     )]
     EncoderJumped {
@@ -51,13 +52,13 @@ pub enum StateError {
         joints: Vec<Joint>,
     },
     /// The arm moves, but a pose must be saved at rest.
-    #[error("{what}, and a pose is where the arm stands; nothing was saved")]
+    #[error("{what}, but a pose can be saved only at rest; nothing was saved")]
     Moving {
         /// Description of the moving part.
         what: String,
     },
     /// The position of a joint is unknown.
-    #[error("{joint}: its position is not known; nothing was saved")]
+    #[error("{joint}: the position is unknown; nothing was saved")]
     NotMeasured {
         /// Joint with the unknown position.
         joint: Joint,
@@ -72,7 +73,7 @@ pub enum StateError {
     },
     /// The arm has torque, and a reset of these nodes can remove it.
     #[error(
-        "the arm has torque ({state}), and a reset of {nodes} can take it away: the arm may fall; nothing was sent"
+        "the arm has torque ({state}), and a reset of {nodes} can remove it: the arm may fall; nothing was sent"
     )]
     MayFall {
         /// Names of the nodes.
@@ -81,7 +82,10 @@ pub enum StateError {
         state: Code<ControllerState>,
     },
     /// The user has marked joints as absent, so the controller executes no motion.
-    #[error("{}: set absent; no motion is executed, and nothing was sent", labels::joints(joints))]
+    #[error(
+        "{}: marked as absent, so the controller executes no motion; nothing was sent",
+        labels::joints(joints)
+    )]
     Absent {
         /// Absent joints.
         joints: Vec<Joint>,
@@ -94,7 +98,7 @@ impl Diagnose for StateError {
             Self::Device { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "device-error",
-                next!("{} leads back to HoldPos, {} explains each error", Recover, ExplainCode),
+                next!("{} returns the controller to HoldPos, {} explains each error", Recover, ExplainCode),
             ),
             Self::HeldStop { status, cause } => {
                 Diagnosis::new(ErrorKind::Fault, "held-stop", held_stop::next_step(status, cause.as_ref()))
@@ -108,9 +112,11 @@ impl Diagnose for StateError {
             Self::NotReady { status } => {
                 Diagnosis::new(ErrorKind::Device, "not-ready", labels::next_step(status))
             }
-            Self::Moving { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "moving", next!("wait until it stands, or {}", Pause))
-            }
+            Self::Moving { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "moving",
+                next!("wait until the arm is at rest, or {}", Pause),
+            ),
             Self::NotMeasured { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "not-measured",
@@ -131,7 +137,7 @@ impl Diagnose for StateError {
                 ErrorKind::Refused,
                 "absent-joints",
                 next!(
-                    "{} shows them; {} moves the joints that are there; {}, then {} ends it: an arm without brakes falls",
+                    "{} lists the absent joints; {} moves the other joints. To end the work on a bench: {}, then {}; an arm without brakes falls",
                     BenchShow,
                     Jog,
                     Disable,

@@ -11,7 +11,7 @@ use crate::labels;
 #[non_exhaustive]
 pub enum UploadError {
     /// The controller refused a segment permanently.
-    #[error("segment {segment} of {segments}: {}", labels::data_status(*code))]
+    #[error("segment {segment} of {segments} was refused: {}", labels::data_status(*code))]
     SegmentRefused {
         /// Number of the segment, from 0.
         segment: usize,
@@ -22,7 +22,7 @@ pub enum UploadError {
     },
     /// The upload did not end with a complete trajectory.
     #[error(
-        "upload given up after {restarts} restarts; segments confirmed: {confirmed} of {segments}, trajectory {}",
+        "upload failed after {restarts} restarts: {confirmed} of {segments} segments confirmed, trajectory {}",
         trajectory
     )]
     Incomplete {
@@ -44,7 +44,7 @@ impl Diagnose for UploadError {
                 ("segment-refused", after_refusal(*code, ControllerState::HoldPos.into()))
             }
             Self::Incomplete { .. } => {
-                ("upload-failed", next!("{} looks at the line; then run it again", Doctor))
+                ("upload-failed", next!("{} checks the line; then run the trajectory again", Doctor))
             }
         };
         Diagnosis::new(ErrorKind::Device, code, next)

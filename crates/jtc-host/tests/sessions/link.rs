@@ -228,7 +228,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(error.to_string(), "Cargo.toml is no serial port");
     let mut s = ready(Some(921_600));
     let error = s.stop().unwrap_err();
-    assert!(error.hint().contains("nothing to pause or stop"), "{}", error.hint());
+    assert!(error.hint().contains("cannot pause or stop"), "{}", error.hint());
     let mut s = session(Some(921_600));
     let error = upload(&mut s, &trajectory(50)).unwrap_err();
     assert!(matches!(error, Error::Upload(UploadError::SegmentRefused { segment: 0, .. })), "{error}");

@@ -108,7 +108,7 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert_eq!((error.kind(), error.code()), (ErrorKind::NoLink, "link-lost"));
     let text = error.to_string();
     assert!(text.contains("THE ARM MAY BE MOVING") && text.contains("point 1234 (1.234 s)"), "{text}");
-    assert!(text.contains("a stop was sent") && !text.contains("goes on"), "{text}");
+    assert!(text.contains("a Stop was sent") && !text.contains("continues"), "{text}");
     assert!(error.hint().contains("emergency stop"), "{}", error.hint());
     assert_eq!(*written.borrow(), jtc_wire::fixed::exec(jtc_wire::ExecCommand::Stop));
 

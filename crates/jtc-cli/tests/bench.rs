@@ -38,7 +38,10 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     // Motions and teaching are refused. The other joints can be jogged, but joint 3 cannot.
     let file = sim.file("motion.csv", &motion(0.1));
     let refused = sim.jtc(&["traj", "run", &file]).ends(4).err;
-    assert!(refused.contains("joint 3: marked as absent") && refused.contains("jtc bench present"), "{refused}");
+    assert!(
+        refused.contains("joint 3: marked as absent") && refused.contains("jtc bench present"),
+        "{refused}"
+    );
     let refused = sim.jtc(&["teach", "on"]).ends(1).err;
     assert!(refused.contains("absent"), "{refused}");
     let refused = sim.jtc(&["jog", "3", "0.1", "--duration", "0.2"]).ends(4).err;

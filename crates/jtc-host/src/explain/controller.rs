@@ -98,32 +98,32 @@ entries! {
             "jtc doctor";
         8 "can-no-answer-joint-1":
             "Joint 1 (node 0) does not answer.",
-            "Its supply or cable is off, its node number is wrong, or it restarts.",
+            "The node has no supply or no connection, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
             "jtc reset --joints 1";
         9 "can-no-answer-joint-2":
             "Joint 2 (node 1) does not answer.",
-            "Its supply or cable is off, its node number is wrong, or it restarts.",
+            "The node has no supply or no connection, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
             "jtc reset --joints 2";
         10 "can-no-answer-joint-3":
             "Joint 3 (node 2) does not answer.",
-            "Its supply or cable is off, its node number is wrong, or it restarts.",
+            "The node has no supply or no connection, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
             "jtc reset --joints 3";
         11 "can-no-answer-joint-4":
             "Joint 4 (node 3) does not answer.",
-            "Its supply or cable is off, its node number is wrong, or it restarts.",
+            "The node has no supply or no connection, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
             "jtc reset --joints 4";
         12 "can-no-answer-joint-5":
             "Joint 5 (node 4) does not answer.",
-            "Its supply or cable is off, its node number is wrong, or it restarts.",
+            "The node has no supply or no connection, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
             "jtc reset --joints 5";
         13 "can-no-answer-joint-6":
             "Joint 6 (node 5) does not answer.",
-            "Its supply or cable is off, its node number is wrong, or it restarts.",
+            "The node has no supply or no connection, its node number is wrong, or it restarts.",
             "Check supply and cable of this drive and of the one before it.",
             "jtc reset --joints 6";
         14 "can-no-answer-gripper":

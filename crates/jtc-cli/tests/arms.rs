@@ -126,7 +126,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     assert_eq!((read.model, read.joint_names), (arm.model, arm.joint_names));
     jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml]).ends(4);
     let output = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
-    assert!(output.err.contains("is no robot description"), "{}", output.err);
+    assert!(output.err.contains("is not a robot description"), "{}", output.err);
 
     // The text output also shows the changes and proposals, and the file passes its check with warnings.
     let output = jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml, "--overwrite"]).ends(0);
@@ -264,7 +264,7 @@ fn degrees_are_neither_taken_for_radians_nor_turned_twice() {
     std::fs::write(&waypoints, "Q1_DEG,Q2_DEG,Q3_DEG,Q4_DEG,Q5_DEG,Q6_DEG\n0,0,0,0,0,0\n60,20,-30,0,20,0\n")
         .unwrap();
     let output = jtc(&["plan", &waypoints, "-o", &motion, "--deg"]).ends(2);
-    assert!(output.err.contains("leave --deg out"), "{}", output.err);
+    assert!(output.err.contains("omit --deg"), "{}", output.err);
     assert!(!std::path::Path::new(&motion).exists());
     jtc(&["plan", &waypoints, "-o", &motion]).ends(0);
     let last = std::fs::read_to_string(&motion).unwrap();

@@ -34,7 +34,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     // If the header contains units, these are used.
     std::fs::write(&path, header.replace("q1,", "q1_deg,") + &rows(45.0, 0.01)).unwrap();
     let output = jtc(&["traj", "info", file, "--deg"]).ends(2);
-    assert!(output.err.contains("units of this file are known"), "{}", output.err);
+    assert!(output.err.contains("the file states its units"), "{}", output.err);
 
     std::fs::write(&path, rows(0.7, 0.01)).unwrap();
     let output = jtc(&["traj", "check", file]).ends(2);
@@ -79,9 +79,9 @@ fn mistakes_in_options_are_named_with_what_helps() {
         (&["move", "--to", ""], 2, "neither six numbers nor the name of a pose"),
         (&["move", "--to", "0,0,0,0,0,0", "--speed", "-5"], 2, "speed -5 % is not within 1..100 %"),
         (&["plan", &waypoints, "-o", &out, "--speed", "-5"], 2, "speed -5 % is not within 1..100 %"),
-        (&["plan", &bytes, "-o", &out], 2, "no text (its bytes are no UTF-8)"),
-        (&["plan", &degrees, "-o", &out, "--deg"], 2, "leave --deg out"),
-        (&["traj", "speed", "-3"], 2, "speed override -3 % is out of range (5 to 100 %)"),
+        (&["plan", &bytes, "-o", &out], 2, "not a text file (its bytes are not valid UTF-8)"),
+        (&["plan", &degrees, "-o", &out, "--deg"], 2, "omit --deg"),
+        (&["traj", "speed", "-3"], 2, "a speed override of -3 % is outside 5..100"),
         (&["traj", "check", &waypoints, "--speed", "300"], 2, "column t (time in s) is missing"),
         (&["traj", "continue", "none.mcap"], 2, "check the name"),
         (&["traj", "continue", &waypoints], 2, "jtc traj run FILE --record"),

@@ -126,7 +126,7 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
         (vec!["--to-flange", "2,0,0.4,0,0,0"], 4, "no move to 2,0,0.4,0,0,0: out of reach"),
         (vec!["--to-flange", "2,0,0.4,0,0,0", "--line"], 4, "out of reach"),
         (vec!["--to", "0,0,0,0,0,0", "--line"], 4, "nothing was sent"),
-        (vec!["--to-flange", "1,2,3"], 2, "3 numbers, not 6"),
+        (vec!["--to-flange", "1,2,3"], 2, "3 numbers, expected 6"),
         (vec!["--line"], 2, "--to"),
     ] {
         let output = sim.jtc(&[&["move"], &words[..]].concat()).ends(code);
@@ -174,10 +174,10 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
         (
             vec!["move", "--to", "hone", "--arm", &arm],
             2,
-            "has no pose \"hone\"; it has home; nothing was sent",
+            "has no pose \"hone\"; the arm has home; nothing was sent",
         ),
-        (vec!["move", "--to", "home"], 2, "has no pose \"home\"; it has none"),
-        (vec!["move", "--to", "0,0,0"], 2, "3 numbers, not 6"),
+        (vec!["move", "--to", "home"], 2, "has no pose \"home\"; the arm has no poses"),
+        (vec!["move", "--to", "0,0,0"], 2, "3 numbers, expected 6"),
         (
             vec!["move", "--to", "0,1.6,0,0,0,0"],
             4,
@@ -191,7 +191,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
             "speed 0 % is not within 1..100 %; nothing was sent",
         ),
         (vec!["move", "--to", "0.1,0,0,0,0,0", "--record", "run.txt"], 2, "run.txt"),
-        (vec!["pose", "save", "1st", "--arm", &arm], 2, "is no name of a pose"),
+        (vec!["pose", "save", "1st", "--arm", &arm], 2, "is not a valid name of a pose"),
         (vec!["pose", "save", "new", "--arm", "nothing.toml"], 2, "nothing.toml: No such file"),
     ] {
         let output = sim.jtc(&words).ends(code);

@@ -8,7 +8,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 pub const FILE_MAX: u64 = 64 << 20;
 /// Reason why `--deg` is not allowed for a file that states its units.
 pub(crate) const UNITS_KNOWN: &str =
-    "the units of this file are known: its numbers are not taken as degrees; leave --deg out";
+    "the file states its units, so its numbers cannot be degrees; omit --deg";
 
 /// Reason why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -127,19 +127,19 @@ impl Diagnose for FileError {
     fn diagnosis(&self) -> Diagnosis {
         let next = match self {
             FileError::Io { .. } => "check the name and the rights of the file".into(),
-            FileError::TooLarge { .. } => "is it the right file?".into(),
+            FileError::TooLarge { .. } => "check that this is the right file".into(),
             FileError::Joints { path, six, .. } => format!(
-                "name the six that are the arm, the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
+                "name the six joints of the arm; the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
                 path.display()
             ),
             FileError::Choice { .. } => {
-                "--joints takes the names of six joints from the base to the wrist, with commas between them; --tip the link that is \
-                 the flange, which the sixth joint carries: `jtc arm import --help`"
+                "--joints takes the names of six joints from the base to the wrist, separated by commas. --tip takes the link of the flange, which \
+                 the sixth joint carries: `jtc arm import --help`"
                     .into()
             }
             FileError::FewJoints { .. } => {
-                "this controller drives arms of six revolute or continuous joints, no arms with fewer axes and no prismatic ones; \
-                 `jtc example arm` writes one that it drives"
+                "this controller drives only arms with six revolute or continuous joints, without prismatic axes; `jtc example arm` writes an \
+                 example"
                     .into()
             }
             FileError::At { .. } | FileError::Form { .. } => {
@@ -186,7 +186,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
         return Err(FileError::TooLarge { path: path.to_owned(), bytes });
     }
     let bytes = std::fs::read(path).map_err(io)?;
-    String::from_utf8(bytes).map_err(|_| FileError::form("no text (its bytes are no UTF-8)").in_file(path))
+    String::from_utf8(bytes)
+        .map_err(|_| FileError::form("not a text file (its bytes are not valid UTF-8)").in_file(path))
 }
 
 /// Parses a number in the notations of these files (`20.`, `-9.e-6`, ` 1`). Never returns NaN or infinity.
@@ -196,7 +197,7 @@ pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileE
         Ok(v) => Err(FileError::at(place(), format!("{v} is not a finite number"))),
         Err(_) if text.trim().is_empty() => Err(FileError::at(place(), "a number is missing")),
         Err(_) if text.trim().replacen(',', ".", 1).parse::<f64>().is_ok() => {
-            let problem = format!("\"{}\" has a decimal comma: write a decimal point", short(text));
+            let problem = format!("\"{}\" has a decimal comma; write a decimal point", short(text));
             Err(FileError::at(place(), problem))
         }
         Err(_) => Err(FileError::at(place(), format!("\"{}\" is not a number", short(text)))),

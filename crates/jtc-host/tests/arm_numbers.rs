@@ -72,7 +72,7 @@ fn a_number_that_is_left_out_is_missed() {
         match Arm::parse(&changed) {
             Err(e) => {
                 let e = e.to_string();
-                let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, not ");
+                let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, expected ");
                 assert!(named, "{} {text}: {e}", number.key);
             }
             // If the missing value has a default, it must be listed as a default or have a warning. A missing rotor inertia
@@ -95,7 +95,7 @@ fn a_number_that_is_given_twice_is_refused() {
         let pair = with(number.at.clone(), &format!("{text}, {} = {text}", number.key));
         for changed in [beside, again, pair] {
             let e = Arm::parse(&changed).expect_err(number.key).to_string();
-            let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, not ");
+            let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, expected ");
             assert!(named || e.contains("place"), "{} {text}: {e}", number.key);
         }
     }

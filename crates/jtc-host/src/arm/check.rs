@@ -137,7 +137,7 @@ impl Arm {
             let what = format!("{}, {}: {}", self.titled(joint), fault.key, fault.problem);
             let mut found = ArmFinding::new(Severity::Problem, "limit", what).of(joint, fault.key);
             found.value = Some(fault.value);
-            findings.push(found.because("a wrong sign or a slip").next("correct it in the file"));
+            findings.push(found.because("a wrong sign or a typing error").next("correct it in the file"));
         }
     }
 
@@ -155,22 +155,23 @@ impl Arm {
         }
         if !findings.iter().any(|f| f.code == "physical") {
             let mass: f64 = self.model.links[1..].iter().map(|l: &Link| l.mass).sum();
-            let what = format!("masses and inertias are those of bodies; {mass:.3} kg move");
+            let what = format!("masses and inertias are physically consistent; {mass:.3} kg move");
             findings.push(ArmFinding::new(Severity::Good, "physical", what));
         }
     }
 
     fn unphysical(&self, error: &ModelError) -> ArmFinding {
-        let bodiless =
-            "no body has such moments: inertia not about the centre of mass, in another unit, or made up";
+        let bodiless = "no physical body has such moments: the inertia is not about the centre of mass, in another unit, or invented";
         let (why, value, limit) = match *error {
-            ModelError::MassZero { .. } => ("a frame without a body, or a mass that was left out", 0.0, None),
+            ModelError::MassZero { .. } => ("a frame without a body, or a missing mass", 0.0, None),
             ModelError::MassNegative { mass, .. } => ("a wrong sign", mass, Some(0.0)),
             ModelError::InertiaNegative { moment, .. } => (bodiless, moment, Some(0.0)),
             ModelError::InertiaTriangle { moment, limit, .. } => (bodiless, moment, Some(limit)),
-            ModelError::AngleTooLarge { value, limit, .. } => ("a slip, or degrees", value, Some(limit)),
-            ModelError::NotFinite { value, .. } => ("a slip", value, None),
-            _ => ("a slip", f64::NAN, None),
+            ModelError::AngleTooLarge { value, limit, .. } => {
+                ("a typing error, or degrees", value, Some(limit))
+            }
+            ModelError::NotFinite { value, .. } => ("a typing error", value, None),
+            _ => ("a typing error", f64::NAN, None),
         };
         // The text gives the number of the part; the finding gives its name.
         let text = error.to_string();
@@ -211,8 +212,8 @@ impl Arm {
                 ArmFinding::new(Severity::Problem, "drives", what)
                     .of(joint, name)
                     .measured(value, limit, unit)
-                    .because("the mechanism may do more than its drives")
-                    .next(format!("{name} of {most} {unit} at most, without sign")),
+                    .because("the limits of the mechanism may exceed those of its drives")
+                    .next(format!("lower {name} to {most} {unit} at most (absolute value)")),
             );
         }
     }
@@ -232,7 +233,7 @@ impl Arm {
                         ArmFinding::new(Severity::Problem, "bounds", what)
                             .of(joint, setting.name)
                             .measured(value, limit, setting.unit)
-                            .because("a slip, or a number in another unit")
+                            .because("a typing error, or a number in another unit")
                             .next("correct it in the file"),
                     );
                 }
@@ -249,7 +250,7 @@ impl Arm {
             let what = joint.map_or(about.clone(), |j| about.replacen(&j.to_string(), &self.titled(j), 1));
             let limit = if e.value < e.low { e.low } else { e.high };
             let mut found = ArmFinding::new(Severity::Problem, "bounds", what)
-                .because("no arm of these drives has that")
+                .because("an arm with these drives cannot have this value")
                 .next(format!("correct {name} in the file"));
             (found.joint, found.name) = (joint, Some(name));
             (found.value, found.limit) = (Some(e.value), Some(limit));
@@ -292,16 +293,18 @@ impl Arm {
         for part in self.parameter_set().missing() {
             findings.push(
                 ArmFinding::new(Severity::Problem, "missing", format!("{part}: not in the file"))
-                    .because("a controller does not leave Init without")
-                    .next("jtc arm import proposes some for a robot description; else add them to the file"),
+                    .because("a controller does not leave Init without this part")
+                    .next("jtc arm import proposes values for a robot description; otherwise add the values to the file"),
             );
         }
         let not_given =
-            [(self.gravity.is_none(), "gravity_m_s2", "the controller's own, straight down, counts")];
+            [(self.gravity.is_none(), "gravity_m_s2", "the controller uses its own gravity, straight down")];
         for (_, name, why) in not_given.into_iter().filter(|(lacks, ..)| *lacks) {
             let mut found = ArmFinding::new(Severity::Warning, "missing", format!("{name}: not in the file"));
             found.name = Some(name);
-            findings.push(found.because(why).next("add it as the arm is mounted, in the frame of its base"));
+            findings.push(
+                found.because(why).next("add gravity for the mounting of the arm, in the frame of its base"),
+            );
         }
         let rotors: Vec<Joint> = Joint::ALL.into_iter().filter(|j| !self.rotors_given[j.index()]).collect();
         if !rotors.is_empty() {
@@ -309,14 +312,14 @@ impl Arm {
             let what = format!("{name}: not in the file for {}", numbers(&rotors));
             let mut found = ArmFinding::new(Severity::Warning, "missing", what);
             found.name = Some(name);
-            let next = "motor's rotor inertia times gear ratio squared";
+            let next = "add the motor's rotor inertia times the gear ratio squared";
             findings
-                .push(found.because("0 counts, and a geared rotor is mostly more than its link").next(next));
+                .push(found.because("the controller uses 0, but the inertia of a geared rotor is usually larger than that of its link").next(next));
         }
         self.find_keys(findings, Source::Default, |name, joints| {
-            let what = format!("{name}: not in the file for {joints}, a default counts");
+            let what = format!("{name}: not in the file for {joints}; a default is used");
             ArmFinding::new(Severity::Warning, "default", what)
-                .next("jtc arm show shows it; add it to the file")
+                .next("jtc arm show shows the default; add the value to the file")
         });
     }
 
@@ -343,23 +346,25 @@ impl Arm {
             let what =
                 format!("pose {name}, {}: {value} rad is outside {min}..{max} rad", self.titled(joint));
             let mut found = ArmFinding::new(Severity::Warning, "pose", what)
-                .because("no motion leads there")
+                .because("no motion can reach this pose")
                 .measured(value, if value < min { min } else { max }, "rad")
-                .next("jtc pose save saves it again where the arm is, jtc pose remove takes it out");
+                .next(
+                    "jtc pose save replaces it with the present pose of the arm, jtc pose remove deletes it",
+                );
             found.joint = Some(joint);
             findings.push(found);
         }
     }
 
     fn find_proposed(&self, findings: &mut Vec<ArmFinding>) {
-        let next = "measure it or look it up, then take its name out of `proposed`";
+        let next = "measure the value or look it up, then remove its name from `proposed`";
         if self.sources.of((None, "gravity_m_s2")) == Source::Proposed {
-            let what = "gravity_m_s2: proposed, nobody has said how the arm is mounted";
+            let what = "gravity_m_s2: proposed; the mounting of the arm is not confirmed";
             let found = ArmFinding::new(Severity::Warning, "proposed", what).next(next);
             findings.push(ArmFinding { name: Some("gravity_m_s2"), ..found });
         }
         self.find_keys(findings, Source::Proposed, |name, joints| {
-            let what = format!("{name}: proposed for {joints}, nobody has measured or looked it up");
+            let what = format!("{name}: proposed for {joints}; not measured and not looked up");
             ArmFinding::new(Severity::Warning, "proposed", what).next(next)
         });
     }

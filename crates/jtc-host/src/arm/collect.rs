@@ -183,7 +183,7 @@ impl ParameterFile {
         if joints.friction.len() > 0 && self.polynomial.is_some() {
             self.warn(
                 path.display().to_string(),
-                "friction polynomial and table are there: the polynomial is taken",
+                "the directory has a friction polynomial and a friction table: the polynomial is used",
             );
         }
         let arms: Vec<&PathBuf> =
@@ -195,12 +195,15 @@ impl ParameterFile {
                 let names: Vec<String> = arms.iter().map(|p| p.display().to_string()).collect();
                 self.warn(
                     "arm model".to_owned(),
-                    format!("none taken of {}: push the right one by name", names.join(", ")),
+                    format!(
+                        "several files found, none is used: {}; push the right file by name",
+                        names.join(", ")
+                    ),
                 );
             }
         }
         if self.sources.len() + joints.len() == before {
-            let problem = "no FricTableJointN.csv, FricPolynomialCoeffs.csv, PidParamJointN.csv, URDF or TOML file in it";
+            let problem = "the directory has no FricTableJointN.csv, FricPolynomialCoeffs.csv, PidParamJointN.csv, URDF or TOML file";
             return Err(FileError::form(problem).in_file(path));
         }
         Ok(())
@@ -247,12 +250,12 @@ impl<T> PerJoint<T> {
     /// Adds the table of a joint; the file name gives the joint number.
     fn add(&mut self, path: &Path, table: T) -> Result<(), FileError> {
         let Some((_, joint, _)) = split_name(path) else {
-            let problem = "holds the numbers of one joint, and its name gives no joint: such files are named ...Joint0.csv \
-                           (joint 1) to ...Joint5.csv (joint 6), and all six are needed";
+            let problem = "has the numbers of one joint, but its name has no joint number, expected ...Joint0.csv (joint 1) to ...Joint5.csv (joint \
+                           6); all six files are needed";
             return Err(FileError::form(problem).in_file(path));
         };
         if let Some((other, _)) = &self.found[joint.index()] {
-            let problem = format!("holds {joint}, which {} holds already", other.display());
+            let problem = format!("has the numbers of {joint}, but {} has them too", other.display());
             return Err(FileError::form(problem).in_file(path));
         }
         self.found[joint.index()] = Some((path.to_owned(), table));
@@ -275,7 +278,7 @@ impl<T> PerJoint<T> {
             Ok(tables) => Ok(Some((tables, paths))),
             Err(_) => {
                 let problem = format!(
-                    "holds the numbers of one joint; not named: {}. Name all six files, or their directory",
+                    "has the numbers of one joint; missing: {}. Name all six files, or their directory",
                     missing.join(", ")
                 );
                 Err(FileError::form(problem).in_file(&first))

@@ -35,7 +35,7 @@ pub(super) fn read(text: &str) -> Result<Table, FileError> {
     let same =
         |rows: &[(usize, Vec<f64>)], w: usize| rows.iter().find(|r| r.1.len() != w).map(|r| (r.0, r.1.len()));
     let uneven = |found: Option<(usize, usize)>, want: usize| match found {
-        Some((line, n)) => Err(FileError::at(Place::line(line), format!("{n} columns, not {want}"))),
+        Some((line, n)) => Err(FileError::at(Place::line(line), format!("{n} columns, expected {want}"))),
         None => Ok(()),
     };
     match (n, w) {
@@ -59,15 +59,16 @@ pub(super) fn read(text: &str) -> Result<Table, FileError> {
             Ok(Table::Model(Box::new(model(&all))))
         }
         _ => Err(FileError::form(format!(
-            "{n} rows of {w} numbers are none of the known tables: friction of a joint 22 x 20, friction polynomial 6 x 4 or \
-             6 x 6, gains of a joint 1 x 5 or of all 6 x 5, arm model 7 x 6 and 7 x 13"
+            "unknown table of {n} rows with {w} numbers, expected friction of a joint 22 x 20, friction polynomial 6 x 4 or 6 x 6, gains of a joint \
+             1 x 5 or of all 6 x 5, arm model 7 x 6 and 7 x 13"
         ))),
     }
 }
 
 fn joint_table(all: &[(usize, Vec<f64>)]) -> Result<TableOf<f32>, FileError> {
     if all.len() != 22 {
-        let problem = format!("{} rows, not 22 (velocities, temperatures, 20 rows of torques)", all.len());
+        let problem =
+            format!("{} rows, expected 22 (velocities, temperatures, 20 rows of torques)", all.len());
         return Err(FileError::form(problem));
     }
     let row = |i: usize| -> [f32; 20] { std::array::from_fn(|c| all[i].1[c] as f32) };
@@ -83,7 +84,7 @@ fn increasing(axis: &[f32; 20], line: usize, name: &str) -> Result<(), FileError
     match axis.windows(2).position(|w| w[1] <= w[0] || w[1].is_nan() || w[0].is_nan()) {
         None => Ok(()),
         Some(i) => {
-            let problem = format!("{} does not lie above {}: the axis must increase", axis[i + 1], axis[i]);
+            let problem = format!("{} is not greater than {}: the axis must increase", axis[i + 1], axis[i]);
             Err(FileError::at(Place::cell(line, i + 2).named(name), problem))
         }
     }
@@ -96,13 +97,14 @@ fn long_table(text: &str) -> Result<Table, FileError> {
     let mut tables = Box::new([empty; JOINTS]);
     for (line, cells) in rows(text).skip(1) {
         if cells.len() != 6 {
-            return Err(FileError::at(Place::line(line), format!("{} columns, not 6", cells.len())));
+            return Err(FileError::at(Place::line(line), format!("{} columns, expected 6", cells.len())));
         }
         let value = |c: usize| number(cells[c], || Place::cell(line, c + 1)).map(|v| v as f32);
         let index = |c: usize, most: usize| match cells[c].parse::<usize>() {
             Ok(v) if v < most => Ok(v),
             _ => {
-                let problem = format!("\"{}\" is not 0..{}", crate::file::short(cells[c]), most - 1);
+                let problem =
+                    format!("\"{}\" is out of range, expected 0..{}", crate::file::short(cells[c]), most - 1);
                 Err(FileError::at(Place::cell(line, c + 1), problem))
             }
         };
@@ -114,7 +116,7 @@ fn long_table(text: &str) -> Result<Table, FileError> {
     }
     for (joint, t) in Joint::ALL.into_iter().zip(tables.iter()) {
         if t.torque.iter().flatten().any(|v| v.is_nan()) {
-            return Err(FileError::form(format!("the table of {joint} is not complete (400 rows)")));
+            return Err(FileError::form(format!("the table of {joint} is not complete, expected 400 rows")));
         }
         increasing(&t.velocity, 0, "velocities")?;
         increasing(&t.temperature, 0, "temperatures")?;
@@ -140,7 +142,7 @@ fn polynomial(all: &[(usize, Vec<f64>)]) -> Result<Table, FileError> {
     if turned * 2 > all.len() {
         let (line, row) = (all[wrong[0]].0, &all[wrong[0]].1);
         let problem = format!(
-            "the coefficients are in descending order ({} first): this form has c0 (Coulomb), c1, c2, c3{} from left to right",
+            "the coefficients are in descending order ({} first), expected c0 (Coulomb), c1, c2, c3{} from left to right",
             row[0],
             if row.len() == 6 { ", c4 (1/K), c5 (°C)" } else { "" }
         );
@@ -153,10 +155,10 @@ fn polynomial(all: &[(usize, Vec<f64>)]) -> Result<Table, FileError> {
 
 fn gains((line, row): &(usize, Vec<f64>)) -> Result<PidGains, FileError> {
     let [kp, ki, kd, int_min, int_max] = row[..] else {
-        return Err(FileError::at(Place::line(*line), format!("{} columns, not 5", row.len())));
+        return Err(FileError::at(Place::line(*line), format!("{} columns, expected 5", row.len())));
     };
     if int_min > int_max {
-        let problem = format!("lower bound {int_min} of the integral is above the upper one {int_max}");
+        let problem = format!("lower bound {int_min} of the integral is above its upper bound {int_max}");
         return Err(FileError::at(Place::cell(*line, 4), problem));
     }
     Ok(PidGains { kp, ki, kd, int_min, int_max })

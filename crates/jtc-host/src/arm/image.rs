@@ -14,7 +14,7 @@ use crate::frame::model_rows;
 #[non_exhaustive]
 pub enum ImageError {
     /// The bytes are not an image of a known version.
-    #[error("no arm image that this program reads")]
+    #[error("not an arm image that this program can read")]
     Form,
     /// A setting is out of range, or two settings contradict each other.
     #[error("{0}")]

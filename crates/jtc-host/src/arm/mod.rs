@@ -173,7 +173,7 @@ impl Arm {
     /// Returns the errors of [`import`](Self::import).
     pub fn import_text(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         if !is_xml(text) {
-            return Err(FileError::form("is no robot description: a URDF is XML and begins with <"));
+            return Err(FileError::form("is not a robot description: a URDF is XML and begins with <"));
         }
         let Described { arm, gravity, friction } = urdf::read(text, choice)?;
         let mut arm = arm.checked()?;

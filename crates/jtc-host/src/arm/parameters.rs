@@ -41,7 +41,7 @@ pub enum ParameterError {
         max: f64,
     },
     /// A table axis does not increase.
-    #[error("friction table of {joint}: {axis} {after} at place {place} does not lie above {before}")]
+    #[error("friction table of {joint}: {axis} {after} at place {place} is not greater than {before}")]
     Axis {
         /// Joint with this table.
         joint: Joint,

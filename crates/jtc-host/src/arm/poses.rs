@@ -91,7 +91,7 @@ pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileErro
         }
         let count = values.len();
         let position = <[f64; JOINTS]>::try_from(&values[..])
-            .map_err(|_| wrong(format!("{count} numbers, not 6 (rad, base to wrist)")))?;
+            .map_err(|_| wrong(format!("{count} numbers, expected 6 (rad, base to wrist)")))?;
         match position.iter().find(|v| !v.is_finite()) {
             Some(v) => Err(wrong(format!("{v} is not a finite number"))),
             None => Ok((name.clone(), position)),
@@ -165,12 +165,12 @@ fn edit(
     let mut document =
         text.parse::<DocumentMut>().map_err(|e| in_file(FileError::form(e.message().to_owned())))?;
     let poses = document.entry("poses").or_insert_with(|| Item::Table(Table::new()));
-    let table = poses.as_table_like_mut().ok_or_else(|| in_file(FileError::form("poses is no table")))?;
+    let table = poses.as_table_like_mut().ok_or_else(|| in_file(FileError::form("poses is not a table")))?;
     change(table, &mut arm)?;
     let written = as_it_was(&document.to_string(), &text);
     if !toml_form::read(&written).is_ok_and(|read| read == arm) {
         return Err(in_file(FileError::form(
-            "its poses cannot be changed by this program: change them by hand",
+            "this program cannot change the poses of this file: change them by hand",
         )));
     }
     write_atomically(path, written.as_bytes())
@@ -305,7 +305,7 @@ mod tests {
         );
         for name in ["", "1", "1e3", "nan", "NaN", "inf", "Infinity", "a b", "a,b", "-x", "ä\n"] {
             assert!(
-                message(save_pose(&path, name, &HOME, false)).contains("is no name of a pose"),
+                message(save_pose(&path, name, &HOME, false)).contains("is not a valid name of a pose"),
                 "{name:?}"
             );
         }
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn a_table_that_is_wrong_names_the_pose() {
         for (line, problem) in [
-            ("home = [0, 0, 0]", "poses, home: 3 numbers, not 6"),
+            ("home = [0, 0, 0]", "poses, home: 3 numbers, expected 6"),
             ("home = [0, 0, 0, 0, 0, nan]", "poses, home: NaN is not a finite number"),
             ("\"a b\" = [0, 0, 0, 0, 0, 0]", "poses, a b: \"a b\" is no name"),
             ("home = \"here\"", "line"),

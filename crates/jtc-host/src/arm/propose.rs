@@ -240,12 +240,12 @@ impl Arm {
             let problem = if within {
                 *to = polynomial;
                 format!(
-                    "friction {coulomb} N·m and damping {viscous} N·m·s/rad: such numbers are often made for a simulator's ease, \
-                     and friction that is compensated too much drives the joint"
+                    "friction {coulomb} N·m and damping {viscous} N·m·s/rad: such numbers are often chosen only for a simulator, and too much \
+                     friction compensation drives the joint"
                 )
             } else {
                 format!(
-                    "friction {coulomb} N·m and damping {viscous} N·m·s/rad are more than the controller takes: 0 is proposed"
+                    "friction {coulomb} N·m and damping {viscous} N·m·s/rad are more than the controller accepts: 0 is proposed"
                 )
             };
             let change = if within { Change::Doubtful } else { Change::NotCarried };

@@ -97,15 +97,15 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     };
     let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
     if !text.lines().any(|line| line.contains('=') || line.starts_with('[')) {
-        let problem = format!("neither TOML nor URDF: no arm file (it begins with \"{}\")", short(first));
+        let problem =
+            format!("not an arm file: neither TOML nor URDF (the file begins with \"{}\")", short(first));
         return Err(FileError::form(problem));
     }
     // The format is checked before the keys, because another format may have other keys.
     if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
         && format.as_integer() != Some(FORMAT)
     {
-        let problem =
-            format!("format = {format} is none that this program reads; it reads `format = {FORMAT}`");
+        let problem = format!("format = {format} is not supported, expected `format = {FORMAT}`");
         return Err(FileError::at(Place::name("format"), problem));
     }
     let form: ArmForm = toml::from_str(text).map_err(wrong)?;
@@ -114,13 +114,13 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         _ => {
             let n = form.joint.len();
             return Err(FileError::form(format!(
-                "{n} [[joint]] entries, not 7 (six joints and the fixed flange)"
+                "{n} [[joint]] entries, expected 7 (six joints and the fixed flange)"
             )));
         }
     };
     if form.link.len() != 7 {
         return Err(FileError::form(format!(
-            "{} [[link]] entries, not 7 (base and six links)",
+            "{} [[link]] entries, expected 7 (base and six links)",
             form.link.len()
         )));
     }
@@ -148,7 +148,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     let proposed = sources.proposed().count();
     if proposed > 0 {
         let problem = format!(
-            "{proposed} {} of this file are starting values that nobody has measured or looked up; `jtc arm check` lists them",
+            "{proposed} {} of this file are proposed starting values, not measured and not looked up; `jtc arm check` lists them",
             if proposed == 1 { "number" } else { "numbers" }
         );
         warnings.push(Warning::new(Change::Proposed, "proposed", problem));
@@ -200,10 +200,10 @@ fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, Fi
         let wrong = |problem: String| FileError::at(Place::name(format!("settings, {name}")), problem);
         let Some(row) = settings::named(name).filter(|row| super::has_no_key(row)) else {
             let problem = match settings::named(name) {
-                Some(row) if row.of_joint() && row.of_arm() => "stands in [[joint]], for each joint",
-                Some(row) if row.of_arm() => "stands above as gravity_m_s2",
-                Some(_) => "belongs to no arm; it is commanded while the arm is in use",
-                None => "is no setting of a controller; docs/settings.md lists them",
+                Some(row) if row.of_joint() && row.of_arm() => "belongs into [[joint]], for each joint",
+                Some(row) if row.of_arm() => "belongs above this table, as gravity_m_s2",
+                Some(_) => "does not belong to an arm file; a host sets it while the arm is in use",
+                None => "is not a setting of a controller; docs/settings.md lists all settings",
             };
             return Err(wrong(problem.into()));
         };
@@ -213,7 +213,7 @@ fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, Fi
             toml::Value::Float(f) => Some(*f),
             _ => None,
         };
-        let number = number.ok_or_else(|| wrong(format!("{value} is no number")))?;
+        let number = number.ok_or_else(|| wrong(format!("{value} is not a number")))?;
         let value = SettingValue { setting: row.number, joint: 0, value: number };
         settings::apply(&mut Config::avena(), value).map_err(|e| wrong(e.to_string()))?;
         all.push(value);
@@ -240,7 +240,7 @@ fn all_or_none<T>(
         (true, _) => Ok(None),
         (false, Some(name)) => Err(FileError::at(
             Place::name(format!("joint {name}")),
-            format!("{key} is missing, other joints have it"),
+            format!("{key} is missing, but other joints have it"),
         )),
         (false, None) => Ok(found.try_into().ok()),
     }
@@ -255,7 +255,7 @@ fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]
             Place::name(of.map_or("proposed".into(), |(_, joint)| format!("joint {}, proposed", joint.name)));
         let Some(key) = keys.iter().find(|key| *key == name) else {
             let problem = format!(
-                "\"{}\" is no number that can be proposed; there are {}",
+                "\"{}\" is not a key that can be proposed, expected one of {}",
                 short(name),
                 keys.join(", ")
             );
@@ -263,7 +263,7 @@ fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]
         };
         let absent = of.is_some_and(|(_, joint)| !joint.has(key));
         if absent || sources.of((number, key)) == Source::Default {
-            return Err(FileError::at(place, format!("{key} is listed and not given")));
+            return Err(FileError::at(place, format!("{key} is listed as proposed, but has no value")));
         }
         sources.propose((number, key));
     }
@@ -288,7 +288,7 @@ fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, Fi
         JOINTS => Box::new(std::array::from_fn(|i| tables[i])),
         n => {
             return Err(FileError::form(format!(
-                "{n} [[friction_table]] entries, not 1 (for all joints) or 6"
+                "{n} [[friction_table]] entries, expected 1 (for all joints) or 6"
             )));
         }
     };
@@ -304,7 +304,7 @@ impl TableForm {
         let wrong = |key: &str, n: usize| {
             FileError::at(
                 Place::name(format!("friction_table {}, {key}", i + 1)),
-                format!("{n} values, not 20"),
+                format!("{n} values, expected 20"),
             )
         };
         let axis = |key: &str, v: &[f32]| <[f32; 20]>::try_from(v).map_err(|_| wrong(key, v.len()));

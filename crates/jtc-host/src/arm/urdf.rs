@@ -85,7 +85,7 @@ fn only_once(robot: &Robot) -> Result<(), FileError> {
         let parents: Vec<&str> =
             robot.joints.iter().filter(|j| j.child.link == name).map(|j| j.name.as_str()).collect();
         return Err(FileError::form(format!(
-            "link {name} is the child of joints {}: only one may carry it",
+            "link {name} is the child of joints {}, expected only one parent joint",
             parents.join(" and ")
         )));
     }
@@ -104,7 +104,7 @@ impl<'a> Chain<'a> {
                 let kind = format!("{:?}", joint.joint_type).to_lowercase();
                 let follows =
                     joint.mimic.as_ref().map_or(String::new(), |m| format!(", follows {}", m.joint));
-                let problem = format!("{kind}{follows}: is held at 0, none of the six");
+                let problem = format!("{kind}{follows}: is not one of the six joints and is held at 0");
                 chain.warn(Change::LeftOut, format!("joint {}", joint.name), problem);
             }
         }
@@ -126,7 +126,7 @@ impl<'a> Chain<'a> {
         let last = self.rotary[JOINTS - 1];
         let words = format!("{} {}", last.name, last.child.link).to_lowercase();
         if choice.joints.is_none() && ["gripper", "jaw", "finger"].iter().any(|w| words.contains(w)) {
-            let problem = "by its name moves a gripper: it is driven as the sixth axis, for the description has no other";
+            let problem = "seems to move a gripper, by its name: it is driven as the sixth axis, because the description has no other";
             self.warn(Change::Doubtful, format!("joint {}", last.name), problem);
         }
     }
@@ -162,14 +162,14 @@ impl<'a> Chain<'a> {
         self.flange = flange.into_iter().collect();
         match flange {
             None => {
-                let problem = "no fixed flange joint behind it: the flange is its own frame";
+                let problem = "carries no fixed flange joint: the flange has the frame of this link";
                 self.warn(Change::Flange, format!("link {last}"), problem);
             }
             Some(flange) if behind.len() > 1 => {
                 let others: Vec<&str> =
                     behind.iter().filter(|j| j.name != flange.name).map(|j| j.name.as_str()).collect();
                 let problem = format!(
-                    "is taken as the flange, not {}; `jtc arm import` takes another with --tip",
+                    "is used as the flange, not {}; `jtc arm import` selects another with --tip",
                     others.join(", ")
                 );
                 self.warn(Change::Flange, format!("joint {}", flange.name), problem);
@@ -205,7 +205,7 @@ impl<'a> Chain<'a> {
             let from = if i == 0 { &base } else { &self.rotary[i - 1].child.link };
             let fixed = self.rigid_path(from, &joint.parent.link).unwrap_or_default();
             for f in fixed.iter().filter(|f| f.joint_type == JointType::Fixed) {
-                let problem = format!("is fixed: merged into joint {}, which it carries", joint.name);
+                let problem = format!("is fixed: merged into joint {}, which this joint carries", joint.name);
                 self.warn(Change::Merged, format!("joint {}", f.name), problem);
             }
             let axis = joint.axis.xyz.0;
@@ -224,7 +224,7 @@ impl<'a> Chain<'a> {
             };
             if !next.is_identity() {
                 let problem = format!(
-                    "axis {} {} {} is not +z: the frame of its link is turned, positions and torques keep their sign",
+                    "axis {} {} {} is not +z: the frame of its link is turned; positions and torques keep their sign",
                     axis[0], axis[1], axis[2]
                 );
                 self.warn(Change::AxisTurned, format!("joint {}", joint.name), problem);
@@ -250,8 +250,7 @@ impl<'a> Chain<'a> {
             let o = origin(&joint.origin);
             if o != Origin::default() {
                 let problem = format!(
-                    "its offset (xyz {:?} rpy {:?}) is not carried: positions count from link {base}; gravity is a setting \
-                     of the controller",
+                    "its offset (xyz {:?} rpy {:?}) is not imported: positions refer to link {base}; gravity is a setting of the controller",
                     o.xyz.map(short),
                     o.rpy.map(short)
                 );
@@ -267,8 +266,9 @@ impl<'a> Chain<'a> {
         let mut todo = vec![(name.to_owned(), Frame::IDENTITY)];
         while let Some((at, frame)) = todo.pop() {
             let found = self.robot.links.iter().find(|l| l.name == at);
-            let link = found
-                .ok_or_else(|| FileError::form(format!("link {at} is named by a joint and not there")))?;
+            let link = found.ok_or_else(|| {
+                FileError::form(format!("link {at} is named by a joint, but does not exist"))
+            })?;
             let inertial = &link.inertial;
             let i = &inertial.inertia;
             let own = Link {
@@ -277,14 +277,14 @@ impl<'a> Chain<'a> {
                 mass: inertial.mass.value,
             };
             if at != name && own.mass != 0.0 {
-                let problem = format!("{} kg: made part of link {name}", own.mass);
+                let problem = format!("{} kg: merged into link {name}", own.mass);
                 self.warn(Change::Merged, format!("link {at}"), problem);
             }
             if at == name || own.mass != 0.0 {
                 bodies.push((own, frame.clone()));
             }
             if bodies.len() + todo.len() > self.robot.links.len() {
-                return Err(FileError::form(format!("fixed joints at link {at} are a loop")));
+                return Err(FileError::form(format!("fixed joints at link {at} form a loop")));
             }
             for joint in &self.robot.joints {
                 if joint.parent.link == at && self.rigid(joint) {

@@ -38,14 +38,14 @@ impl Change {
             Self::Base => "base",
             Self::Flange => "flange",
             Self::AxisTurned => {
-                "turned: the link's frame, so that its joint turns about +z; positions and torques are as they were"
+                "turned: the frame of the link, so that its joint turns about +z; positions and torques do not change"
             }
-            Self::Merged => "merged: what fixed joints carry, into the link that carries them",
-            Self::LeftOut => "left out: joints that are none of the six, held at 0",
-            Self::LimitCut => "cut: limits that the drives cannot do",
-            Self::LimitAssumed => "missing: limits that are not given, or are no limits",
-            Self::NotCarried => "not carried",
-            Self::Doubtful => "taken for a start",
+            Self::Merged => "merged: links on fixed joints, into the link that carries them",
+            Self::LeftOut => "left out: joints other than the six, held at 0",
+            Self::LimitCut => "cut: limits beyond those of the drives",
+            Self::LimitAssumed => "missing: limits that are absent or not usable",
+            Self::NotCarried => "not imported",
+            Self::Doubtful => "starting values only",
             Self::Proposed => "proposed",
             Self::Files => "files",
         }

@@ -124,7 +124,7 @@ fn a_unit_in_a_header_counts_in_letters_of_any_case() {
         let last = loaded.trajectory.points.last().unwrap().position[0];
         assert!((last - position).abs() < 1e-9, "{header}: {last}");
         let error = loaded.in_degrees().expect_err(header).to_string();
-        assert!(error.contains("are known"), "{header}: {error}");
+        assert!(error.contains("states its units"), "{header}: {error}");
     }
     assert!(parse(&format!("t,Q1,Q2,Q3,Q4,Q5,Q6\n0,0{zeros}1,1{zeros}")).unwrap().in_degrees().is_ok());
     let both = problem(&format!("t,q1,Q1_DEG,q2,q3,q4,q5,q6\n0,0,0{zeros}"));

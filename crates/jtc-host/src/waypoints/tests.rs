@@ -98,7 +98,7 @@ fn degrees_are_taken_only_where_the_file_names_no_unit() {
     let file = WaypointFile::parse("q1,q2,q3,q4,q5,q6\n90,0,0,0,0,0\n").unwrap().in_degrees().unwrap();
     assert_eq!(file.positions(&arm()).unwrap()[0].position[0], std::f64::consts::FRAC_PI_2);
     let named = WaypointFile::parse("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n90,0,0,0,0,0\n").unwrap();
-    assert!(named.in_degrees().unwrap_err().to_string().contains("are known"));
+    assert!(named.in_degrees().unwrap_err().to_string().contains("states its units"));
 }
 
 /// A unit in the name of a column or key is recognised in upper and lower case, and an option cannot convert the numbers
@@ -120,7 +120,7 @@ fn a_unit_in_a_name_counts_in_letters_of_any_case() {
             "{text}"
         );
         let error = file.in_degrees().expect_err(&text).to_string();
-        assert!(error.contains("are known"), "{text}: {error}");
+        assert!(error.contains("states its units"), "{text}: {error}");
     }
     let keys = header_keys("Q1_DEG Q2 Q3 Q4 Q5 Q6");
     let mixed = header_keys("q1_Deg q2_deg q3_rad q4 Q5_RAD q6");
@@ -140,7 +140,7 @@ fn a_unit_in_a_name_counts_in_letters_of_any_case() {
         "[{\"x\": 0.3, \"y\": 0, \"z\": 0.3, \"roll\": 0, \"pitch\": 0, \"Yaw_rad\": 0}]",
     ] {
         let error = WaypointFile::parse(named).unwrap().in_degrees().expect_err(named).to_string();
-        assert!(error.contains("are known"), "{named}: {error}");
+        assert!(error.contains("states its units"), "{named}: {error}");
     }
     let plain = WaypointFile::parse("Q1,Q2,Q3,Q4,Q5,Q6\n90,0,0,0,0,0\n").unwrap();
     assert!(plain.in_degrees().is_ok());

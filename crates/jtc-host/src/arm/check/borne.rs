@@ -46,15 +46,13 @@ impl Arm {
     fn too_light(&self, joint: Joint, gains: &PidGains, felt: f64, needed: f64) -> ArmFinding {
         let PidGains { kp, kd, .. } = gains;
         let what = format!(
-            "{}: Kp {kp} and Kd {kd} need {needed:.3} kg·m², the joint feels {felt:.3} kg·m² where it feels least",
+            "{}: Kp {kp} and Kd {kd} need an inertia of {needed:.3} kg·m², but the joint has only {felt:.3} kg·m² in its lightest pose",
             self.titled(joint)
         );
         ArmFinding::new(Severity::Problem, "too-light", what)
-            .because(
-                "their torque is some milliseconds late, and a joint that is too light for it oscillates",
-            )
+            .because("their torque is some milliseconds late, so a joint that is too light oscillates")
             .next(format!(
-                "Kp and Kd times {:.2} at most; or the rotor inertia, if that is missing",
+                "multiply Kp and Kd by {:.2} at most, or add the rotor inertia if it is missing",
                 felt / needed
             ))
             .of(joint, "pid")
@@ -72,19 +70,19 @@ impl Arm {
         let PidGains { kd, ki, .. } = gains;
         let with = if payload > 0.0 { format!(" with {payload:.1} kg at the flange") } else { String::new() };
         let what = format!(
-            "{}: Kd {kd} N·m·s/rad does not damp the joint{with}: {needed:.1} is needed",
+            "{}: Kd {kd} N·m·s/rad does not damp the joint{with}, expected at least {needed:.1}",
             self.titled(joint)
         );
         // The delay of Kp uses up a part of Kd. The integral can use the rest.
         let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
         ArmFinding::new(Severity::Warning, "damping", what)
             .because(
-                "the delay of Kp and the integral take its damping away: without friction the joint swings",
+                "the delay of Kp and the integral use up the damping: without friction the joint oscillates",
             )
             .next(if ki > 0.0 {
-                format!("Kd of {needed:.1} or more, or Ki of {ki:.0} or less")
+                format!("raise Kd to {needed:.1} or more, or lower Ki to {ki:.0} or less")
             } else {
-                format!("Kd of {needed:.1} or more, or a smaller Kp")
+                format!("raise Kd to {needed:.1} or more, or lower Kp")
             })
             .of(joint, "pid")
             .measured(*kd, needed, "N·m·s/rad")

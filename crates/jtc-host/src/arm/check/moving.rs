@@ -29,7 +29,7 @@ impl Arm {
         for h in holding.iter().filter(|h| h.torque_nm > LITTLE_LEFT * h.limit_nm) {
             let share = 100.0 * h.torque_nm / h.limit_nm;
             let what = format!(
-                "{}: gravity asks for {:.1} N·m of {} N·m ({share:.0} %) at q = {}",
+                "{}: gravity needs {:.1} N·m of {} N·m ({share:.0} %) at q = {}",
                 self.titled(h.joint),
                 h.torque_nm,
                 h.limit_nm,
@@ -37,13 +37,13 @@ impl Arm {
             );
             let (why, next) = if share > 100.0 {
                 (
-                    "the drive cannot hold the arm there",
-                    "a narrower position range, a torque limit that the drive has, or a lighter arm",
+                    "the drive cannot hold the arm in this pose",
+                    "narrow the position range, correct the torque limit to that of the drive, or use a lighter arm",
                 )
             } else {
                 (
-                    "little is left to move with",
-                    "slow motions there; jtc traj check counts the torque of each",
+                    "little torque remains for motion",
+                    "move slowly near this pose; jtc traj check computes the torque of each motion",
                 )
             };
             let mut found = ArmFinding::new(Severity::Warning, "holding", what).because(why).next(next);
@@ -55,7 +55,7 @@ impl Arm {
             && share(most) <= LITTLE_LEFT
         {
             let what = format!(
-                "the drives hold the arm in every pose; {} the most, {:.1} N·m of {} N·m ({:.0} %)",
+                "the drives hold the arm in every pose; {} needs the largest share, {:.1} N·m of {} N·m ({:.0} %)",
                 self.titled(most.joint),
                 most.torque_nm,
                 most.limit_nm,
@@ -73,12 +73,12 @@ impl Arm {
         let (torque, limit) = (most(|h| h.torque_nm), most(|h| h.limit_nm));
         if torque > 0.0 && limit > FAR_ABOVE * torque {
             let what =
-                format!("torque limits up to {limit} N·m, where gravity asks for {torque:.2} N·m at most");
+                format!("torque limits up to {limit} N·m, but gravity needs only {torque:.2} N·m at most");
             let mut found = ArmFinding::new(Severity::Warning, "unit", what)
                 .because(
-                    "limits in another unit than N·m (10 kg·cm are 1 N·m), or a number to fill the field",
+                    "limits in another unit than N·m (10 kg·cm are 1 N·m), or placeholder numbers",
                 )
-                .next("torque_max_nm from the data sheet of the drives: it is what protects arm and people");
+                .next("take torque_max_nm from the data sheet of the drives: this limit protects arm and people");
             found.name = Some("torque_max_nm");
             findings.push(found.measured(limit, torque, "N·m"));
         }

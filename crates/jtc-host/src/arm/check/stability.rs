@@ -63,11 +63,11 @@ impl Arm {
         let matrices = mass_matrices(&self.model, &ranges);
         let margin = |of: [bool; JOINTS]| rotor_margin(&matrices, &rotor, &stable, of);
         let Some(all) = margin([true; JOINTS]) else {
-            let what = "the gains are not stable together, though those of each joint alone are";
+            let what = "the gains of all joints together are not stable, but those of each joint alone are";
             findings.push(
                 unstable_gains(what.to_owned())
-                    .because("joints that move each other have less inertia together")
-                    .next("smaller gains of all joints, with the same ratios"),
+                    .because("joints that move each other have less inertia than each joint alone")
+                    .next("lower the gains of all joints by the same factor"),
             );
             return None;
         };
@@ -87,29 +87,29 @@ impl Arm {
         let titled = self.titled(joint);
         let PidGains { kp, ki, kd, .. } = gains;
         let Some(stable) = StableInertia::of(gains, delay) else {
-            let what = format!("{titled}: Kp {kp}, Ki {ki} and Kd {kd} are stable with no inertia");
-            let found = unstable_gains(what).because("too little damping, or none");
-            return Some(found.next("a larger Kd, or a smaller Kp and Ki").of(joint, "pid"));
+            let what = format!("{titled}: Kp {kp}, Ki {ki} and Kd {kd} are unstable with every inertia");
+            let found = unstable_gains(what).because("the damping is too low or missing");
+            return Some(found.next("raise Kd, or lower Kp and Ki").of(joint, "pid"));
         };
         let found = if least < stable.least {
             let kd_max = kd * least / stable.least;
             unstable_gains(format!(
-                "{titled}: Kd {kd} N·m·s/rad is stable from {:.3} kg·m² on, the joint has {least:.3} kg·m²",
+                "{titled}: Kd {kd} N·m·s/rad is stable only from {:.3} kg·m², but the joint has {least:.3} kg·m²",
                 stable.least
             ))
-            .because("the derivative is some 5 ms late, and such a joint oscillates")
+            .because("the derivative is about 5 ms late, so such a joint oscillates")
             .next(format!(
-                "Kd below {kd_max:.3}, better half of it, and Kp and Ki with it; or the rotor inertia, if that is missing"
+                "lower Kd below {kd_max:.3}, better to half of it, and Kp and Ki in proportion; or add the rotor inertia if it is missing"
             ))
             .measured(least, stable.least, "kg·m²")
         } else if most > stable.most {
             let ki_max = ki * stable.most / most;
             unstable_gains(format!(
-                "{titled}: Ki {ki} N·m/(rad·s) is stable up to {:.3} kg·m², the joint has {most:.3} kg·m²",
+                "{titled}: Ki {ki} N·m/(rad·s) is stable only up to {:.3} kg·m², but the joint has {most:.3} kg·m²",
                 stable.most
             ))
             .because("the integral makes the joint oscillate, unless its friction damps it")
-            .next(format!("Ki below {ki_max:.0}, better a third of it, or a larger Kd"))
+            .next(format!("lower Ki below {ki_max:.0}, better to a third of it, or raise Kd"))
             .measured(most, stable.most, "kg·m²")
         } else {
             return None;
@@ -128,16 +128,16 @@ impl Arm {
             return None;
         }
         let what = format!(
-            "the gains are stable with {} times the proposed rotor inertias of {} only, {} is needed",
+            "the gains are stable only with {} times the proposed rotor inertias of {}, expected {}",
             range(down, up),
             numbers(&proposed),
             range(PROPOSED_RANGE.down, PROPOSED_RANGE.up)
         );
         let found = unstable_gains(what)
-            .because("a proposed rotor inertia may be off by that much, and the arm oscillates then")
+            .because("a proposed rotor inertia may be wrong by this factor, and the arm then oscillates")
             .next(
-                "the rotor inertia from the data sheet (then take it out of `proposed`), or import the description again: \
-                 `jtc arm import` proposes gains that tolerate it",
+                "enter the rotor inertia from the data sheet and remove it from `proposed`, or import the description again: `jtc arm import` \
+                 proposes gains that tolerate this error",
             );
         Some(ArmFinding { name: Some(name), ..found })
     }

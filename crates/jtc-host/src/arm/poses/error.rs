@@ -14,8 +14,8 @@ use crate::file::FileError;
 pub enum PoseError {
     /// The name cannot be used in a waypoint file or an option.
     #[error(
-        "\"{name}\" is no name of a pose: it begins with a letter, has letters, digits, _, - and . only, {NAME_MAX} at most, and is no number \
-         (nan, inf)"
+        "\"{name}\" is not a valid name of a pose: a name begins with a letter, has only letters, digits, _, - and ., at most {NAME_MAX}, and is \
+         not a number (nan, inf)"
     )]
     Name {
         /// The name.
@@ -48,7 +48,7 @@ pub enum PoseError {
         max: f64,
     },
     /// A pose of this name exists already.
-    #[error("{}: pose \"{name}\" is there already", path.display())]
+    #[error("{}: pose \"{name}\" exists already", path.display())]
     Exists {
         /// The arm file.
         path: PathBuf,
@@ -56,7 +56,7 @@ pub enum PoseError {
         name: String,
     },
     /// The file is a robot description, which cannot contain poses.
-    #[error("{} is a robot description, which has no place for poses", path.display())]
+    #[error("{} is a robot description, which cannot store poses", path.display())]
     Description {
         /// The file.
         path: PathBuf,
@@ -67,29 +67,33 @@ pub enum PoseError {
 }
 
 fn known_words(known: &[String]) -> String {
-    if known.is_empty() { "; it has none".into() } else { format!("; it has {}", known.join(", ")) }
+    if known.is_empty() {
+        "; the arm has no poses".into()
+    } else {
+        format!("; the arm has {}", known.join(", "))
+    }
 }
 
 impl Diagnose for PoseError {
     fn diagnosis(&self) -> Diagnosis {
         let (kind, code, next) = match self {
-            Self::Name { .. } => (ErrorKind::Usage, "pose-name", "give it another name, as above-table".into()),
+            Self::Name { .. } => (ErrorKind::Usage, "pose-name", "choose another name, for example above-table".into()),
             Self::Unknown { like: Some(like), .. } => {
-                (ErrorKind::Usage, "unknown-pose", format!("is \"{like}\" meant? `jtc pose list` shows all poses of an arm file"))
+                (ErrorKind::Usage, "unknown-pose", format!("did you mean \"{like}\"? `jtc pose list` shows all poses of an arm file"))
             }
             Self::Unknown { .. } => (
                 ErrorKind::Usage,
                 "unknown-pose",
-                "`jtc pose save NAME --arm FILE` saves where the arm is, --arm FILE names the file with the pose".into(),
+                "`jtc pose save NAME --arm FILE` saves the present pose; --arm FILE names the file with the pose".into(),
             ),
             Self::Outside { .. } => (
                 ErrorKind::Refused,
                 "outside-limits",
-                "a pose from another arm, or limits that were changed since: save it again, or correct it in the file".into(),
+                "the pose is from another arm, or the limits have changed: save the pose again, or correct it in the file".into(),
             ),
-            Self::Exists { .. } => (ErrorKind::Refused, "exists", "choose another name; --overwrite writes over it".into()),
+            Self::Exists { .. } => (ErrorKind::Refused, "exists", "choose another name; --overwrite replaces the pose".into()),
             Self::Description { .. } => {
-                (ErrorKind::Usage, "no-arm-file", "`jtc arm import URDF -o arm.toml` makes an arm file of it".into())
+                (ErrorKind::Usage, "no-arm-file", "`jtc arm import URDF -o arm.toml` makes an arm file from it".into())
             }
             Self::File(e) => return e.diagnosis(),
         };

@@ -115,7 +115,7 @@ impl JointForm {
             6 => Ok(Some([c[0], c[1], c[2], c[3], c[4], c[5]])),
             n => Err(FileError::at(
                 Place::name(format!("joint {}, friction_polynomial", self.name)),
-                format!("{n} coefficients, not 4 or 6"),
+                format!("{n} coefficients, expected 4 or 6"),
             )),
         }
     }

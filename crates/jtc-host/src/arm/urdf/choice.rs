@@ -26,7 +26,7 @@ pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Jo
     if let Some(joint) = six.iter().find(|j| j.mimic.is_some()) {
         return Err(unfit_joint(
             joint,
-            "follows another joint (mimic): it is none of the six that are driven",
+            "follows another joint (mimic), so it cannot be one of the six driven joints",
         ));
     }
     if let Some(tip) = &choice.tip
@@ -73,7 +73,7 @@ fn no_loops(robot: &Robot) -> Result<(), FileError> {
             let Some(parent) = above(robot, &at.parent.link) else { break };
             at = parent;
             if depth > robot.joints.len() {
-                return Err(about(joint, "its chain of parents is a loop"));
+                return Err(about(joint, "its chain of parents forms a loop"));
             }
         }
     }
@@ -84,7 +84,7 @@ fn no_loops(robot: &Robot) -> Result<(), FileError> {
 fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError> {
     if !robot.links.iter().any(|l| l.name == link) {
         let links: Vec<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
-        return Err(unfit(format!("there is no link {link}; there are {}", links.join(", "))));
+        return Err(unfit(format!("link {link} does not exist; the links are {}", links.join(", "))));
     }
     let mut way: Vec<&Joint> = way_down(robot, link).collect();
     way.reverse();
@@ -104,7 +104,7 @@ fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, File
     let find = |name: &String| -> Result<&'a Joint, FileError> {
         let joint = robot.joints.iter().find(|j| &j.name == name).ok_or_else(|| {
             let others = names(&moving(robot, robot.joints.iter().collect())).join(", ");
-            unfit(format!("there is no joint {name}; those that move are {others}"))
+            unfit(format!("joint {name} does not exist; the moving joints are {others}"))
         })?;
         match rotary(joint) {
             true => Ok(joint),
@@ -113,10 +113,10 @@ fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, File
     };
     let joints = wanted.iter().map(find).collect::<Result<Vec<_>, _>>()?;
     if joints.len() != JOINTS {
-        return Err(unfit(format!("{} joints are named, the controller drives six", joints.len())));
+        return Err(unfit(format!("{} joints are named, expected six", joints.len())));
     }
     if let Some(joint) = first_branch(robot, &joints) {
-        return Err(unfit_joint(joint, "is not carried by the one named before it"));
+        return Err(unfit_joint(joint, "is not carried by the joint named before it"));
     }
     Ok(joints)
 }
@@ -150,7 +150,7 @@ fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileErro
         .map(|c| format!("{} ({})", c.name, kind(c)))
         .collect();
     let mut text = format!(
-        "{} rotary joints carry each other ({}), the controller drives six",
+        "{} rotary joints form a chain ({}), expected six",
         longest.len(),
         names(&longest).join(", ")
     );
@@ -159,7 +159,7 @@ fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileErro
     }
     if longest.len() < JOINTS {
         if choice.tip.is_some() {
-            text += "; is --tip the last link of the arm?";
+            text += "; check that --tip names the last link of the arm";
             return unfit(text);
         }
         return FileError::FewJoints { path: PathBuf::new(), problem: text };

@@ -47,12 +47,13 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
     }
     if lower == upper {
         let problem = format!(
-            "position limits {lower}..{upper} rad leave no way: write both limits in rad, or type=\"fixed\" for a joint that does not move"
+            "position limits {lower}..{upper} rad leave no range of motion: write both limits in rad, or type=\"fixed\" for a joint that does not \
+             move"
         );
         return Err(about(joint, problem));
     }
     if lower > upper {
-        return Err(about(joint, format!("lower limit {lower} is not below upper {upper}")));
+        return Err(about(joint, format!("lower limit {lower} is not below upper limit {upper}")));
     }
     let beyond = |limit: &f64| limit.is_finite() && limit.abs() > TURN;
     let degrees: Vec<String> = [lower, upper]
@@ -67,7 +68,7 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
         return Ok(true);
     }
     let problem = format!(
-        "position limits {}..{} rad are beyond a turn. Degrees? {}. Write rad, or type=\"continuous\" for a joint without stops",
+        "position limits {}..{} rad exceed one turn. If they are degrees: {}. Write rad, or type=\"continuous\" for a joint without stops",
         short(lower),
         short(upper),
         degrees.join(", ")
@@ -126,7 +127,7 @@ impl Chain<'_> {
             [end] => format!("no position limit on one side: {end} rad is used there"),
             _ if endless => {
                 format!(
-                    "turns without end, no position limits: {}..{} rad are used",
+                    "continuous joint, no position limits: {}..{} rad are used",
                     -WORKING_AREA, WORKING_AREA
                 )
             }
@@ -147,7 +148,7 @@ impl Chain<'_> {
             to.velocity_max = in_degrees.min(fastest());
             self.sources.fill_in((Some(number), "velocity_max_rad_s"));
             let problem = format!(
-                "velocity limit {}: no arm reaches that in rad/s; {0} °/s are {} rad/s; {} rad/s is used",
+                "velocity limit {}: too high for an arm in rad/s; {0} °/s are {} rad/s; {} rad/s is used",
                 limit.velocity,
                 short(in_degrees),
                 short(to.velocity_max)
@@ -183,7 +184,7 @@ impl Chain<'_> {
             self.narrow_position(rotary, to)?;
             if to.velocity_max > fastest {
                 let problem = format!(
-                    "velocity limit {}: {fastest} rad/s is used, above {} rad/s the drives trip",
+                    "velocity limit {}: {fastest} rad/s is used, because the drives trip above {} rad/s",
                     short(to.velocity_max),
                     drives.drive_speed_trip
                 );
@@ -192,7 +193,7 @@ impl Chain<'_> {
             }
             if to.torque_max > strongest {
                 let problem = format!(
-                    "effort limit {}: {strongest} N·m is used, the joint bus carries no more",
+                    "effort limit {}: {strongest} N·m is used, the maximum of the joint bus",
                     to.torque_max
                 );
                 to.torque_max = strongest;
@@ -213,21 +214,21 @@ impl Chain<'_> {
         let shift = short(0.5 * (min + max));
         if to.position_min >= to.position_max {
             let problem = format!(
-                "{limits} rad are outside the drives' working area, ±{WORKING_AREA} rad: put the joint's zero into the middle of \
-                 its range, {shift} rad from where it is (its origin turned about its axis, and both limits less that)"
+                "{limits} rad are outside the drives' working area, ±{WORKING_AREA} rad: move the zero of the joint by {shift} rad into the middle \
+                 of its range (turn its origin about its axis, and subtract this angle from both limits)"
             );
             return Err(about(joint, problem));
         }
         let kept = to.position_max - to.position_min;
         let could = (max - min).min(2.0 * WORKING_AREA);
         let mut problem = format!(
-            "{limits} leave the drives' working area: {}..{} rad are used",
+            "{limits} exceed the drives' working area: {}..{} rad are used",
             short(to.position_min),
             short(to.position_max)
         );
         if kept < 0.9 * could {
             problem +=
-                &format!("; {} rad of it would be within with the joint's zero at {shift} rad", short(could));
+                &format!("; with the zero of the joint at {shift} rad, {} rad would be usable", short(could));
         }
         self.warn(Change::LimitCut, format!("joint {}", joint.name), problem);
         Ok(())

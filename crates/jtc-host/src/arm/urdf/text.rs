@@ -70,7 +70,7 @@ fn end_of_tag(rest: &str) -> Option<usize> {
 pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
     if deepest > DEPTH_MAX {
-        return Err(FileError::form(format!("XML nested {deepest} deep is no description of an arm")));
+        return Err(FileError::form(format!("XML with {deepest} levels is not a description of an arm")));
     }
     Ok(())
 }
@@ -133,8 +133,8 @@ pub(super) fn locate(text: &str, what: &str) -> FileError {
             return FileError::at(Place::line(line).named(name), slip.unwrap_or(what));
         }
     }
-    let whole = if what == "No elements found" { "it breaks off or holds no element" } else { &what };
-    FileError::form(format!("no URDF: {whole}"))
+    let whole = if what == "No elements found" { "the file is incomplete or has no element" } else { &what };
+    FileError::form(format!("not a valid URDF: {whole}"))
 }
 
 /// Returns the first attribute of an element that must be a number and is not.

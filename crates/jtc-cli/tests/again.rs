@@ -188,7 +188,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     let output = sim.jtc(&["traj", "continue", &whole]).ends(2);
     assert!(output.err.contains("does not contain the whole trajectory"), "{}", output.err);
     let output = sim.jtc(&["traj", "continue", &whole, "--trajectory", &other, "--record", &rest]).ends(4);
-    assert!(output.err.contains("nothing is left of it"), "{}", output.err);
+    assert!(output.err.contains("no part of it remains"), "{}", output.err);
     assert!(!std::path::Path::new(&rest).exists());
 }
 
@@ -232,7 +232,7 @@ fn the_runs_that_are_left_are_run() {
     child.wait_with_output().unwrap();
     std::thread::sleep(std::time::Duration::from_secs(3));
     let output = sim.jtc(&["traj", "continue", &rest]).ends(4);
-    assert!(output.err.contains("nothing is left of it"), "{}", output.err);
+    assert!(output.err.contains("no part of it remains"), "{}", output.err);
     // With this option the user requests one more run.
     let value = sim.json(&["traj", "continue", &rest, "--repeat", "3"], 0);
     assert_eq!((phases(&value), &value["runs_finished"]), (vec!["motion"], &1.into()), "{value}");

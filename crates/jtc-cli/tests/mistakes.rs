@@ -77,8 +77,16 @@ fn mistakes_in_options_are_named_with_what_helps() {
     for (words, code, message) in [
         (&["move"][..], 2, "--to-flange <"),
         (&["move", "--to", ""], 2, "neither six numbers nor the name of a pose"),
-        (&["move", "--to", "0,0,0,0,0,0", "--speed", "-5"], 2, "speed -5 % is not within 1..100 %"),
-        (&["plan", &waypoints, "-o", &out, "--speed", "-5"], 2, "speed -5 % is not within 1..100 %"),
+        (
+            &["move", "--to", "0,0,0,0,0,0", "--speed", "-5"],
+            2,
+            "speed -5 % is out of range, expected 1..100 %",
+        ),
+        (
+            &["plan", &waypoints, "-o", &out, "--speed", "-5"],
+            2,
+            "speed -5 % is out of range, expected 1..100 %",
+        ),
         (&["plan", &bytes, "-o", &out], 2, "not a text file (its bytes are not valid UTF-8)"),
         (&["plan", &degrees, "-o", &out, "--deg"], 2, "omit --deg"),
         (&["traj", "speed", "-3"], 2, "a speed override of -3 % is outside 5..100"),

@@ -188,7 +188,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
         (
             vec!["move", "--to", "0,0,0,0,0,0", "--speed", "0"],
             2,
-            "speed 0 % is not within 1..100 %; nothing was sent",
+            "speed 0 % is out of range, expected 1..100 %; nothing was sent",
         ),
         (vec!["move", "--to", "0.1,0,0,0,0,0", "--record", "run.txt"], 2, "run.txt"),
         (vec!["pose", "save", "1st", "--arm", &arm], 2, "is not a valid name of a pose"),

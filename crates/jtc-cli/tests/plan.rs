@@ -232,8 +232,8 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         (vec![&good, "--blend", "inf"], 2, "blend of inf rad is out of range"),
         (vec![&good, "--deg", "--blend", "29"], 2, "blend of 0.506"),
         (vec![&good, "--line", "--blend-m", "20"], 2, "blend of 20 m is out of range, expected 0..0.5 m"),
-        (vec![&good, "--speed", "0"], 2, "speed 0 % is not within 1..100 %"),
-        (vec![&good, "--speed", "101"], 2, "speed 101 % is not within 1..100 %"),
+        (vec![&good, "--speed", "0"], 2, "speed 0 % is out of range, expected 1..100 %"),
+        (vec![&good, "--speed", "101"], 2, "speed 101 % is out of range, expected 1..100 %"),
         (vec![&good, "--payload", "25,0,0,0.1"], 4, "good.csv, line"),
         (vec![&good, "--temperature", "500"], 2, "500 °C"),
     ] {
@@ -272,7 +272,7 @@ fn ten_thousand_waypoints_are_planned_or_too_long() {
     jtc(&["traj", "check", &out]).ends(0);
     let output = jtc(&["plan", &file, "-o", &out, "--overwrite"]).ends(4);
     assert!(
-        output.err.contains("12000 points are") && output.err.contains("plan it in parts"),
+        output.err.contains("12000 points are") && output.err.contains("plan the motion in parts"),
         "{}",
         output.err
     );

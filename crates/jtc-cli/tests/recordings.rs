@@ -39,7 +39,7 @@ fn the_simulator_records_each_millisecond() {
         let notes = info["notes"].to_string();
         assert!(notes.contains("at 1201 places at most 1 ms apart"), "{notes}");
         assert!(
-            name == "sim.csv" || notes.contains("not completed") || notes.contains("breaks off"),
+            name == "sim.csv" || notes.contains("not completed") || notes.contains("is incomplete"),
             "{notes}"
         );
         jtc(&["traj", "check", &record]).ends(0);
@@ -90,9 +90,13 @@ fn a_run_that_is_killed_leaves_its_recording() {
             "{info}"
         );
         let notes = info["notes"].to_string();
-        assert!(notes.contains("breaks off") || notes.contains("not completed"), "{notes}");
+        assert!(notes.contains("is incomplete") || notes.contains("not completed"), "{notes}");
         let output = jtc(&["report", &record]).ends(0);
-        assert!(output.err.contains("breaks off") || output.err.contains("not completed"), "{}", output.err);
+        assert!(
+            output.err.contains("is incomplete") || output.err.contains("not completed"),
+            "{}",
+            output.err
+        );
         assert!(output.out.starts_with("FAILED "), "{}", output.out);
     }
 }

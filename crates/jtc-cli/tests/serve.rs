@@ -136,7 +136,7 @@ fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
     let dir = tempfile::tempdir().expect("a directory");
     let jtc = |words: &[&str]| run(command_in(&dir), words, "");
     let none = jtc(&["serve", "--port", "/dev/does-not-exist", "--listen", "127.0.0.1:0"]).ends(3);
-    assert!(none.err.contains("no such port"), "{}", none.err);
+    assert!(none.err.contains("port does not exist"), "{}", none.err);
     jtc(&["serve", "--sim", "--port", "/dev/null"]).ends(2);
     jtc(&["serve", "--port", "http://127.0.0.1:1", "--listen", "127.0.0.1:0"]).ends(2);
     let gone = jtc(&["status", "--port", "http://127.0.0.1:1"]).ends(3);

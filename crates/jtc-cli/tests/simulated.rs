@@ -140,10 +140,10 @@ fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
     let status = sim.json(&["status"], 0);
     assert_eq!(status["missing_parameters"].as_array().unwrap().len(), 3, "{status}");
     let output = sim.jtc(&["--json", "recover", "--defaults"]).ends(0);
-    assert!(output.err.contains("the controller's own defaults"), "{}", output.err);
+    assert!(output.err.contains("the defaults of the controller"), "{}", output.err);
     assert_eq!(output.json()["status"]["state"], "HoldPos");
     let output = sim.jtc(&["recover"]).ends(0);
-    assert!(output.err.contains("given before"), "{}", output.err);
+    assert!(output.err.contains("received them before"), "{}", output.err);
 }
 
 #[test]

@@ -358,7 +358,7 @@ fn a_program_that_does_not_answer_is_named() {
     let mut child = cell.moving(&["traj", "run", &file], "", 1.0);
     signal(&child, "-STOP");
     let silent = cell.jtc(&["stop"]).ends(3);
-    let words = format!("the program that has this port (process {}) did not answer within 3 s", child.id());
+    let words = format!("the program that uses this port (process {}) did not answer within 3 s", child.id());
     assert!(silent.err.contains(&words) && silent.err.contains("emergency stop"), "{}", silent.err);
     assert!(silent.err.contains("the Stop was sent, but is not confirmed"), "{}", silent.err);
     assert!(!silent.err.contains("nothing was sent"), "{}", silent.err);

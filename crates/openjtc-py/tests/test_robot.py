@@ -541,5 +541,5 @@ def test_the_same_lines_over_a_serial_port_and_through_an_agent(tmp_path: Path):
             run = robot.move([0.1, 0.2, -0.4, 0, 0.2, 0])
             assert run.outcome == "finished" and len(run) > 5
         # The agent refuses an unknown token.
-        with pytest.raises(openjtc.RefusedError, match="does not let this program in"):
+        with pytest.raises(openjtc.RefusedError, match="denies access to this program"):
             openjtc.connect(url, token="x" * 30)

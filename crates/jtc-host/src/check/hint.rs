@@ -55,35 +55,36 @@ impl Verdict {
             Next::typed(Action::TrajRun, format!("jtc traj run {file}{speed}"))
         } else if has(ProblemKind::TooManyPoints) {
             format!(
-                "at most {POINTS_MAX} points: give points further apart in time (steps of up to 1000 ms), or run it in parts"
+                "use at most {POINTS_MAX} points: use a longer step between points (up to 1000 ms), or run the trajectory in parts"
             )
             .into()
         } else if has(ProblemKind::SegmentPoints) || has(ProblemKind::TooManySegments) {
             let least = self.points.div_ceil(SEGMENTS_MAX).max(1);
             format!(
-                "`--points-per-segment` from {least} to {SEGMENT_POINTS_MAX} carries these {} points in at most {SEGMENTS_MAX} \
-                 segments; without it the length of the segments is chosen",
+                "use `--points-per-segment` from {least} to {SEGMENT_POINTS_MAX}, so that these {} points fit into {SEGMENTS_MAX} segments; or omit \
+                 it, then the program chooses the length",
                 self.points
             )
             .into()
         } else if only(ProblemKind::StartPose) {
             Next::typed(Action::TrajRunWithApproach, format!("jtc traj run {file}{speed} --approach"))
-                .then(" moves the arm to the first point before")
+                .then(" first moves the arm to the first point")
         } else if self.suspicion() == Suspicion::Degrees {
             "the positions look like degrees: all numbers of a trajectory are in rad, rad/s and rad/s² (90° = 1.5708)"
                 .into()
         } else if has(ProblemKind::Jump) {
-            "the file was put together from pieces that do not meet: join them with a move, or run each alone"
+            "the file consists of pieces that do not meet: join the pieces with a move, or run each piece alone"
                 .into()
         } else if has(ProblemKind::Position) || has(ProblemKind::PositionScale) {
-            "positions do not change with the speed: correct the path (are all numbers in rad?)".into()
+            "positions do not change with the speed: correct the path, and check that all numbers are in rad"
+                .into()
         } else if has(ProblemKind::HoldTorque) {
-            "the speed does not change what standing still takes: begin, rest and end in poses that take less (less stretched out), \
-             or with a lighter payload"
+            "the torque at rest does not depend on the speed: begin, rest and end in poses that need less torque (less stretched out), or use a \
+             lighter payload"
                 .into()
         } else if let Some(percent) = passes {
             let load = if has(ProblemKind::NoStop) || has(ProblemKind::Torque) {
-                ", or take a lighter payload"
+                ", or use a lighter payload"
             } else {
                 ""
             };
@@ -91,7 +92,7 @@ impl Verdict {
             Next::from(format!("lower the speed to {percent} %{load}: "))
                 .then(Next::typed(Action::TrajRunSlower, command))
         } else {
-            format!("correct the file; `jtc traj info {file}` shows its figures").into()
+            format!("correct the file; `jtc traj info {file}` shows its values").into()
         }
     }
 }

@@ -48,11 +48,11 @@ kinds! {
     /// The step time is 0.
     StepTime, "step time of 0 ms";
     /// A position does not fit into a frame.
-    PositionScale, "position outside what a frame carries" in "rad";
+    PositionScale, "position outside the range of a frame" in "rad";
     /// A velocity does not fit into a frame.
-    VelocityScale, "velocity outside what a frame carries" in "rad/s";
+    VelocityScale, "velocity outside the range of a frame" in "rad/s";
     /// An acceleration does not fit into a frame.
-    AccelerationScale, "acceleration outside what a frame carries" in "rad/s²";
+    AccelerationScale, "acceleration outside the range of a frame" in "rad/s²";
     /// Two points are too far apart for the arm to move from one to the other in one step.
     Jump, "jump" in "rad";
     /// Position over its limit.
@@ -64,7 +64,7 @@ kinds! {
     /// Torque of the arm model over its limit.
     Torque, "torque over its limit" in "N·m";
     /// Where the path stands still, holding the arm needs nearly all of a joint's torque, so the arm would fall later.
-    HoldTorque, "nearly all torque to stand" in "N·m";
+    HoldTorque, "too much torque needed at rest" in "N·m";
     /// A velocity is outside the friction table (J-36).
     FrictionVelocity, "velocity outside the friction table" in "rad/s";
     /// From this place Pause or Stop cannot bring the arm to rest in time with the available torque (J-33).

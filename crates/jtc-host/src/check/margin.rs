@@ -38,8 +38,8 @@ impl TorqueMargin {
     pub fn warning(&self) -> Option<String> {
         self.is_low().then(|| {
             format!(
-                "torque margin {:.1} % is below {MARGIN_LOW_PCT} %: {} reaches its limit, and the motion is held back, when the arm is \
-                 heavier or has more friction than its model; a lower speed leaves more, and so does a plan with a larger margin",
+                "torque margin {:.1} % is below {MARGIN_LOW_PCT} %: if the arm is heavier or has more friction than its model, {} reaches its limit \
+                 and slows the motion; use a lower speed, or plan with a larger margin",
                 self.percent, self.joint
             )
         })

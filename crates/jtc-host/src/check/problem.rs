@@ -94,21 +94,20 @@ impl Seen {
         let what = match kind {
             Empty | StepTime => words.to_owned(),
             TooManyPoints | TooManySegments => format!("{words}: {value}, at most {limit}"),
-            SegmentPoints => format!("{words}: {value}, 1 to {limit} are possible"),
+            SegmentPoints => format!("{words}: {value}, expected 1 to {limit}"),
             Jump => format!(
                 "jump of {value:+.4} rad between points {point} and {next} ({time_s:.3} s; at most {limit:.4} rad in a step)"
             ),
             StartPose => format!("{value:+.4} rad away from the first point (tolerance {limit} rad)"),
             NoStop => format!(
-                "a stop in time from {ms} ms after point {point} ({time_s:.3} s) needs {value:+.1} N·m, more than the {limit} N·m \
-                 that there are"
+                "a Stop {ms} ms after point {point} ({time_s:.3} s) needs {value:+.1} N·m to end in time, limit {limit} N·m"
             ),
             HoldTorque => {
                 let most = limit.abs() / HOLD_SHARE;
                 let (share, limit) = (100.0 * value.abs() / most, limit.abs());
                 format!(
-                    "standing still at point {point} ({time_s:.3} s) takes {value:+.1} N·m, {share:.1} % of the torque limit \
-                     ({most:.1} N·m); at most {:.0} % ({limit:.1} N·m), or the noise of the encoder drops the arm later",
+                    "rest at point {point} ({time_s:.3} s) needs {value:+.1} N·m, {share:.1} % of the torque limit ({most:.1} N·m), expected at \
+                     most {:.0} % ({limit:.1} N·m); with more, encoder noise can make the arm fall later",
                     100.0 * HOLD_SHARE
                 )
             }
@@ -118,7 +117,7 @@ impl Seen {
             }
             NotAtRest => format!("{words}: {value:+.4} {unit} {place}"),
             VelocityMismatch | AccelerationMismatch => format!(
-                "{words}: {value:+.4} {unit} between points {point} and {next} ({time_s:.3} s) where {limit:+.4} {unit} is given"
+                "{words}: {value:+.4} {unit} between points {point} and {next} ({time_s:.3} s), but the file has {limit:+.4} {unit}"
             ),
             _ => format!("{words}: {value:+.4} {unit} (limit {limit}) {place}"),
         };

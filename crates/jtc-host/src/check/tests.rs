@@ -414,10 +414,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
         assert_eq!(refusal(t, 0.965, None), None);
     }
     let text = check(&there, 0.98, None).to_string();
-    assert!(
-        text.contains("joint 2: standing still at point") && text.contains("98.0 % of the torque limit"),
-        "{text}"
-    );
+    assert!(text.contains("joint 2: rest at point") && text.contains("98.0 % of the torque limit"), "{text}");
     // Joint 1 turns about the vertical meanwhile, so the arm is not at rest in that pose.
     let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
     for (i, point) in both.points.iter_mut().enumerate() {

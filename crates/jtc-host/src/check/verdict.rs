@@ -266,7 +266,7 @@ impl fmt::Display for Verdict {
             write!(f, "\n  {cause}")?;
         }
         if left > 0 {
-            write!(f, "\n  and {left} further kinds, which follow from it")?;
+            write!(f, "\n  and {left} further kinds of problems that follow from this one")?;
         }
         Ok(())
     }

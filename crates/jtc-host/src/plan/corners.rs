@@ -55,7 +55,7 @@ fn missed(planned: &Planned, positions: &[[f64; JOINTS]]) -> Option<String> {
     };
     let mut named: Vec<String> = all.iter().enumerate().map(words).collect();
     if others > 0 {
-        named.push(format!("{others} more by less"));
+        named.push(format!("{others} more by smaller distances"));
     }
     (!named.is_empty()).then(|| format!("rounded corners: {}", named.join(", ")))
 }
@@ -84,7 +84,8 @@ fn cut(positions: &[[f64; JOINTS]], blend: f64) -> Option<String> {
         n => ("s", format!(" and {} more", n - NAMED)),
     };
     Some(format!(
-        "the blend of {blend} rad is more than half of a leg at waypoint{s} {named}{more}: a corner is rounded within half of its shorter leg at most"
+        "the blend of {blend} rad is more than half of a leg at waypoint{s} {named}{more}: such a corner is rounded only within half of its shorter \
+         leg"
     ))
 }
 
@@ -180,7 +181,7 @@ mod tests {
             for (i, q) in positions.iter().enumerate() {
                 let (by, named) = (missed(q), words.contains(&format!("waypoint {} ", i + 1)));
                 prop_assert!(by > NOTED - 0.01 || !named, "{by} rad from waypoint {}: {words}", i + 1);
-                prop_assert!(by < NOTED + 0.01 || named || words.contains("more by less"), "{by}: {words}");
+                prop_assert!(by < NOTED + 0.01 || named || words.contains("more by smaller"), "{by}: {words}");
                 prop_assert!(by <= blend + 1e-3, "{by} rad with a blend of {blend} rad");
             }
         }

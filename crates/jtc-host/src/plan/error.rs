@@ -16,7 +16,7 @@ pub enum PlanError {
     #[error(transparent)]
     Plan(#[from] jtc_plan::PlanError),
     /// All waypoints are equal.
-    #[error("all {count} waypoints are at the same place: that is no motion")]
+    #[error("all {count} waypoints are at the same position, so there is no motion")]
     Nowhere {
         /// Number of waypoints.
         count: usize,
@@ -25,7 +25,7 @@ pub enum PlanError {
     #[error("{0}")]
     Refused(Box<Verdict>),
     /// The speed is out of range.
-    #[error("speed {percent} % is not within 1..{most} %")]
+    #[error("speed {percent} % is out of range, expected 1..{most} %")]
     Speed {
         /// Requested value, %.
         percent: f64,
@@ -52,7 +52,7 @@ pub enum PlanError {
     },
     /// The waypoints have more corners than the points of a trajectory can represent.
     #[error(
-        "{corners} sharp corners are more than the {POINTS_MAX} points of a trajectory can follow: it has room for {most}"
+        "too many sharp corners: {corners}, expected at most {most} for the {POINTS_MAX} points of a trajectory"
     )]
     TooManyCorners {
         /// Number of corners found.
@@ -62,7 +62,7 @@ pub enum PlanError {
     },
     /// The motion takes too long: the points of its trajectory are too far apart for its corners.
     #[error(
-        "the motion takes {seconds:.0} s: {POINTS_MAX} points are {step_ms} ms apart then, too far to follow its corners"
+        "the motion is too long for its corners: in {seconds:.0} s, {POINTS_MAX} points are {step_ms} ms apart"
     )]
     TooFine {
         /// Duration, s.
@@ -71,7 +71,9 @@ pub enum PlanError {
         step_ms: u16,
     },
     /// The motion takes longer than a trajectory can.
-    #[error("the motion takes {seconds:.0} s or more: {POINTS_MAX} points cannot hold it")]
+    #[error(
+        "the motion is too long: it takes {seconds:.0} s or more, which {POINTS_MAX} points cannot cover"
+    )]
     TooLong {
         /// Minimum duration, s.
         seconds: f64,
@@ -92,10 +94,10 @@ impl PlanError {
     pub fn next_of_move(&self) -> Option<Next> {
         match self {
             Self::Plan(jtc_plan::PlanError::Position { waypoint: 1, .. }) => {
-                Some(next!("{} brings the joint back inside its limits", Jog))
+                Some(next!("{} moves the joint back inside its limits", Jog))
             }
             Self::Plan(jtc_plan::PlanError::Position { .. }) => Some(next!(
-                "choose a place inside the limits, which {} lists; positions are in rad, and in degrees with --deg",
+                "choose a position inside the limits, which {} lists; positions are in rad, and in degrees with --deg",
                 ArmShow
             )),
             _ => None,
@@ -112,11 +114,13 @@ impl PlanError {
             Of::Flange(Pose::Leg { distance, length, source, .. }) => {
                 format!("{distance:.4} m of {length:.4} m along the line: {source}")
             }
-            Of::Flange(Pose::Waypoint { waypoint: 1, .. }) => format!("where the arm stands: {what}"),
+            Of::Flange(Pose::Waypoint { waypoint: 1, .. }) => {
+                format!("in the present pose of the arm: {what}")
+            }
             Of::NotFinite { waypoint: 1, .. }
             | Of::Position { waypoint: 1, .. }
             | Of::Torque { waypoint: 1, .. } => {
-                format!("where the arm stands, {what}")
+                format!("in the present pose of the arm, {what}")
             }
             _ => what,
         }
@@ -139,34 +143,34 @@ impl Diagnose for PlanError {
             }
             Self::Plan(e) => Diagnosis::new(ErrorKind::Refused, "plan", e.hint()),
             Self::Refused(verdict) => {
-                let what = "choose other waypoints or poses: less stretched out, or nearer to each other; or carry a lighter payload";
-                let slower = "give later times, or leave the times out";
+                let what = "choose waypoints or poses that are less stretched out or nearer to each other, or use a lighter payload";
+                let slower = "give later times, or omit the times";
                 let too_fast = verdict.slower(100.0).is_some();
                 Diagnosis::new(ErrorKind::Refused, "check", if too_fast { slower } else { what })
             }
             Self::Nowhere { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "waypoints", "give a waypoint that is elsewhere")
+                Diagnosis::new(ErrorKind::Refused, "waypoints", "give a waypoint at another position")
             }
             Self::Speed { most, .. } => Diagnosis::new(
                 ErrorKind::Usage,
                 "speed",
                 if *most > 100.0 {
-                    "100 is the speed of the file itself"
+                    "give 100 for the speed of the file itself"
                 } else {
-                    "100 is as fast as the limits allow"
+                    "give 100 for the fastest motion within the limits"
                 },
             ),
             Self::Margin { .. } => Diagnosis::new(
                 ErrorKind::Usage,
                 "margin",
-                "a larger margin is for an arm whose model is uncertain; 0 plans with the whole torque",
+                "use a larger margin for an arm with an uncertain model; 0 plans with the whole torque",
             ),
             Self::Blend { unit, .. } => {
                 let next = if *unit == "m" {
-                    Next::from("is it in mm? This blend is in m (20 mm = 0.02 m)")
+                    Next::from("check the unit: this blend is in m (20 mm = 0.02 m)")
                 } else {
                     next!(
-                        "is it in degrees? A blend is in rad (5° = 0.0873 rad), and in degrees with {}, as the positions are",
+                        "check the unit: a blend is in rad (5° = 0.0873 rad), and in degrees with {}, like the positions",
                         Degrees
                     )
                 };
@@ -175,11 +179,13 @@ impl Diagnose for PlanError {
             Self::TooManyCorners { .. } | Self::TooFine { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "too-long",
-                "plan it in parts, each of fewer waypoints, or leave waypoints out",
+                "plan the motion in parts with fewer waypoints, or omit waypoints",
             ),
-            Self::TooLong { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "too-long", "plan it in parts, or at a higher speed")
-            }
+            Self::TooLong { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "too-long",
+                "plan the motion in parts, or at a higher speed",
+            ),
         }
     }
 
@@ -200,7 +206,7 @@ mod tests {
     #[test]
     fn a_move_is_refused_with_the_words_of_its_waypoint() {
         let joint = Joint::ALL[2];
-        for (waypoint, place) in [(1, "where the arm stands, "), (2, "")] {
+        for (waypoint, place) in [(1, "in the present pose of the arm, "), (2, "")] {
             let torque =
                 |holding| Of::Torque { waypoint, joint, torque: 90.0, limit: 77.6, whole: 80.0, holding };
             let position = Of::Position { waypoint, joint, value: 5.0, min: -1.0, max: 1.0 };
@@ -214,7 +220,7 @@ mod tests {
         let source = || Box::new(PoseError::NoMotion);
         let of = |error: PoseError| PlanError::from(Of::from(error)).of_move();
         let start = of(PoseError::Waypoint { waypoint: 1, source: source() });
-        assert_eq!(start, format!("where the arm stands: {}", PoseError::NoMotion));
+        assert_eq!(start, format!("in the present pose of the arm: {}", PoseError::NoMotion));
         assert_eq!(
             of(PoseError::Waypoint { waypoint: 2, source: source() }),
             PoseError::NoMotion.to_string()

@@ -65,7 +65,7 @@ pub(super) fn note(
     let at = trajectory.at_ms((1e3 * left.time_s).round() as u32)?;
     let hold = arm.holding(&at.position)[left.joint.index()].abs();
     Some(format!(
-        "the torque margin of {} is {:.1} % instead of {margin_pct} %: holding the arm takes {hold:.1} of its {:.1} N·m at {:.3} s",
+        "the torque margin of {} is {:.1} % instead of {margin_pct} %: holding the arm needs {hold:.1} of its {:.1} N·m at {:.3} s",
         left.joint, left.percent, left.limit_nm, left.time_s
     ))
 }

@@ -336,7 +336,7 @@ impl<'a> Planner<'a> {
             let scale = sampled.scale;
             let of_margin = joint.filter(|_| for_margin > NOTED).map(|joint| {
                 format!(
-                    "slowed down to {:.0} % of the speed that was planned, for the torque margin of {joint}",
+                    "slowed down to {:.0} % of the planned speed, for the torque margin of {joint}",
                     100.0 / for_margin
                 )
             });
@@ -418,7 +418,7 @@ fn binding(motion: &Motion, scale: f64, slowed: Option<&Problem>) -> Vec<Bound> 
 }
 
 fn slowed_words(problem: &Problem, stretch: f64) -> String {
-    format!("slowed down to {:.0} % of the speed that was planned, for the check: {problem}", 100.0 / stretch)
+    format!("slowed down to {:.0} % of the planned speed, to pass the check: {problem}", 100.0 / stretch)
 }
 
 /// Plans a move between two positions at `speed_pct` % of the limits of `config`, like [`Planner::to`] without torques.

@@ -117,14 +117,14 @@ pub fn read_capture(input: impl BufRead) -> io::Result<Vec<Captured>> {
         let wrong =
             |what: &str| io::Error::new(io::ErrorKind::InvalidData, format!("line {}: {what}", i + 1));
         let mut words = line.split_whitespace();
-        let time_s = words.next().and_then(|w| w.parse().ok()).ok_or_else(|| wrong("no time"))?;
+        let time_s = words.next().and_then(|w| w.parse().ok()).ok_or_else(|| wrong("the time is missing"))?;
         let direction = match words.next() {
             Some(">") => Direction::ToDevice,
             Some("<") => Direction::ToHost,
-            _ => return Err(wrong("neither > nor <")),
+            _ => return Err(wrong("the direction is neither > nor <")),
         };
         let bytes = words
-            .map(|w| u8::from_str_radix(w, 16).map_err(|_| wrong("a byte that is not hex")))
+            .map(|w| u8::from_str_radix(w, 16).map_err(|_| wrong("a byte is not hexadecimal")))
             .collect::<io::Result<_>>()?;
         all.push(Captured { time_s, direction, bytes });
     }

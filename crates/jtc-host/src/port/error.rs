@@ -9,7 +9,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 #[non_exhaustive]
 pub enum PortError {
     /// The device was not found.
-    #[error("{path}: there is no such port")]
+    #[error("{path}: this port does not exist")]
     NotFound {
         /// Name of the port.
         path: String,
@@ -35,7 +35,9 @@ pub enum PortError {
         baud: u32,
     },
     /// The port disappeared while it was open.
-    #[error("{path}: the port has gone (cable pulled, or the program at its other end has ended)")]
+    #[error(
+        "{path}: the port has disappeared (the cable was pulled, or the program at its other end has ended)"
+    )]
     Gone {
         /// Name of the port.
         path: String,
@@ -49,7 +51,7 @@ pub enum PortError {
         what: String,
     },
     /// The agent rejects this client.
-    #[error("{url}: the agent does not let this program in: {what}")]
+    #[error("{url}: the agent denies access to this program: {what}")]
     NotLetIn {
         /// Address of the agent.
         url: String,
@@ -65,7 +67,7 @@ pub enum PortError {
         what: String,
     },
     /// The other end accepts no bytes.
-    #[error("{path}: no byte could be written for {seconds:.1} s")]
+    #[error("{path}: the port accepted no byte for {seconds:.1} s")]
     Stalled {
         /// Name of the port.
         path: String,
@@ -94,7 +96,7 @@ pub enum PortError {
         by: Option<String>,
     },
     /// The program that holds the port does not answer a Stop or Pause.
-    #[error("{}: the program that has this port{} did not answer within {seconds:.0} s", path, process_words(*process))]
+    #[error("{}: the program that uses this port{} did not answer within {seconds:.0} s", path, process_words(*process))]
     HolderSilent {
         /// Name of the port or of its socket.
         path: String,
@@ -104,7 +106,7 @@ pub enum PortError {
         seconds: f64,
     },
     /// The program that holds the port could not deliver a Stop or Pause to the controller.
-    #[error("{path}: the controller has not confirmed it to {holder}, which has this port{}", what.as_ref().map_or(String::new(), |what| format!(" ({what})")))]
+    #[error("{path}: the controller did not confirm the request to {holder}, which uses this port{}", what.as_ref().map_or(String::new(), |what| format!(" ({what})")))]
     NotHalted {
         /// Name of the port.
         path: String,
@@ -134,36 +136,35 @@ fn process_words(process: Option<i32>) -> String {
 impl Diagnose for PortError {
     fn diagnosis(&self) -> Diagnosis {
         let next: Next = match self {
-            PortError::NotFound { .. } | PortError::NoPort { .. } => "`jtc ports` lists the ports that are there".into(),
+            PortError::NotFound { .. } | PortError::NoPort { .. } => "`jtc ports` lists the ports of this computer".into(),
             PortError::Permission { path } if cfg!(target_os = "linux") => {
-                format!("`sudo usermod -aG dialout $USER`, then log in again (owner and group: `ls -l {path}`)").into()
+                format!("run `sudo usermod -aG dialout $USER`, then log in again (`ls -l {path}` shows owner and group)").into()
             }
             PortError::Permission { .. } => "run with the rights to open this port".into(),
             PortError::Busy { path } if cfg!(target_os = "linux") => {
-                format!("`fuser -v {path}` names the program that has it; end it and try again").into()
+                format!("`fuser -v {path}` names the program that uses the port; end the program and try again").into()
             }
-            PortError::Busy { .. } => "close the program that has it and try again".into(),
-            PortError::Baud { .. } => "try `--baud 115200`, the rate the controller starts with".into(),
-            PortError::Gone { .. } => "plug it in again, then `jtc ports`".into(),
+            PortError::Busy { .. } => "close the program that uses the port and try again".into(),
+            PortError::Baud { .. } => "try `--baud 115200`, the rate of the controller after a start".into(),
+            PortError::Gone { .. } => "plug the cable in again, then run `jtc ports`".into(),
             PortError::NoAgent { .. } => "`jtc serve` starts an agent and prints its address".into(),
             PortError::NotLetIn { .. } => {
-                "give the token with --token-file, the file that `jtc serve` names when it starts".into()
+                "give the token with --token-file; `jtc serve` prints the name of the file when it starts".into()
             }
-            PortError::AgentGone { url, .. } => format!("`jtc status --port {url}` shows whether it is back").into(),
+            PortError::AgentGone { url, .. } => format!("`jtc status --port {url}` shows whether the agent is back").into(),
             PortError::Stalled { .. } => {
-                "check cable and power; a device with flow control holds the line: the controller uses none".into()
+                "check cable and power; switch flow control off, because the controller does not use it".into()
             }
             PortError::NoneFound => {
-                "plug the adapter in, or start a simulated controller: `jtc sim --serial /tmp/jtc` and then `--port \
-                 /tmp/jtc`"
+                "plug the adapter in, or start a simulated controller with `jtc sim --serial /tmp/jtc` and use `--port /tmp/jtc`"
                     .into()
             }
-            PortError::Several { .. } => "name one with `--port PATH` (or JTC_PORT)".into(),
-            PortError::Halted { .. } => next!("{} shows where the arm is", Status),
+            PortError::Several { .. } => "select a port with `--port PATH` (or JTC_PORT)".into(),
+            PortError::Halted { .. } => next!("{} shows the position of the arm", Status),
             PortError::HolderSilent { .. } | PortError::NotHalted { .. } => {
                 "if the arm is moving, press the emergency stop".into()
             }
-            PortError::Io { path, .. } => format!("`jtc ports` shows how {path} is").into(),
+            PortError::Io { path, .. } => format!("`jtc ports` shows the state of {path}").into(),
         };
         let (kind, code) = match self {
             PortError::NotLetIn { .. } => (ErrorKind::Refused, "not-let-in"),

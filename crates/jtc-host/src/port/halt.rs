@@ -137,7 +137,7 @@ impl End {
         let moving = match labels::moving_joint(status) {
             _ if stands => None,
             Some((joint, speed)) if !has_torque(status) => {
-                Some(format!("{joint} moves without torque at {speed:.2} rad/s, which no Stop ends"))
+                Some(format!("{joint} moves without torque at {speed:.2} rad/s, and a Stop cannot end this"))
             }
             Some((joint, speed)) => Some(format!("{joint} moves at {speed:.2} rad/s")),
             None if status.is_executing() => Some("the arm is on the path of a trajectory".to_owned()),
@@ -147,7 +147,7 @@ impl End {
             None if is_paused(status) => {
                 Some("the trajectory is paused and not stopped: it can be resumed".to_owned())
             }
-            None => Some("the arm was not still for long enough".to_owned()),
+            None => Some("the arm was not at rest for long enough".to_owned()),
         };
         let (state, trajectory) = (status.state.to_string(), status.trajectory.to_string());
         let held_stop = status.is_held_stop();
@@ -158,8 +158,8 @@ impl End {
     pub fn next_step(&self) -> Next {
         if self.held_stop {
             next!(
-                "keep clear and wait: the controller gives way to a push or lowers a load, and holds the arm where it comes to rest; \
-                 {} shows the cause. The emergency stop takes the torque away: an arm without brakes falls",
+                "keep clear and wait: the controller yields to a push or lowers a load, then holds the arm at rest; {} shows the cause. The \
+                 emergency stop removes the torque: an arm without brakes falls",
                 Status
             )
         } else {

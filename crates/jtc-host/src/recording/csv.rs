@@ -229,7 +229,7 @@ impl<R: BufRead> Lines<R> {
         let read = (&mut self.file).take(LINE_MAX).read_until(b'\n', &mut self.line)?;
         let ended = self.line.pop_if(|last| *last == b'\n').is_some();
         if !ended && read as u64 == LINE_MAX {
-            return Err(failure(self.number, None, "no line of a recording is as long"));
+            return Err(failure(self.number, None, "the line is too long for a recording"));
         }
         self.line.pop_if(|last| ended && *last == b'\r');
         Ok((read > 0).then_some((&self.line, ended)))
@@ -251,7 +251,7 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
     let columns: Vec<(&str, Target)> =
         header.split(',').map(str::trim).map(|name| (name, Target::of(name))).collect();
     if !columns.iter().any(|(_, target)| matches!(target, Target::Time)) {
-        return Err(failure(1, None, "no recording: its header has no column time_s"));
+        return Err(failure(1, None, "not a recording: the header has no column time_s"));
     }
     let mut ending = Ending::default();
     let (mut in_motion, mut within_line) = (false, false);
@@ -283,9 +283,9 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
         see(&sample);
     }
     let cut = if within_line {
-        Some("the file breaks off within a line")
+        Some("the file is incomplete: it ends within a line")
     } else if in_motion && ending.outcome.is_empty() {
-        Some("the file breaks off while the arm moves")
+        Some("the file is incomplete: it ends while the arm moves")
     } else {
         None
     };

@@ -104,7 +104,7 @@ impl fmt::Display for RecordingError {
                 )
             }
             RecordingError::Empty { path } => {
-                write!(f, "{}: an empty file: the program ended before anything was recorded", path.display())
+                write!(f, "{}: the file is empty: the program ended before it recorded data", path.display())
             }
             RecordingError::Io { path, source } => write!(f, "{}: {source}", path.display()),
             RecordingError::Line { path, line, column, problem } => {
@@ -117,7 +117,7 @@ impl fmt::Display for RecordingError {
             RecordingError::Mcap { path, problem } => write!(f, "{}: {problem}", path.display()),
             RecordingError::Disorder { path, time_s } => write!(
                 f,
-                "{}: the message of {time_s:.3} s stands far behind later ones: the file is not in the order of time",
+                "{}: the messages are not in the order of time: the message of {time_s:.3} s is far after later messages",
                 path.display()
             ),
             RecordingError::Message { path, topic, time_s } => {
@@ -146,10 +146,10 @@ impl Diagnose for RecordingError {
             Self::UnknownFormat { .. } | Self::BuiltWithout { .. } => "",
             Self::Io { .. } => "check the name and the rights of the file",
             Self::Disorder { .. } => {
-                "`mcap sort FILE -o SORTED.mcap` (the MCAP project's command) puts it in order"
+                "`mcap sort FILE -o SORTED.mcap` (a command of the MCAP project) sorts the file"
             }
             Self::Empty { .. } | Self::Line { .. } | Self::Mcap { .. } | Self::Message { .. } => {
-                "recordings are written by `jtc traj run FILE --record run.mcap`, `jtc move --record` and `jtc sim --record`"
+                "`jtc traj run FILE --record run.mcap`, `jtc move --record` and `jtc sim --record` write recordings"
             }
         };
         Diagnosis::new(ErrorKind::Usage, "recording", next)

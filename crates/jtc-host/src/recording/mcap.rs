@@ -293,7 +293,7 @@ pub(super) fn scan(
         Ok(true) => None,
         Ok(false) => Some("the file was not completed".to_owned()),
         Err(e) if gatherer.is_empty() => return Err(e),
-        Err(RecordingError::Mcap { problem, .. }) => Some(format!("the file breaks off: {problem}")),
+        Err(RecordingError::Mcap { problem, .. }) => Some(format!("the file is incomplete: {problem}")),
         Err(e) => return Err(e),
     };
     gatherer.finish(cut.is_some(), &mut give);

@@ -318,8 +318,8 @@ fn scan_with(path: &Path, room: usize, mut see: impl FnMut(&Sample)) -> Result<S
     let _ = room;
     let Found { info, ending, cut } = found.map_err(|e| e.at(path))?;
     let cut = cut.map(|why| match samples {
-        0 => format!("{why}; it holds no sample"),
-        n => format!("{why}; {n} samples up to {last_s:.3} s are whole"),
+        0 => format!("{why}; the file contains no sample"),
+        n => format!("{why}; {n} samples up to {last_s:.3} s are complete"),
     });
     Ok(Scanned { info, ending, samples, cut })
 }

@@ -85,13 +85,13 @@ fn away(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
 #[non_exhaustive]
 pub enum NothingLeft {
     /// The run reached its end.
-    #[error("the run came to its end: nothing is left of it")]
+    #[error("the run reached its end, so no part of it remains")]
     Finished,
     /// The recording contains no motion.
-    #[error("the recording holds no execution of this trajectory")]
+    #[error("the recording contains no execution of this trajectory")]
     NoExecution,
     /// The commanded positions belong to another trajectory.
-    #[error("the recording is of another trajectory, or of this one at another speed")]
+    #[error("the recording is of another trajectory, or of this trajectory at another speed")]
     Other,
 }
 
@@ -99,9 +99,11 @@ impl Diagnose for NothingLeft {
     fn diagnosis(&self) -> Diagnosis {
         let next = match self {
             Self::Finished => "`jtc traj replay RECORDING --approach` runs it again",
-            Self::Other => "name the trajectory as it was run; a recording in MCAP holds it itself",
+            Self::Other => {
+                "name the trajectory that was run, at its speed; an MCAP recording contains its trajectory"
+            }
             Self::NoExecution => {
-                "a recording of the run is needed, and the trajectory that was run: `jtc traj run FILE --record run.mcap`"
+                "use a recording of the run and its trajectory: `jtc traj run FILE --record run.mcap`"
             }
         };
         Diagnosis::new(ErrorKind::Refused, "nothing-left", next)

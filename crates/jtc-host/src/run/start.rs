@@ -28,7 +28,7 @@ pub enum StartError {
     #[error(transparent)]
     Elsewhere(CheckError),
     /// An approach of the run is not possible.
-    #[error("the straight way from where the arm stands to the first point is refused: {0}")]
+    #[error("the straight path from the present position to the first point is refused: {0}")]
     Approach(#[from] ApproachError),
     /// The next run cannot begin at the end of the run before it.
     #[error(transparent)]
@@ -38,8 +38,7 @@ pub enum StartError {
 /// The end of a path is too far from the first point of the next run.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "it ends {distance:.3} rad from where it begins ({joint}), more than {tolerance} rad: it cannot be repeated as it is; nothing was \
-     sent"
+    "the path ends {distance:.3} rad from where it begins ({joint}), limit {tolerance} rad, so it cannot be repeated; nothing was sent"
 )]
 pub struct OpenPath {
     /// Joint with the largest distance.
@@ -67,7 +66,7 @@ impl Diagnose for StartError {
             Self::Approach(_) => Diagnosis::new(
                 ErrorKind::Refused,
                 "approach",
-                "nothing moved: bring the arm nearer to the first point, by hand or with a motion of your own",
+                "bring the arm nearer to the first point, by hand or with a motion of your own; nothing moved",
             ),
             Self::Open(error) => error.diagnosis(),
         }
@@ -86,7 +85,7 @@ impl Diagnose for StartError {
 impl Diagnose for OpenPath {
     fn diagnosis(&self) -> Diagnosis {
         let next =
-            "`--approach` leads back to its first point before each run; or let the path end where it begins";
+            "use `--approach` to return to the first point before each run; or end the path where it begins";
         Diagnosis::new(ErrorKind::Refused, "open-path", next)
     }
 

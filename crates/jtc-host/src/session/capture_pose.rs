@@ -53,7 +53,7 @@ fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
         let j = joint.index();
         let way = now.positions()[j] - begin.positions()[j];
         if way.abs() > STILL {
-            return moving(format!("{joint} moves slowly, by {:.1} mrad since a moment ago", way * 1e3));
+            return moving(format!("{joint} moves slowly: {:.1} mrad since the check began", way * 1e3));
         }
     }
     Ok(())

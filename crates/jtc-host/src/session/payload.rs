@@ -52,7 +52,7 @@ impl<P: Port> Session<P> {
     fn why_refused(&mut self, payload: &Payload) -> Result<Option<ExtensionError>, Error> {
         let config = self.device_config()?;
         if let Err(e) = config.parameter_bounds.check_payload(payload) {
-            let why = format!("{} is {}, and the controller takes {} to {}", e.what, e.value, e.low, e.high);
+            let why = format!("{} is {}, expected {} to {}", e.what, e.value, e.low, e.high);
             return Ok(Some(ExtensionError::NoBody { why }));
         }
         let (arm, status) = (self.device_arm()?, self.fresh_status()?);

@@ -202,7 +202,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
             ParameterSource::ControllerDefaults => self.session.info()?.filter(|info| info.defaults_stored),
             _ => None,
         };
-        let stored = stored.map(|info| format!("{}, the arm that is stored in the controller", info.arm));
+        let stored = stored.map(|info| format!("{}, the stored arm of the controller", info.arm));
         (self.report)(&RecoverStep::Give(self.parameters.arm_name().or(stored)));
         self.session.give(self.parameters, &self.ended)?;
         self.given = true;

@@ -15,7 +15,7 @@ use crate::{Arm, Error};
 
 /// Result of a run: how it ended, and a sample for each status.
 #[derive(Debug)]
-#[must_use = "a run may have failed: look at its outcome"]
+#[must_use = "a run may have failed: check its outcome"]
 pub struct Run {
     /// How the run ended. If it failed, it is an error of [`Session::execute`] or of [`Session::follow`]. A failed run also
     /// has samples, for an analysis of the failure.

@@ -37,14 +37,14 @@ fn recover_says_each_step_of_each_state() {
         );
         steps
     }
-    let kept = "friction, gains and arm model: those that the controller was given before";
+    let kept = "friction, gains and arm model: unchanged, as the controller received them before";
     let done = "HoldPos, no errors";
     let mut s = session(None);
     let fresh = words(&mut s, ParameterSource::ControllerDefaults);
     assert!(fresh[0].starts_with("found: state ") && fresh[0].contains("friction not given"), "{fresh:?}");
     assert!(
         fresh.contains(
-            &"friction, gains and arm model: the controller's own defaults, those of its built-in arm"
+            &"friction, gains and arm model: the defaults of the controller, those of its built-in arm"
                 .to_owned()
         ),
         "{fresh:?}"

@@ -49,16 +49,16 @@ impl std::fmt::Display for RecoverStep {
             RecoverStep::Reset(nodes) => write!(f, "resetting {}", nodes.join(", ")),
             RecoverStep::Give(None) => write!(
                 f,
-                "friction, gains and arm model: the controller's own defaults, those of its built-in arm"
+                "friction, gains and arm model: the defaults of the controller, those of its built-in arm"
             ),
             RecoverStep::Give(Some(arm)) => write!(f, "friction, gains and arm model: those of {arm}"),
             RecoverStep::Keep => {
-                write!(f, "friction, gains and arm model: those that the controller was given before")
+                write!(f, "friction, gains and arm model: unchanged, as the controller received them before")
             }
             RecoverStep::KeepHolding(arm) => write!(
                 f,
-                "the arm is held with the friction, gains and arm model that the controller was given before, not with those of \
-                 {arm}; a push of the parameters gives them"
+                "the controller holds the arm with its previous friction, gains and arm model, not with those of {arm}; push the parameters to \
+                 change this"
             ),
             RecoverStep::WaitNodes(nodes) => write!(f, "waiting for {}", nodes.join(", ")),
             RecoverStep::HoldPos => write!(f, "HoldPos, no errors"),

@@ -46,11 +46,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
     // Replays the whole motion, and then its measured version.
     let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach"]).ends(0);
-    assert!(
-        output.err.contains("the whole trajectory that the recording holds; the run got to"),
-        "{}",
-        output.err
-    );
+    assert!(output.err.contains("the whole trajectory of the recording; the run reached"), "{}", output.err);
     assert!((output.json()["verdict"]["duration_s"].as_f64().unwrap() - whole).abs() < 0.1);
     let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach", "--measured"]).ends(0);
     let part = &output.json()["verdict"]["joints"][0];

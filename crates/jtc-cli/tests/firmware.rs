@@ -104,7 +104,7 @@ fn without_a_line_a_person_answers_for_the_arm_and_nothing_is_proved() {
     let refused = json(&jtc(&dir, &words).ends(4));
     assert_eq!(refused["error"]["code"], "not-confirmed-by-person");
     let question = refused["error"]["message"].as_str().unwrap();
-    assert!(question.contains("safety wires") && question.contains("cut short"), "{question}");
+    assert!(question.contains("safety wires") && question.contains("file is complete"), "{question}");
     nothing_written(&drive);
     // If the drive stays mounted, the board has not accepted the image, and the command fails.
     let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(5));
@@ -254,11 +254,11 @@ mod with_a_board {
         );
         // The drive is unmounted and its folder stays. Then another drive is mounted there.
         let page = Path::new(&drive).join("MBED.HTM");
-        answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is there");
+        answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is at this place");
         fs::remove_file(page).unwrap();
         answer_after(
             &|| fs::remove_file(Path::new(&drive).join("DETAILS.TXT")).unwrap(),
-            "the drive has gone",
+            "the drive has disappeared",
         );
         appear(Path::new(&drive));
     }

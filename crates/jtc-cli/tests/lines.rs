@@ -226,16 +226,13 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
     };
     // Errors in the format of the file.
     for (kinds, message) in [
-        (
-            &["", "via", "line"][..],
-            "refused.csv, line 3: `via`, a point on the way of an arc, and the waypoint behind it is not `arc`",
-        ),
+        (&["", "via", "line"][..], "refused.csv, line 3: `via` (a point on an arc) is not followed by `arc`"),
         (&["", "line", "via"], "refused.csv, line 4: `via`"),
-        (&["", "arc"], "refused.csv, line 3: `arc`, and the waypoint before it is not `via`"),
-        (&["via", "arc"], "refused.csv, line 2: `via` for the first waypoint"),
+        (&["", "arc"], "refused.csv, line 3: `arc` (the end of an arc) does not follow `via`"),
+        (&["via", "arc"], "refused.csv, line 2: `via` is not valid for the first waypoint"),
         (
             &["", "curve"],
-            "refused.csv, line 3, column 8, leg: \"curve\" is no leg; known: joint, line, via, arc",
+            "refused.csv, line 3, column 8, leg: \"curve\" is not a valid leg, expected joint, line, via or arc",
         ),
     ] {
         let refused = dir.refused(&legs(kinds), &[], 2);

@@ -110,7 +110,7 @@ fn j56_what_is_no_log_is_refused_with_the_next_command() {
     let recording = sim.path("run.mcap");
     sim.jtc(&["traj", "run", &file, "--approach", "--record", &recording]).ends(0);
     let refused = jtc(&["log", "replay", &recording]).ends(2).err;
-    assert!(refused.contains("holds no log") && refused.contains("jtc log fetch"), "{refused}");
+    assert!(refused.contains("contains no log") && refused.contains("jtc log fetch"), "{refused}");
     sim.jtc(&["log", "fetch", "-o", &sim.path("log.csv")]).ends(2);
     sim.file("broken.mcap", "no recording at all");
     jtc(&["log", "replay", &sim.path("broken.mcap")]).ends(2);

@@ -62,7 +62,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     assert_eq!(output["suspicion"], "too_fast", "{output}");
     assert!(output["overshoot"][0]["beyond_rad"].as_f64().unwrap() > 0.05, "{output}");
     let output = jtc(&["traj", "info", file]).ends(0);
-    assert!(output.err.contains("the curve goes beyond them: joint 1 by"), "{}", output.err);
+    assert!(output.err.contains("the curve exceeds them: joint 1 by"), "{}", output.err);
 }
 
 /// Typed values are interpreted as the user means them, and errors use the words of the command.

@@ -157,7 +157,7 @@ fn an_arm_moves_between_positions_and_the_poses_that_were_saved() {
     // An existing pose is overwritten only on request. After a pose is removed, the file is as before, except for its
     // end.
     let refused = sim.jtc(&["pose", "save", "up", "--arm", &arm]).ends(4);
-    assert!(refused.err.contains("pose \"up\" is there already"), "{}", refused.err);
+    assert!(refused.err.contains("pose \"up\" exists already"), "{}", refused.err);
     sim.jtc(&["pose", "save", "up", "--arm", &arm, "--overwrite"]).ends(0);
     jtc(&["pose", "remove", "up", "--arm", &arm]).ends(0);
     let left = jtc(&["pose", "list", "--arm", &arm]).ends(0).out;
@@ -198,7 +198,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
         assert!(output.err.contains(message), "{words:?}: {}", output.err);
     }
     let output = jtc(&["pose", "remove", "hone", "--arm", &arm]).ends(2);
-    assert!(output.err.contains("is \"home\" meant?"), "{}", output.err);
+    assert!(output.err.contains("did you mean \"home\"?"), "{}", output.err);
     at(&sim, [0.0; 6]);
     // Like `traj run`, a move begins only in HoldPos.
     let sim = Sim::start(&FAST);
@@ -396,7 +396,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
         }
         patience.pause(format_args!("that it is run again: {}", output.err));
     };
-    assert!(output.err.contains("the last teaching in the recording, as it was measured"), "{}", output.err);
+    assert!(output.err.contains("the last teaching in the recording, as measured"), "{}", output.err);
     assert!(output.json()["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap() > 0.25);
     for wrong in ["0", "-1", "nan", "2"] {
         let refused = sim

@@ -77,7 +77,7 @@ fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
     sim.jtc(&["payload", "set", "--mass", "1", "--com", "0,0,0"]).ends(0);
     let heavy = set(&["--mass", "49", "--com", "0,0,0.5"], 4);
     assert!(
-        heavy.contains("N·m of joint 4") && heavy.contains("limit is 60 N·m") && heavy.contains("jtc jog"),
+        heavy.contains("N·m at joint 4") && heavy.contains("limit 60 N·m") && heavy.contains("jtc jog"),
         "{heavy}"
     );
     let bounds = set(&["--mass", "51", "--com", "0,0,0"], 2);

@@ -243,7 +243,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     }
     // The hint contains suggestions.
     let output = jtc(&["plan", &pose, "--arm", &arm, "-o", &out]).ends(2);
-    assert!(output.err.contains("is \"above-table\" meant?"), "{}", output.err);
+    assert!(output.err.contains("did you mean \"above-table\"?"), "{}", output.err);
     // An output file that exists, or that is the input, is refused.
     jtc(&["plan", &good, "-o", &out]).ends(0);
     let output = jtc(&["plan", &good, "-o", &out]).ends(4);

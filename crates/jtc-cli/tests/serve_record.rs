@@ -131,7 +131,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
     let report = is_reported(&dir, &part);
     assert!(report["cut"].as_str().is_some_and(|cut| cut.contains("complete")), "{report}");
     assert!(
-        report["failure"]["causes"][0].as_str().is_some_and(|why| why.contains("was not seen")),
+        report["failure"]["causes"][0].as_str().is_some_and(|why| why.contains("was not recorded")),
         "{report}"
     );
 

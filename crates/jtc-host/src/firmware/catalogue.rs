@@ -100,11 +100,11 @@ impl Catalogue {
         let mut catalogue: Self = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
         for image in &catalogue.images {
             if Path::new(&image.file).file_name() != Some(image.file.as_ref()) {
-                return Err(bad(format!("{:?} is no name of a file in this folder", image.file)));
+                return Err(bad(format!("{:?} is not the name of a file in this folder", image.file)));
             }
             if image.address != FLASH {
                 return Err(bad(format!(
-                    "{} is for {:#010x}; the drive of a board writes from {FLASH:#010x} on",
+                    "{} is for address {:#010x}, expected {FLASH:#010x}, where the drive of a board writes",
                     image.file, image.address
                 )));
             }
@@ -146,7 +146,11 @@ impl Catalogue {
         listed.check(&path, &bytes)?;
         let image = Image::parse(&path, bytes)?.listed();
         if image.record().board != board {
-            let why = format!("{} is listed for {board}, and is for {}", listed.file, image.record().board);
+            let why = format!(
+                "{} is listed for {board}, but its content is for {}",
+                listed.file,
+                image.record().board
+            );
             return Err(FirmwareError::BadCatalogue { path: self.folder.join(FILE), why });
         }
         Ok(image)

@@ -73,11 +73,11 @@ impl Drive {
     pub fn at(path: &Path) -> Result<Self, FirmwareError> {
         let no_drive = |why: &str| FirmwareError::NoDrive { path: path.to_owned(), why: why.to_owned() };
         if !path.is_dir() {
-            return Err(no_drive("there is no such folder"));
+            return Err(no_drive("this folder does not exist"));
         }
         let (details, page) = (text(path, "DETAILS.TXT"), text(path, "MBED.HTM"));
         if details.is_none() && page.is_none() {
-            return Err(no_drive("it has neither DETAILS.TXT nor MBED.HTM, as the drive of an ST-LINK has"));
+            return Err(no_drive("the folder has neither DETAILS.TXT nor MBED.HTM"));
         }
         Ok(Self {
             path: path.to_owned(),
@@ -240,7 +240,7 @@ mod tests {
     fn a_folder_is_a_drive_when_it_has_its_files() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("NOD_H745ZIQ");
-        assert!(Drive::at(&path).unwrap_err().to_string().contains("no such folder"));
+        assert!(Drive::at(&path).unwrap_err().to_string().contains("folder does not exist"));
         fs::create_dir(&path).unwrap();
         assert!(Drive::at(&path).unwrap_err().to_string().contains("neither DETAILS.TXT"));
         fs::write(path.join("DETAILS.TXT"), "Version: 0221\n").unwrap();

@@ -19,7 +19,7 @@ pub(super) fn is_elf(bytes: &[u8]) -> bool {
 /// Returns the flash content of the file, beginning with the first byte of the flash. Gaps are filled with the value of
 /// erased flash.
 pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
-    let damaged = || "an ELF file that is cut off or damaged".to_owned();
+    let damaged = || "an incomplete or damaged ELF file".to_owned();
     let half =
         |at: usize| bytes.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]])).ok_or_else(damaged);
     let word = |at: usize| {
@@ -28,7 +28,7 @@ pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
     };
     let word = |at: usize| word(at).ok_or_else(damaged);
     if !bytes.starts_with(&MAGIC) || half(18)? != EM_ARM {
-        return Err("an ELF file of another processor".into());
+        return Err("an ELF file for another processor".into());
     }
     let (table, size, count) = (word(28)? as usize, usize::from(half(42)?), half(44)?);
     if count > SEGMENTS_MAX || size < 32 {
@@ -48,7 +48,7 @@ pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
         let end = at.and_then(|at| at.checked_add(length)).filter(|end| *end <= STORED_ARM);
         let (Some(at), Some(end)) = (at, end) else {
             return Err(format!(
-                "{length} bytes for {address:#010x}, which is not where a program stands in flash"
+                "{length} bytes at address {address:#010x}, which is outside the flash of a program"
             ));
         };
         if flat.len() < end {
@@ -98,7 +98,10 @@ mod tests {
             assert!(flat(&bytes[..end]).is_err(), "{end}");
         }
         for address in [0x0700_0000, 0x2000_0000, FLASH + 0x1C_0000 - 1, u32::MAX] {
-            assert!(flat(&file(&[(address, &[1, 2])])).unwrap_err().contains("not where"), "{address:#x}");
+            assert!(
+                flat(&file(&[(address, &[1, 2])])).unwrap_err().contains("outside the flash"),
+                "{address:#x}"
+            );
         }
         let mut other = bytes.clone();
         other[18] = 62;

@@ -43,7 +43,7 @@ pub enum FirmwareError {
         why: String,
     },
     /// The catalogue has no image for this board.
-    #[error("no image for the board {board}; there are those for {}", known.join(", "))]
+    #[error("no image for the board {board}; the images are for {}", known.join(", "))]
     NoBoard {
         /// Requested board.
         board: String,
@@ -65,7 +65,7 @@ pub enum FirmwareError {
         listed: Box<CatalogueImage>,
     },
     /// The folder is not a drive of an ST-LINK.
-    #[error("{}: no drive of an ST-LINK: {why}", path.display())]
+    #[error("{}: not the drive of an ST-LINK: {why}", path.display())]
     NoDrive {
         /// The folder.
         path: PathBuf,
@@ -82,7 +82,7 @@ pub enum FirmwareError {
         drives: Vec<PathBuf>,
     },
     /// The board must be asked over a serial port before it is flashed, but the port cannot be used.
-    #[error("the board has to be asked over {port} before it is flashed: {source}")]
+    #[error("the board must report its state over {port} before it is flashed: {source}")]
     NotAsked {
         /// The port.
         port: String,
@@ -106,7 +106,7 @@ pub enum FirmwareError {
         state: Code<ControllerState>,
     },
     /// The controller on the line runs on another board than the board of the image.
-    #[error("the controller at {port} runs on {runs}, and the image is for {board}")]
+    #[error("the controller at {port} runs on {runs}, but the image is for {board}")]
     OtherController {
         /// Port of the controller.
         port: String,
@@ -144,7 +144,7 @@ pub enum FirmwareError {
         runs: Option<String>,
     },
     /// The drive has no space for a file of this size.
-    #[error("{}: the drive has no room for {bytes} bytes{}", drive.display(), with_failure(failure))]
+    #[error("{}: the drive has no space for {bytes} bytes{}", drive.display(), with_failure(failure))]
     DriveFull {
         /// The drive.
         drive: PathBuf,
@@ -164,7 +164,7 @@ pub enum FirmwareError {
         source: io::Error,
     },
     /// The copying was interrupted.
-    #[error("{}: {source} after {written} bytes; the board may hold a part of the image", path.display())]
+    #[error("{}: {source} after {written} bytes; the board may contain a part of the image", path.display())]
     NotWritten {
         /// The file on the drive.
         path: PathBuf,
@@ -182,7 +182,7 @@ pub enum FirmwareError {
         text: String,
     },
     /// The drive does not behave as after accepting an image.
-    #[error("the image was copied, and {seen}{}", with_doubt(doubt))]
+    #[error("the image was copied, but {seen}{}", with_doubt(doubt))]
     NotTaken {
         /// Behaviour of the drive.
         seen: DriveAfter,
@@ -201,7 +201,7 @@ pub enum FirmwareError {
     },
     /// The running program does not report its flash.
     #[error(
-        "the board runs {runs}, which does not report what is in its flash: it is not proved that it is the image"
+        "the board runs {runs}, which does not report the content of its flash, so the image cannot be verified"
     )]
     NotReported {
         /// Version and board that the controller reports.
@@ -212,7 +212,7 @@ pub enum FirmwareError {
     NoController,
     /// No controller started in time.
     #[error(
-        "the image was copied, and no controller started with it within {waited_s:.0} s: {last}{}",
+        "the image was copied, but no controller started with it within {waited_s:.0} s: {last}{}",
         with_doubt(doubt)
     )]
     NotStarted {
@@ -238,14 +238,13 @@ fn of_label(label: &Option<String>) -> String {
 
 fn as_supplied(board: &str, runs: &Option<String>) -> String {
     match runs {
-        Some(runs) => format!("and the board runs {runs}: its core may be supplied in another way"),
+        Some(runs) => format!("but the board runs {runs}: its core may have another supply"),
         None if board.ends_with("-ldo") => {
-            "whose core is supplied by the LDO; as it is sold the board supplies it by the SMPS, \
-             and no firmware reports that this one does not"
+            "with its core supplied by the LDO; a new board supplies its core by the SMPS, and no firmware reports a change on this board"
                 .into()
         }
         None => {
-            "whose core is supplied by the SMPS as it is sold, and no firmware reports that this one still is"
+            "with its core supplied by the SMPS, as on a new board; no firmware confirms this for this board"
                 .into()
         }
     }
@@ -255,7 +254,7 @@ fn cannot_open(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::PermissionDenied => "nothing was written; this user may not write to the drive",
         io::ErrorKind::ReadOnlyFilesystem => "nothing was written; the drive is mounted read-only",
-        _ => "nothing was written; no file can be made on the drive",
+        _ => "nothing was written; the file cannot be created on the drive",
     }
 }
 
@@ -266,5 +265,5 @@ fn with_failure(failure: &Option<String>) -> String {
 fn with_doubt(doubt: &Option<String>) -> String {
     doubt
         .as_ref()
-        .map_or(String::new(), |doubt| format!(" (at the end of the copying the system reported: {doubt})"))
+        .map_or(String::new(), |doubt| format!(" (at the end of the copy the system reported: {doubt})"))
 }

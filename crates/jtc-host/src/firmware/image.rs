@@ -150,19 +150,19 @@ impl Image {
     pub fn is_what_runs(&self, program: Program) -> Result<(), String> {
         let bank1 = &self.bytes[..self.bytes.len().min(BANK1)];
         let Some((read, rest)) = bank1.split_at_checked(program.bytes as usize) else {
-            return Err(format!("it has a program of {} bytes, the image {}", program.bytes, bank1.len()));
+            return Err(format!("its program has {} bytes, the image has {}", program.bytes, bank1.len()));
         };
         let fills = |byte: u8| rest.iter().all(|b| *b == byte);
         if !fills(0) && !fills(ERASED) {
             return Err(format!(
-                "its program ends after {} bytes, that of the image does not",
+                "its program ends after {} bytes, but the program of the image is longer",
                 program.bytes
             ));
         }
         match CRC.checksum(read) {
             crc32 if crc32 == program.crc32 => Ok(()),
             crc32 => Err(format!(
-                "the CRC-32 of its {} bytes is {:08x}, that of the image {crc32:08x}",
+                "the CRC-32 of its {} bytes is {:08x}, that of the image is {crc32:08x}",
                 program.bytes, program.crc32
             )),
         }
@@ -176,15 +176,18 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
         return Err(format!("{} bytes, too few for a program", bytes.len()));
     };
     if bytes.len() > STORED_ARM {
-        return Err(format!("{} bytes, and from {STORED_ARM} on a board keeps its stored arm", bytes.len()));
+        return Err(format!(
+            "{} bytes are too many, expected at most {STORED_ARM}, where the stored arm of a board begins",
+            bytes.len()
+        ));
     }
     if !STACKS.iter().any(|(first, end)| stack > *first && stack <= *end) || stack % 8 != 0 {
-        return Err(format!("its first word, {stack:#010x}, is no stack in the memory of these processors"));
+        return Err(format!("its first word, {stack:#010x}, is not a stack address of these processors"));
     }
     let program = FLASH..FLASH + bytes.len().min(BANK1) as u32;
     let entry = |word: u32| word % 2 == 1 && program.contains(&(word & !1));
     if !entry(reset) {
-        return Err(format!("its second word, {reset:#010x}, is no entry of a program within it"));
+        return Err(format!("its second word, {reset:#010x}, is not the entry of a program in this file"));
     }
     let record = Record::parse(bytes)
         .ok_or_else(|| format!("no record of this project's firmware at {:#x}", Record::OFFSET))?;
@@ -192,12 +195,12 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
     let lost = (2..VECTORS).filter_map(|n| word(4 * n)).find(|word| !unused(*word) && !entry(*word));
     if let Some(lost) = lost {
         return Err(format!(
-            "cut short or damaged: an interrupt leads to {lost:#010x}, which is not within it"
+            "incomplete or damaged: an interrupt leads to {lost:#010x}, which is outside the file"
         ));
     }
     if has_second_core(&record.board) && !starts_second_core(bytes) {
         return Err(format!(
-            "cut short: {} bytes, and the program of the second core, {BANK1} bytes behind the first, is not whole",
+            "incomplete: {} bytes, but the program of the second core, {BANK1} bytes after the first, is not complete",
             bytes.len()
         ));
     }
@@ -243,13 +246,13 @@ mod tests {
         long.resize(STORED_ARM + 1, 0);
         for (bytes, why) in [
             (vec![1, 2, 3], "3 bytes, too few"),
-            (good()[..0x400].to_vec(), "is no entry"),
-            (good()[..0xF00].to_vec(), "0x08000f05, which is not within it"),
-            (b"#!/bin/sh\necho this is no program at all".to_vec(), "is no stack"),
-            (with(0, &[0; 4]), "0x00000000, is no stack"),
-            (with(0, &0x2002_0008u32.to_le_bytes()), "is no stack"),
-            (with(4, &0x0800_0500u32.to_le_bytes()), "is no entry"),
-            (with(4, &0x0810_0001u32.to_le_bytes()), "is no entry"),
+            (good()[..0x400].to_vec(), "is not the entry"),
+            (good()[..0xF00].to_vec(), "0x08000f05, which is outside the file"),
+            (b"#!/bin/sh\necho this is no program at all".to_vec(), "is not a stack address"),
+            (with(0, &[0; 4]), "0x00000000, is not a stack address"),
+            (with(0, &0x2002_0008u32.to_le_bytes()), "is not a stack address"),
+            (with(4, &0x0800_0500u32.to_le_bytes()), "is not the entry"),
+            (with(4, &0x0810_0001u32.to_le_bytes()), "is not the entry"),
             (with(0x400, b"openjtc"), "no record"),
             (with(0x40A, &[95, 0]), "no record"),
             (with(0x418, &[0]), "no record"),
@@ -267,7 +270,7 @@ mod tests {
         assert!(parsed(good.clone()).is_ok());
         for end in [0x1000, BANK1 - 1, BANK1, BANK1 + 4, BANK1 + 66, good.len() - 1] {
             let said = parsed(good[..end].to_vec()).unwrap_err();
-            assert!(said.contains("cut short") && said.contains("second core"), "{end}: {said}");
+            assert!(said.contains("incomplete") && said.contains("second core"), "{end}: {said}");
         }
         // The other board has only one core.
         assert_eq!(image_bytes("nucleo-h743zi2", 7).len(), 0x1000);
@@ -307,7 +310,7 @@ mod tests {
             assert_eq!(parsed(longer.clone()).unwrap().is_what_runs(program), Ok(()));
             longer[BANK1 - 1] = 9;
             let said = parsed(longer).unwrap().is_what_runs(program).unwrap_err();
-            assert!(said.contains("that of the image does not"), "{said}");
+            assert!(said.contains("the program of the image is longer"), "{said}");
         }
         let other = parsed(image_bytes("nucleo-h743zi2", 8)).unwrap();
         assert!(other.is_what_runs(program).unwrap_err().contains("CRC-32"));

@@ -76,8 +76,8 @@ impl Places {
     pub fn still_there(&self, drive: &Drive) -> Result<(), FirmwareError> {
         let what = match self.at(&drive.path) {
             Ok(now) if now == *drive => return Ok(()),
-            Ok(_) => "another drive is there than was looked at",
-            Err(_) => "the drive has gone",
+            Ok(_) => "another drive is at this place now",
+            Err(_) => "the drive has disappeared",
         };
         Err(FirmwareError::Changed { what: format!("{}: {what}", drive.path.display()) })
     }

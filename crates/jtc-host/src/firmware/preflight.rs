@@ -71,16 +71,16 @@ impl Asked {
         match &self.answers {
             Answers::Nothing { bytes: 0 } => None,
             Answers::Nothing { .. } => Some(format!(
-                "{}: bytes arrive, and no status can be read: something runs at another rate (--baud).",
+                "{}: bytes arrive, but contain no status: the device may use another rate (--baud).",
                 self.port
             )),
             Answers::Controller { silent, grips, .. } => {
                 let joints = silent.iter().map(Joint::to_string).collect::<Vec<_>>().join(", ");
-                let joints = (!silent.is_empty())
-                    .then(|| format!("{}: no answer from {joints}: torque is not known there.", self.port));
-                let gripper = grips.then(|| {
-                    format!("{}: the gripper is on, and a part that it holds is dropped.", self.port)
+                let joints = (!silent.is_empty()).then(|| {
+                    format!("{}: no answer from {joints}: the torque of these joints is unknown.", self.port)
                 });
+                let gripper = grips
+                    .then(|| format!("{}: the gripper is on and drops the part that it holds.", self.port));
                 let doubts: Vec<String> = joints.into_iter().chain(gripper).collect();
                 (!doubts.is_empty()).then(|| doubts.join(" "))
             }
@@ -119,10 +119,10 @@ impl Preflight {
         if !self.lines.iter().any(|line| line.is_own() && reports(line)) {
             let who = match self.lines.iter().find(|line| reports(line)) {
                 Some(line) => format!(
-                    "The controller at {} reports that its arm has no torque, but not whether it is the board with this drive.",
+                    "The controller at {} reports that its arm has no torque, but it may not be the board with this drive.",
                     line.port
                 ),
-                None => "No controller reports what the board does.".to_owned(),
+                None => "No controller reports the state of the board.".to_owned(),
             };
             doubts.insert(0, who);
         }
@@ -131,11 +131,11 @@ impl Preflight {
         }
         doubts.push("Flashing resets the board, and an arm that it holds falls.".into());
         if !image.is_whole() {
-            doubts.push("That the file is not cut short cannot be proved before it is written.".into());
+            doubts.push("The program cannot verify that the file is complete before it is written.".into());
         }
         doubts.push(
-            "No file reports how its safety wires are (PD3 in and PD4 out, or swapped): are they as on this board? Is its arm \
-             supported, and are its drives without power?"
+            "The file does not state its safety wires (PD3 in and PD4 out, or swapped): do they match this board? Is the arm supported, and are \
+             its drives without power?"
                 .into(),
         );
         Some(doubts.join(" "))

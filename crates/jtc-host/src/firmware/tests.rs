@@ -126,7 +126,7 @@ fn what_fail_txt_says_is_reported() {
 fn a_drive_that_does_nothing_is_no_success() {
     let (verification, ..) = flash(Behaviour::Ignores, SHORT);
     let error = verification.unwrap_err();
-    assert!(error.to_string().contains("the program of before still runs"), "{error}");
+    assert!(error.to_string().contains("the previous program still runs"), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
 }
 
@@ -148,7 +148,7 @@ fn a_drive_that_does_not_come_back_is_no_success_where_the_system_is_in_doubt() 
     let doubtful = Written { doubt: Some("Input/output error".into()), ..written.clone() };
     // A drive that never vanishes has not accepted the image. A drive that was removed may have.
     let stayed = wait_for_drive(&places(), &drive, &written, SHORT).unwrap_err();
-    assert!(stayed.to_string().contains("has not vanished"), "{stayed}");
+    assert!(stayed.to_string().contains("has not disappeared"), "{stayed}");
     fs::remove_dir_all(&link.path).unwrap();
     assert_eq!(wait_for_drive(&places(), &drive, &written, SHORT).unwrap(), DriveAfter::Gone);
     let gone = wait_for_drive(&places(), &drive, &doubtful, SHORT).unwrap_err();

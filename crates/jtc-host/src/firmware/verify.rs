@@ -56,9 +56,9 @@ pub enum DriveAfter {
 impl fmt::Display for DriveAfter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
-            Self::CameBack => "the drive vanished and came back without a report",
-            Self::Gone => "the drive vanished, and has not come back",
-            Self::Stayed => "the drive has not vanished, as it does when it takes an image",
+            Self::CameBack => "the drive disappeared and returned without a report",
+            Self::Gone => "the drive disappeared and has not returned",
+            Self::Stayed => "the drive has not disappeared, although it must do so after an image",
         })
     }
 }
@@ -164,9 +164,9 @@ pub fn verify_program(
         watch.look()?;
         let last = match open().map_err(LinkError::from).and_then(|port| ask(port, limits)) {
             Ok(Some(info)) if !started_since(&info, written.began.elapsed()) => {
-                "the program of before still runs".into()
+                "the previous program still runs".into()
             }
-            Ok(Some(info)) if still_reads(&info) => "it still reads its flash".into(),
+            Ok(Some(info)) if still_reads(&info) => "the controller still reads its flash".into(),
             Ok(Some(info)) => match compare(image, &info) {
                 Ok(program) => {
                     // The drive may have come back in the meantime, and it may contain a report.

@@ -74,7 +74,8 @@ pub fn write_image(
 
 /// Creates the file on the drive. A file that was created on another file system instead is removed.
 fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
-    let gone = || FirmwareError::Changed { what: format!("{}: the drive has gone", drive.path.display()) };
+    let gone =
+        || FirmwareError::Changed { what: format!("{}: the drive has disappeared", drive.path.display()) };
     let is_drive = |found: &fs::Metadata| drive.volume.is_none() || volume(found) == drive.volume;
     if !drive.is_there() || !fs::metadata(&drive.path).is_ok_and(|found| is_drive(&found)) {
         return Err(gone());

@@ -29,7 +29,7 @@ pub enum LogFileError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// The recording contains no log.
-    #[error("{}: it holds no log of a flight recorder", path.display())]
+    #[error("{}: the file contains no log of a flight recorder", path.display())]
     NoLog {
         /// The file.
         path: PathBuf,
@@ -43,7 +43,7 @@ impl Diagnose for LogFileError {
             Self::NoLog { .. } => Diagnosis::new(
                 ErrorKind::Usage,
                 "no-log",
-                "`jtc log fetch -o FILE.mcap` writes one; `jtc report FILE` shows any recording",
+                "`jtc log fetch -o FILE.mcap` writes a log; `jtc report FILE` shows any recording",
             ),
         }
     }

@@ -85,7 +85,7 @@ impl Timeline {
         let near = |event: &&Event| at.tick - event.tick <= BEFORE_MS;
         let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
         if !before.is_empty() {
-            lines.push("before it, the latest first:".to_owned());
+            lines.push("before this error, the latest event first:".to_owned());
         }
         for event in before {
             lines.push(format!("{} before: {}", span(at.tick - event.tick), event.text));
@@ -286,7 +286,7 @@ impl Narrator<'_> {
         let occurred =
             labels::occurred_since(&last.status.joints.map(|joint| joint.internal_occurred), &tick.status);
         if !occurred.is_empty() && begins == 0 {
-            self.push(tick, false, format!("acted upon, no error: {occurred}"));
+            self.push(tick, false, format!("handled without an error: {occurred}"));
         }
     }
 
@@ -315,7 +315,7 @@ impl Narrator<'_> {
 
     /// Describes an error that the controller detected in a joint, with the value and its limit.
     fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
-        let name = labels::joint_errors(bit).first().copied().unwrap_or("an error without a name");
+        let name = labels::joint_errors(bit).first().copied().unwrap_or("an unnamed error");
         let j = joint.index();
         // In the tick of the error the controller removes the torque, and with it the commanded value. So the tick before
         // is also used.

@@ -123,7 +123,7 @@ impl RunFailure {
 
     /// Returns one line with the time and the first cause of the failure.
     pub fn headline(&self) -> String {
-        let cause = self.causes.first().map_or("an error without a name", String::as_str);
+        let cause = self.causes.first().map_or("an unnamed error", String::as_str);
         if self.in_log {
             return format!("FIRST, {:.3} s after the start of the device: {cause}", self.time_s);
         }
@@ -225,13 +225,17 @@ impl RunFailure {
         );
         if self.causes.len() > 1 {
             let others: Vec<String> = self.causes[1..].iter().map(|c| super::escape(c)).collect();
-            let _ = writeln!(out, "<p>with it: {}</p>", others.join(", "));
+            let _ = writeln!(out, "<p>other errors at this time: {}</p>", others.join(", "));
         }
         let (whose, before) = match self.joint {
-            Some(joint) => (format!("Joint {} around it", joint.number()), "the marked line"),
-            None => ("All joints up to it".to_owned(), "the last of these moments"),
+            Some(joint) => (format!("Joint {} around this error", joint.number()), "the marked line"),
+            None => ("All joints until this error".to_owned(), "the last of these moments"),
         };
-        let _ = writeln!(out, "<p>{whose}; it happened in the {:.0} ms before {before}.</p>", self.within_ms);
+        let _ = writeln!(
+            out,
+            "<p>{whose}; the error occurred in the {:.0} ms before {before}.</p>",
+            self.within_ms
+        );
         out.push_str("<div class=\"scroll\"><table><tr>");
         for head in Self::HEAD {
             let _ = write!(out, "<th>{head}</th>");
@@ -258,11 +262,12 @@ pub(super) fn is_bad(sample: &Sample) -> bool {
 /// motion. Returns `None` if the run did not fail.
 pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     match (ending.is_fault(), ending.reason.as_str()) {
-        (true, "") => Some("the run ended in a fault that the recording does not name".to_owned()),
+        (true, "") => Some("the run ended in a fault, but the recording does not name the fault".to_owned()),
         (true, reason) => Some(reason.to_owned()),
-        (false, _) if unseen && ending.outcome.is_empty() => {
-            Some("the end of the motion was not seen: the last sample is in the middle of it".to_owned())
-        }
+        (false, _) if unseen && ending.outcome.is_empty() => Some(
+            "the end of the motion was not recorded: the last sample is in the middle of the motion"
+                .to_owned(),
+        ),
         (false, _) => None,
     }
 }
@@ -308,7 +313,7 @@ fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint
             let share = step / allowed;
             if allowed > 0.0 && share > STEP_SHARE && worst.as_ref().is_none_or(|w| share > w.0) {
                 let words = format!(
-                    "{joint}: measured position went {step:.3} rad in {:.0} ms, its velocity limit allows {allowed:.3} rad",
+                    "{joint}: the measured position changed by {step:.3} rad in {:.0} ms, its velocity limit allows {allowed:.3} rad",
                     span_s * 1e3
                 );
                 worst = Some((share, joint, words));

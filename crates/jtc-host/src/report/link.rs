@@ -6,7 +6,7 @@ impl Facts {
     /// Returns the facts about upload and link of a run, on a line with this rate (Bd).
     pub fn of_link(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32>) -> Self {
         let share = upload.line_share_percent();
-        let share = share.map_or(String::new(), |s| format!(", {s:.1} % of what the line can carry"));
+        let share = share.map_or(String::new(), |s| format!(", {s:.1} % of the capacity of the line"));
         let row = |name: &str, value: String| (name.to_owned(), value);
         Self {
             title: "Link".into(),
@@ -22,9 +22,9 @@ impl Facts {
                 row("Upload time", format!("{:.2} s{share}", upload.time_s)),
                 row("Segments sent again", upload.retries.to_string()),
                 row("Statuses", format!("{}, {:.1} a second", link.statuses, link.status_rate())),
-                row("Frames sent", format!("{}, {} of them again", link.frames_sent, link.retries)),
-                row("Frames damaged on the way", link.bad_frames.to_string()),
-                row("Bytes received, in no frame", format!("{}, {}", link.bytes_received, link.bad_bytes)),
+                row("Frames sent", format!("{}, {} of them repeated", link.frames_sent, link.retries)),
+                row("Damaged frames", link.bad_frames.to_string()),
+                row("Bytes received, outside frames", format!("{}, {}", link.bytes_received, link.bad_bytes)),
             ],
         }
     }

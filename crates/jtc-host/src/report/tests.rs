@@ -192,7 +192,11 @@ fn an_encoder_that_jumps_is_named_by_its_step() {
     }
     let failure = RunFailure::find(&info, &samples).unwrap();
     assert_eq!((failure.joint.map(Joint::number), failure.moments[0].time_ms.round()), (Some(4), 597.0));
-    assert!(failure.causes[0].starts_with("joint 4: measured position went "), "{:?}", failure.causes);
+    assert!(
+        failure.causes[0].starts_with("joint 4: the measured position changed by "),
+        "{:?}",
+        failure.causes
+    );
 
     for s in &mut samples[600..] {
         s.joints[3].position -= 0.4;
@@ -217,7 +221,7 @@ fn a_recording_without_its_end_is_no_success() {
     };
     assert_eq!(of(&samples, "fault", "the link was lost").unwrap().causes, ["the link was lost"]);
     let unseen = of(&samples, "", "").expect("a failure");
-    assert!(unseen.headline().starts_with("FAILED 999 ms") && unseen.causes[0].contains("was not seen"));
+    assert!(unseen.headline().starts_with("FAILED 999 ms") && unseen.causes[0].contains("was not recorded"));
     assert_eq!(of(&samples, "finished", ""), None);
     let last = samples.len() - 1;
     samples[last].trajectory = TrajectoryState::Stop.into();

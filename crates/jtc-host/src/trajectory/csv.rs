@@ -16,7 +16,7 @@ const COLUMNS: usize = 1 + 3 * JOINTS;
 
 pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
     let Some((line, first)) = rows(text).next() else {
-        return Err(FileError::form("an empty file is no trajectory"));
+        return Err(FileError::form("the file is empty, not a trajectory"));
     };
     let headed = first.iter().any(|c| c.chars().any(|c| c.is_alphabetic()) && c.parse::<f64>().is_err());
     if headed {
@@ -25,7 +25,7 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
     match first.len() {
         COLUMNS => {}
         22 => {
-            let problem = "22 columns: the older form for seven axes, which this controller does not speak";
+            let problem = "22 columns: the older form for seven axes, which this controller does not support";
             return Err(FileError::at(Place::line(line), problem));
         }
         n => {
@@ -40,12 +40,12 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
                 _ => None,
             };
             let help = guess.map_or(
-                "known without a header: 19 (time, 6 positions, 6 velocities, 6 accelerations), with one: t,q1..q6[,qd1..qd6]\
-                 [,qdd1..qdd6]"
+                "expected 19 columns without a header (time, 6 positions, 6 velocities, 6 accelerations), or a header \
+                 t,q1..q6[,qd1..qd6][,qdd1..qdd6]"
                     .to_owned(),
                 |(header, more)| format!("the header is missing: write {more}the line {header} before all others"),
             );
-            return Err(FileError::at(Place::line(line), format!("{n} columns and no header; {help}")));
+            return Err(FileError::at(Place::line(line), format!("{n} columns without a header; {help}")));
         }
     }
     // The float form always contains a decimal point, and the int16 form never does.
@@ -58,7 +58,10 @@ fn width(line: usize, cells: &[&str], want: usize) -> Result<(), FileError> {
     if cells.len() == want {
         return Ok(());
     }
-    Err(FileError::at(Place::line(line), format!("{} columns, the lines before have {want}", cells.len())))
+    Err(FileError::at(
+        Place::line(line),
+        format!("{} columns, but the lines before have {want}", cells.len()),
+    ))
 }
 
 fn int16(text: &str) -> Result<Loaded, FileError> {
@@ -76,7 +79,7 @@ fn int16(text: &str) -> Result<Loaded, FileError> {
         let mut raw = [0i16; 3 * JOINTS];
         for (c, (to, cell)) in raw.iter_mut().zip(&cells[1..]).enumerate() {
             *to = cell.parse().map_err(|_| {
-                let problem = format!("\"{}\" is no int16 (-32768..32767)", short(cell));
+                let problem = format!("\"{}\" is not an int16, expected -32768..32767", short(cell));
                 FileError::at(Place::cell(line, c + 2).named(channel_name(c)), problem)
             })?;
         }
@@ -89,7 +92,8 @@ fn int16(text: &str) -> Result<Loaded, FileError> {
         [(_, first), (line, second), ..] => match second.checked_sub(first) {
             Some(step @ 1..=1000) => step as u16,
             _ => {
-                let problem = format!("{second} ms after {first} ms makes no step of 1 to 1000 ms");
+                let problem =
+                    format!("the step from {first} ms to {second} ms is out of range, expected 1 to 1000 ms");
                 return Err(FileError::at(Place::cell(line, 1).named("time"), problem));
             }
         },
@@ -98,8 +102,8 @@ fn int16(text: &str) -> Result<Loaded, FileError> {
     let odd = times.windows(2).find(|w| w[1].1.checked_sub(w[0].1) != Some(i64::from(step_ms)));
     if let Some([before, after]) = odd {
         notes.push(format!(
-            "the time column does not go on by {step_ms} ms at line {} ({} after {}): as in existing programs it is \
-             ignored, the step is {step_ms} ms throughout",
+            "the time column does not advance by {step_ms} ms at line {} ({} after {}): as in existing programs, the column is ignored, and each \
+             step is {step_ms} ms",
             after.0, after.1, before.1
         ));
     }
@@ -148,7 +152,7 @@ fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileE
     match samples.fit() {
         Ok(fitted) => Ok(Loaded::fitted(fitted, form)),
         Err(FitError::Time(i)) => {
-            let problem = format!("{} s does not lie after {} s of the line before", times[i], times[i - 1]);
+            let problem = format!("{} s is not after {} s of the line before", times[i], times[i - 1]);
             Err(FileError::at(Place::line(lines[i]).named("time"), problem))
         }
         Err(other) => Err(FileError::form(other.to_string())),
@@ -187,13 +191,13 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
         };
         let (column, unit) = column_of(name).ok_or_else(|| {
             at(if waypoints::is_column(name) {
-                "a column of waypoints, which are no trajectory yet: `jtc plan` makes one of them"
+                "a column of waypoints, not of a trajectory: `jtc plan` makes a trajectory from waypoints"
             } else {
-                "unknown column; known: t, q1..q6 (rad) or q1_deg..q6_deg, qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)"
+                "unknown column, expected t, q1..q6 (rad) or q1_deg..q6_deg, qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)"
             })
         })?;
         if place_of[column].replace((i, unit)).is_some() {
-            return Err(at("this column is there twice"));
+            return Err(at("this column occurs twice"));
         }
     }
     let missing = |from: usize| (from..from + JOINTS).find(|c| place_of[*c].is_none());
@@ -201,7 +205,7 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
     if place_of[0].is_none() {
         return Err(FileError::at(
             Place::line(header_line),
-            "column t (time in s) is missing; `jtc plan` makes a trajectory of waypoints without times",
+            "column t (time in s) is missing; `jtc plan` makes a trajectory from waypoints without times",
         ));
     }
     for from in [1, 1 + JOINTS, 1 + 2 * JOINTS] {
@@ -231,7 +235,7 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
         samples.push(row[0], |c| row[1 + c]);
     }
     if lines.is_empty() {
-        return Err(FileError::at(Place::line(header_line), "a header and no points"));
+        return Err(FileError::at(Place::line(header_line), "the file has a header but no points"));
     }
     let named = |name: &&str| ["_rad", "_deg"].iter().any(|unit| name.to_ascii_lowercase().contains(unit));
     let loaded = finish(samples, &lines, Form::Csv)?;

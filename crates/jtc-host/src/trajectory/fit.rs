@@ -89,7 +89,7 @@ const DURATION_MAX: f64 = 86_400.0;
 #[non_exhaustive]
 pub enum FitError {
     /// The number of samples in a channel differs from the number of times.
-    #[error("{samples} samples of the {channel} for {times} times")]
+    #[error("{samples} samples of the {channel}, expected {times} for the times")]
     Count {
         /// "position", "velocity" or "acceleration".
         channel: &'static str,
@@ -102,10 +102,10 @@ pub enum FitError {
     #[error("sample {0}: a number is not finite")]
     NotFinite(usize),
     /// The time of this sample (from 0) is not later than the time before it.
-    #[error("sample {0}: its time does not lie after that of the sample before")]
+    #[error("sample {0}: its time is not after the time of the previous sample")]
     Time(usize),
     /// The samples last longer than a day. The value is their duration, s.
-    #[error("{0} s are longer than a day")]
+    #[error("the duration {0} s is longer than a day")]
     Duration(f64),
 }
 
@@ -137,14 +137,14 @@ impl Samples {
         }
         let points = self.points();
         if points.len() == 1 {
-            notes.push("a single point is a pose and no motion".to_owned());
+            notes.push("a single point is a pose, not a motion".to_owned());
         }
         let overshoot = if self.velocity.is_none() { overshoots(&self.times, &points) } else { Vec::new() };
         if let Some(step_ms) = self.regular_step() {
             return Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes, overshoot });
         }
         let step_ms = resampled_step(duration);
-        notes.push(format!("times are irregular or no whole milliseconds: resampled to {step_ms} ms"));
+        notes.push(format!("times are irregular or not whole milliseconds: resampled to {step_ms} ms"));
         let points = self.resample(&points, step_ms);
         Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes, overshoot })
     }

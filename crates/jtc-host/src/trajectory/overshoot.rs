@@ -64,7 +64,7 @@ pub fn overshoot_words(all: &[Overshoot]) -> Option<String> {
     let each: Vec<String> = each.collect();
     (!each.is_empty()).then(|| {
         format!(
-            "between waypoints the curve goes beyond them: {}; waypoints closer together, or with velocities, keep it nearer",
+            "between waypoints the curve exceeds them: {}; place waypoints closer together, or give them velocities",
             each.join(", ")
         )
     })

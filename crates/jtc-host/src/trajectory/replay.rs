@@ -59,12 +59,12 @@ fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
     let note = match recording.broken_off(whole) {
         Ok(broken) => format!(
-            "the whole trajectory that the recording holds; the run got to {:.3} s of its {:.3} s, and `jtc traj continue` runs the rest alone",
+            "the whole trajectory of the recording; the run reached {:.3} s of its {:.3} s, and `jtc traj continue` runs only the remainder",
             f64::from(broken.last_ms) * 1e-3,
             whole.duration_s()
         ),
-        Err(NothingLeft::Finished) => "the trajectory that the recording holds, as it was run".to_owned(),
-        Err(_) => "the trajectory that the recording holds".to_owned(),
+        Err(NothingLeft::Finished) => "the trajectory of the recording, at the speed of the run".to_owned(),
+        Err(_) => "the trajectory of the recording".to_owned(),
     };
     Some(Loaded {
         trajectory: whole.clone(),
@@ -117,7 +117,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let first = path.position.first().and_then(|rest| path.position.iter().position(|q| moved(q, rest)));
     let last = path.position.last().and_then(|rest| path.position.iter().rposition(|q| moved(q, rest)));
     let (Some(first), Some(last)) = (first, last) else {
-        let problem = "the recording holds no motion by hand and no execution in which the arm moves";
+        let problem = "the recording contains no motion by hand and no execution in which the arm moves";
         return Err(FileError::at(Place::default(), problem));
     };
     // Keeps one position at rest at each end.
@@ -129,7 +129,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let fitted = fitted.map_err(|e| FileError::form(e.to_string()))?;
     let what = if by_hand { "teaching" } else { "execution" };
     let mut loaded = Loaded::fitted(fitted, Form::Recording);
-    loaded.notes.insert(0, format!("the last {what} in the recording, as it was measured"));
+    loaded.notes.insert(0, format!("the last {what} in the recording, as measured"));
     Ok(loaded)
 }
 
@@ -229,7 +229,7 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
     }
     let count = path.ms.len();
     if count < 2 {
-        let problem = "the recording holds no execution of a trajectory whose commanded positions are known";
+        let problem = "the recording contains no execution of a trajectory with known commanded positions";
         return Err(FileError::at(Place::default(), problem));
     }
     let (from, to) = (f64::from(path.ms[0]) * 1e-3, f64::from(path.ms[count - 1]) * 1e-3);

@@ -104,9 +104,9 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
         (Some(step), 0) => f64::from(step) * 1e-3,
         (None, n) if n == form.points.len() => 0.0,
         (Some(_), _) => {
-            return Err(FileError::at(Place::name("step_ms"), "given together with time_s of points"));
+            return Err(FileError::at(Place::name("step_ms"), "cannot be combined with time_s of points"));
         }
-        (None, _) => return Err(FileError::form("neither step_ms nor time_s of every point is given")),
+        (None, _) => return Err(FileError::form("step_ms is missing, and time_s of some points is missing")),
     };
     let mut samples = Samples::default();
     for (i, p) in form.points.iter().enumerate() {
@@ -140,7 +140,7 @@ fn all_or_none<P, const N: usize>(
         let i = points.iter().position(|p| get(p).is_none()).unwrap_or(0);
         Err(FileError::at(
             Place::name(format!("point {i}")),
-            format!("{name} is missing, other points have it"),
+            format!("{name} is missing, but other points have it"),
         ))
     }
 }
@@ -152,7 +152,7 @@ fn ros(form: RosForm, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileEr
     }
     let (Some(found), Some(points)) = (joint_names, points) else {
         return Err(FileError::form(
-            "neither a trajectory of ours nor a JointTrajectory (joint_names and points)",
+            "neither a trajectory of this program nor a JointTrajectory (joint_names and points)",
         ));
     };
     let (order, mut notes) = joint_order(&found, names)?;
@@ -162,7 +162,7 @@ fn ros(form: RosForm, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileEr
             return Ok(None);
         }
         if values.len() != found.len() {
-            let problem = format!("{} values for {} joint names", values.len(), found.len());
+            let problem = format!("{} values, but {} joint names", values.len(), found.len());
             return Err(FileError::at(Place::name(format!("point {i}, {name}")), problem));
         }
         Ok(Some(order.map(|j| values[j])))
@@ -201,8 +201,7 @@ fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
     match samples.fit() {
         Ok(fitted) => Ok(Loaded::fitted(fitted, form)),
         Err(FitError::Time(i)) => {
-            let problem =
-                format!("time {} s does not lie after {} s of the point before", times[i], times[i - 1]);
+            let problem = format!("time {} s is not after {} s of the point before", times[i], times[i - 1]);
             Err(FileError::at(Place::name(format!("point {i}")), problem))
         }
         Err(other) => Err(FileError::form(other.to_string())),
@@ -217,7 +216,7 @@ fn joint_order(
     let wrong = |problem: String| FileError::at(Place::name("joint_names"), problem);
     let mut twice = found.iter().enumerate().filter(|(i, n)| found[..*i].contains(n));
     if let Some((_, name)) = twice.next() {
-        return Err(wrong(format!("{name} is there twice")));
+        return Err(wrong(format!("{name} occurs twice")));
     }
     let mut order = [0; JOINTS];
     let by_name = |name: &String| found.iter().position(|f| f == name);
@@ -245,7 +244,7 @@ fn joint_order(
         }
         if names.is_some() {
             notes.push(format!(
-                "joint names {}: taken in the order of the numbers at their ends",
+                "joint names {}: used in the order of the numbers at their ends",
                 found.join(", ")
             ));
         }
@@ -253,10 +252,10 @@ fn joint_order(
     if found.len() > JOINTS {
         let extra: Vec<&str> =
             found.iter().enumerate().filter(|(i, _)| !order.contains(i)).map(|(_, n)| n.as_str()).collect();
-        notes.push(format!("{} not of this arm: left out", extra.join(", ")));
+        notes.push(format!("{} not of this arm: ignored", extra.join(", ")));
     }
     if !order.is_sorted() {
-        notes.push("joints are in another order in the file: sorted by their names".to_owned());
+        notes.push("the joints of the file have another order: sorted by their names".to_owned());
     }
     Ok((order, notes))
 }

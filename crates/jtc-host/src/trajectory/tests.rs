@@ -79,19 +79,19 @@ fn header_columns_may_come_in_any_order_and_some_may_be_missing() {
 fn errors_name_line_column_and_value() {
     let head = "t,q1,q2,q3,q4,q5,q6\n";
     assert_eq!(problem(&format!("{head}0,1,2,3,x4,5,6\n")), ", line 2, column 5, q4: \"x4\" is not a number");
-    assert_eq!(problem(&format!("{head}0,1,2,3,4,5\n")), ", line 2: 6 columns, the lines before have 7");
+    assert_eq!(problem(&format!("{head}0,1,2,3,4,5\n")), ", line 2: 6 columns, but the lines before have 7");
     assert_eq!(
         problem(&format!("{head}0,0,0,0,0,0,NaN\n")),
         ", line 2, column 7, q6: NaN is not a finite number"
     );
     let back = problem(&format!("{head}0,0,0,0,0,0,0\n0.01,0,0,0,0,0,0\n0.005,0,0,0,0,0,0\n"));
-    assert_eq!(back, ", line 4, time: 0.005 s does not lie after 0.01 s of the line before");
+    assert_eq!(back, ", line 4, time: 0.005 s is not after 0.01 s of the line before");
     assert!(problem("t,q1,q2,q3,q4,q5\n").contains("column q6 is missing"));
     assert!(problem("t,q1,q2,q3,q4,q5,q6,speed\n").contains("\"speed\""));
-    assert!(problem("0,1,2\n").contains("3 columns and no header"));
+    assert!(problem("0,1,2\n").contains("3 columns without a header"));
     assert!(problem(&vec!["1"; 22].join(",")).contains("seven axes"));
     let wide = problem(&format!("0,40000{}\n", ",0".repeat(17)));
-    assert_eq!(wide, ", line 1, column 2, q1: \"40000\" is no int16 (-32768..32767)");
+    assert_eq!(wide, ", line 1, column 2, q1: \"40000\" is not an int16, expected -32768..32767");
     assert!(problem("").contains("empty"));
 }
 
@@ -128,7 +128,7 @@ fn a_unit_in_a_header_counts_in_letters_of_any_case() {
     }
     assert!(parse(&format!("t,Q1,Q2,Q3,Q4,Q5,Q6\n0,0{zeros}1,1{zeros}")).unwrap().in_degrees().is_ok());
     let both = problem(&format!("t,q1,Q1_DEG,q2,q3,q4,q5,q6\n0,0,0{zeros}"));
-    assert!(both.contains("\"Q1_DEG\": this column is there twice"), "{both}");
+    assert!(both.contains("\"Q1_DEG\": this column occurs twice"), "{both}");
 }
 
 /// Every column that waypoint files have and trajectories do not have is recognised as such.
@@ -136,7 +136,7 @@ fn a_unit_in_a_header_counts_in_letters_of_any_case() {
 fn columns_of_waypoints_are_known_as_such() {
     for name in "pose leg x y z qx qy qz qw roll pitch yaw x_m roll_deg".split(' ') {
         let text = problem(&format!("t,{name}\n0,0\n"));
-        assert!(text.contains(name) && text.contains("`jtc plan` makes one"), "{text}");
+        assert!(text.contains(name) && text.contains("`jtc plan` makes a trajectory"), "{text}");
     }
     assert!(problem("t,q7\n0,0\n").contains("unknown column"));
 }

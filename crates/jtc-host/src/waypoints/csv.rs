@@ -8,7 +8,7 @@ use super::{FileWaypoint, Target, WaypointFile};
 use crate::file::{FileError, Place, number, rows, short};
 
 /// Description of the known columns.
-pub(super) const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
+pub(super) const KNOWN: &str = "expected q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
                      qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
 
 /// Content of a column, or of a key in a JSON object.
@@ -37,17 +37,19 @@ struct Header {
 pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
     let mut rows = rows(text);
     let Some((line, names)) = rows.next() else {
-        return Err(FileError::form("an empty file has no waypoints"));
+        return Err(FileError::form("the file is empty, expected waypoints"));
     };
     if names.iter().all(|name| name.parse::<f64>().is_ok()) {
-        let problem =
-            format!("{} columns and no header: write q1,q2,q3,q4,q5,q6 before all other lines", names.len());
+        let problem = format!(
+            "{} columns without a header: write q1,q2,q3,q4,q5,q6 before all other lines",
+            names.len()
+        );
         return Err(FileError::at(Place::line(line), problem));
     }
     let header = header(line, &names)?;
     let waypoints = rows.map(|(line, cells)| header.waypoint(line, &cells)).collect::<Result<Vec<_>, _>>()?;
     if waypoints.is_empty() {
-        return Err(FileError::at(Place::line(line), "a header and no waypoints"));
+        return Err(FileError::at(Place::line(line), "the file has a header but no waypoints"));
     }
     let units_named = names.iter().any(|name| names_unit(name));
     Ok(WaypointFile { waypoints, units_named, ..WaypointFile::default() })
@@ -99,7 +101,7 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
             let lower = name.to_ascii_lowercase();
             let is_rate = lower.starts_with("qd");
             let problem = if is_rate {
-                "waypoints have no velocities: a file with them is a trajectory, which `jtc traj run` runs as it is".into()
+                "waypoints have no velocities: a file with velocities is a trajectory, which `jtc traj run` runs directly".into()
             } else {
                 format!("unknown column; {KNOWN}")
             };
@@ -113,7 +115,7 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
             Column::Flange(k) => header.flange[k].replace((i, unit)).is_some(),
         };
         if before {
-            return Err(wrong("this column is there twice".into()));
+            return Err(wrong("this column occurs twice".into()));
         }
     }
     let missing = header.joints.iter().position(Option::is_none);
@@ -129,7 +131,7 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
 impl Header {
     fn waypoint(&self, line: usize, cells: &[&str]) -> Result<FileWaypoint, FileError> {
         if cells.len() != self.names.len() {
-            let problem = format!("{} columns, the header has {}", cells.len(), self.names.len());
+            let problem = format!("{} columns, but the header has {}", cells.len(), self.names.len());
             return Err(FileError::at(Place::line(line), problem));
         }
         let value = |i: usize| number(cells[i], || Place::cell(line, i + 1).named(&self.names[i]));
@@ -148,7 +150,7 @@ impl Header {
         let of_flange = self.flange.iter().flatten().map(|(i, _)| *i).find(filled);
         let both = |what: &str, at: usize| {
             let problem =
-                format!("both {what}: a waypoint is a pose, joint positions or a pose of the flange");
+                format!("both {what}, expected one of a pose, joint positions or a pose of the flange");
             Err(FileError::at(Place::cell(line, at + 1).named(&self.names[at]), problem))
         };
         let (target, place) = match (name, joint, of_flange) {
@@ -164,7 +166,10 @@ impl Header {
                 (self.flange(line, cells, leg == Some(LegKind::Via))?, Place::line(line))
             }
             (None, None, None) if self.pose.is_some() || self.flange.iter().any(Option::is_some) => {
-                return Err(FileError::at(Place::line(line), "neither a pose nor positions"));
+                return Err(FileError::at(
+                    Place::line(line),
+                    "the waypoint has neither a pose nor positions",
+                ));
             }
             (None, ..) => {
                 let mut position = [0.0; JOINTS];
@@ -190,6 +195,6 @@ impl Header {
         let wrong = |problem: String| FileError::at(Place::line(line), problem);
         flange::target(&given, point)
             .map_err(wrong)?
-            .ok_or_else(|| wrong("neither a pose nor positions".into()))
+            .ok_or_else(|| wrong("the waypoint has neither a pose nor positions".into()))
     }
 }

@@ -22,14 +22,14 @@ pub(super) fn target(given: &[Option<f64>; NAMES.len()], point: bool) -> Result<
     let missing = |part: &[usize]| {
         let name = part.iter().find(|i| given[**i].is_none()).map_or("", |i| NAMES[*i]);
         format!(
-            "{name} is missing: a pose of the flange is x, y, z with qx, qy, qz, qw or with roll, pitch, yaw"
+            "{name} is missing: a pose of the flange has x, y, z and either qx, qy, qz, qw or roll, pitch, yaw"
         )
     };
     let any = |part: &[usize]| part.iter().any(|i| given[*i].is_some());
     let (Some(x), Some(y), Some(z)) = (x, y, z) else { return Err(missing(&[0, 1, 2])) };
     let orientation = match (any(&[3, 4, 5, 6]), any(&[7, 8, 9])) {
         (true, true) => {
-            return Err("both a quaternion and roll, pitch, yaw: an orientation is one of them".into());
+            return Err("both a quaternion and roll, pitch, yaw, expected only one of them".into());
         }
         (true, false) => match (qx, qy, qz, qw) {
             (Some(qx), Some(qy), Some(qz), Some(qw)) => Orientation::Quaternion([qx, qy, qz, qw]),

@@ -136,10 +136,10 @@ impl Entry {
             (Some(name), None, false, _) => Target::Pose(name),
             (None, Some(target), false, _) => target,
             (Some(_), ..) | (_, Some(_), ..) => {
-                return wrong("a waypoint is one of a pose, joint positions and a pose of the flange".into());
+                return wrong("expected one of a pose, joint positions and a pose of the flange".into());
             }
             (None, None, false, _) => {
-                return wrong("neither a pose nor q1..q6, nor one of the flange".into());
+                return wrong("the waypoint has no pose, no q1..q6 and no pose of the flange".into());
             }
             (None, None, true, Some(j)) => return wrong(format!("q{} is missing", j + 1)),
             (None, None, true, None) => Target::Joints(self.joints.map(Option::unwrap_or_default)),

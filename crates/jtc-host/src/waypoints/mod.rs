@@ -162,7 +162,7 @@ impl WaypointFile {
         let count = file.waypoints.len();
         if count > WAYPOINTS_MAX {
             let problem = format!(
-                "{count} waypoints, more than {WAYPOINTS_MAX}; a recorded motion is a trajectory, which `jtc traj run` runs as it is"
+                "{count} waypoints, expected at most {WAYPOINTS_MAX}; a recorded motion is a trajectory, which `jtc traj run` runs directly"
             );
             return Err(FileError::form(problem));
         }
@@ -178,13 +178,13 @@ impl WaypointFile {
             let problem = match waypoint.leg {
                 Some(leg @ (LegKind::Via | LegKind::Arc)) if i == 0 => {
                     let word = leg_word(leg);
-                    format!("`{word}` for the first waypoint: a motion begins there, and no arc leads to it")
+                    format!("`{word}` is not valid for the first waypoint, because the motion begins there")
                 }
                 Some(LegKind::Via) if kind(i + 1) != Some(LegKind::Arc) => {
-                    "`via`, a point on the way of an arc, and the waypoint behind it is not `arc`, the end of one".into()
+                    "`via` (a point on an arc) is not followed by `arc` (the end of the arc)".into()
                 }
                 Some(LegKind::Arc) if before != Some(LegKind::Via) => {
-                    "`arc`, and the waypoint before it is not `via`, the point that the arc passes".into()
+                    "`arc` (the end of an arc) does not follow `via` (a point on the arc)".into()
                 }
                 _ => continue,
             };
@@ -348,7 +348,7 @@ fn leg_kind(word: &str) -> Result<Option<LegKind>, String> {
         "line" => LegKind::Line,
         "via" => LegKind::Via,
         "arc" => LegKind::Arc,
-        _ => return Err(format!("\"{}\" is no leg; known: joint, line, via, arc", short(word))),
+        _ => return Err(format!("\"{}\" is not a valid leg, expected joint, line, via or arc", short(word))),
     }))
 }
 

@@ -173,8 +173,8 @@ fn two_names_for_one_number_are_refused() {
         (format!("[{{{pose},\"x_m\":1}}]"), "waypoint 1: both x and x_m"),
         ("[{\"pose\":\"home\",\"name\":\"home\"}]".into(), "waypoint 1: both pose and name"),
         ("[{\"pose\":\"home\",\"t\":1,\"time\":1}]".into(), "waypoint 1: both t and time"),
-        ("x,y,z,roll,pitch,yaw,roll_deg\n0,0,0,0,0,0,0\n".into(), "\"roll_deg\": this column is there twice"),
-        ("x,y,z,roll,pitch,yaw,YAW_DEG\n0,0,0,0,0,0,0\n".into(), "\"YAW_DEG\": this column is there twice"),
+        ("x,y,z,roll,pitch,yaw,roll_deg\n0,0,0,0,0,0,0\n".into(), "\"roll_deg\": this column occurs twice"),
+        ("x,y,z,roll,pitch,yaw,YAW_DEG\n0,0,0,0,0,0,0\n".into(), "\"YAW_DEG\": this column occurs twice"),
     ] {
         let error = WaypointFile::parse(&text).expect_err(&text).to_string();
         assert!(error.contains(words), "{text}: {error}");
@@ -184,20 +184,20 @@ fn two_names_for_one_number_are_refused() {
 #[test]
 fn a_broken_file_is_refused_with_its_place() {
     for (text, words) in [
-        ("", "an empty file has no waypoints"),
-        ("0,0,0,0,0,0\n1,0,0,0,0,0\n", ", line 1: 6 columns and no header: write q1,q2"),
-        ("q1,q2,q3,q4,q5,q6\n", ", line 1: a header and no waypoints"),
+        ("", "the file is empty, expected waypoints"),
+        ("0,0,0,0,0,0\n1,0,0,0,0,0\n", ", line 1: 6 columns without a header: write q1,q2"),
+        ("q1,q2,q3,q4,q5,q6\n", ", line 1: the file has a header but no waypoints"),
         ("q1,q2,q3,q4,q5\n0,0,0,0,0\n", ", line 1: column q6 is missing"),
-        ("q1,q2,q3,q4,q5,q7\n0,0,0,0,0,0\n", ", line 1, column 6, \"q7\": unknown column; known: q1..q6"),
-        ("q1,q2,q3,q4,q5,q6,q6_deg\n0,0,0,0,0,0,0\n", "column 7, \"q6_deg\": this column is there twice"),
-        ("t,q1,q2,q3,q4,q5,q6,qd1\n0,0,0,0,0,0,0,0\n", "a file with them is a trajectory"),
+        ("q1,q2,q3,q4,q5,q7\n0,0,0,0,0,0\n", ", line 1, column 6, \"q7\": unknown column; expected q1..q6"),
+        ("q1,q2,q3,q4,q5,q6,q6_deg\n0,0,0,0,0,0,0\n", "column 7, \"q6_deg\": this column occurs twice"),
+        ("t,q1,q2,q3,q4,q5,q6,qd1\n0,0,0,0,0,0,0,0\n", "a file with velocities is a trajectory"),
         ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0,0,0,0,x,0\n", ", line 3, column 5, q5: \"x\" is not a number"),
-        ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0\n", ", line 2: 5 columns, the header has 6"),
+        ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0\n", ", line 2: 5 columns, but the header has 6"),
         ("q1;q2;q3;q4;q5;q6\n0;0;0;0;0;1,5\n", "has a decimal comma"),
         ("t,pose\nsoon,home\n", ", line 2, column 1, t: \"soon\" is not a number"),
         ("pose,q1,q2,q3,q4,q5,q6\nhome,0,0,0,0,0,0\n", "both the pose \"home\" and positions"),
-        ("pose,q1,q2,q3,q4,q5,q6\n,,,,,,\n", ", line 2: neither a pose nor positions"),
-        ("x,y,z,roll,pitch\n0.3,0,0.3,0,0\n", ", line 2: yaw is missing: a pose of the flange is"),
+        ("pose,q1,q2,q3,q4,q5,q6\n,,,,,,\n", ", line 2: the waypoint has neither a pose nor positions"),
+        ("x,y,z,roll,pitch\n0.3,0,0.3,0,0\n", ", line 2: yaw is missing: a pose of the flange has"),
         ("x,y,z,roll,pitch,yaw,qw\n0.3,0,0.3,0,0,0,1\n", "both a quaternion and roll, pitch, yaw"),
         ("pose,x,y,z,roll,pitch,yaw\nhome,1,0,0,0,0,0\n", "both the pose \"home\" and one of the flange"),
         ("[{\"pose\": \"home\", \"x\": 0}]", ", waypoint 1: y is missing"),
@@ -213,11 +213,16 @@ fn a_broken_file_is_refused_with_its_place() {
     let error = WaypointFile::parse("pose\nhome\nabove-tabel\n").unwrap().positions(&arm()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        ", line 3, column 1: the arm avena has no pose \"above-tabel\"; it has above-table, home"
+        ", line 3, column 1: the arm avena has no pose \"above-tabel\"; the arm has above-table, home"
     );
-    assert!(error.diagnosis().next.to_string().contains("is \"above-table\" meant?"));
+    assert!(error.diagnosis().next.to_string().contains("did you mean \"above-table\"?"));
     let many = "pose\n".to_owned() + &"home\n".repeat(WAYPOINTS_MAX + 1);
-    assert!(WaypointFile::parse(&many).unwrap_err().to_string().contains("10001 waypoints, more than 10000"));
+    assert!(
+        WaypointFile::parse(&many)
+            .unwrap_err()
+            .to_string()
+            .contains("10001 waypoints, expected at most 10000")
+    );
 }
 
 proptest! {

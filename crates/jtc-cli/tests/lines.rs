@@ -240,7 +240,10 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
     }
     // Three collinear points are not an arc.
     let refused = dir.refused(&legs(&["", "via", "arc"]), &[], 4);
-    assert!(refused.contains("line 4: waypoint 3: the arc's three points are on no circle"), "{refused}");
+    assert!(
+        refused.contains("line 4: waypoint 3: the three points of the arc are not on a circle"),
+        "{refused}"
+    );
     // First the end is out of reach. Then both ends are in reach, but the middle of the line is not.
     let far = "x,y,z,qx,qy,qz,qw\n0.6,0,0.4,0,0,0,1\n0.6,0.2,0.4,0,0,0,1\n2.6,0,0.4,0,0,0,1\n";
     let refused = dir.refused(far, &["--line"], 4);

@@ -178,7 +178,7 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
         let words = [simulator, &["--arm", &bad]].concat();
         let refused = run(command_in(&dir), &words, "").ends(2);
         assert!(
-            refused.err.contains("bad.toml") && refused.err.contains("no number that a frame carries"),
+            refused.err.contains("bad.toml") && refused.err.contains("not a number that a frame can carry"),
             "{words:?}: {}",
             refused.err
         );

@@ -246,9 +246,12 @@ fn typed_events_happen_and_mistakes_are_named() {
     std::fs::write(&lead, motion(0.2)).unwrap();
     let lines = [
         ("push 3 12 0.5", "push: joint 3 by 12 N·m for 0.5 s".to_owned()),
-        ("# a comment, then an empty line\n\npush 0 12 0.5", "joint `0` is none of 1..6".to_owned()),
-        ("shove", "there is no event `shove`; events are push".to_owned()),
-        (&format!("hand {lead}"), format!("hand: leads along {lead}")),
+        (
+            "# a comment, then an empty line\n\npush 0 12 0.5",
+            "joint `0` is out of range, expected 1..6".to_owned(),
+        ),
+        ("shove", "unknown event `shove`; the events are push".to_owned()),
+        (&format!("hand {lead}"), format!("hand: a hand leads the arm along {lead}")),
         ("hand /no/such/file.csv", "/no/such/file.csv".to_owned()),
     ];
     assert!(sim.error_line().contains("holding brakes"), "announced at the start");

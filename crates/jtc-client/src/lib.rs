@@ -96,7 +96,9 @@ impl AgentPort {
         let authority = rest
             .map(|rest| rest.trim_end_matches('/'))
             .filter(|rest| !rest.is_empty() && !rest.contains('/'))
-            .ok_or_else(|| no_agent("an agent's address is http://HOST:PORT or https://HOST:PORT".into()))?;
+            .ok_or_else(|| {
+                no_agent("not the address of an agent, expected http://HOST:PORT or https://HOST:PORT".into())
+            })?;
         let (scheme, port) = if secure { ("wss", 443) } else { ("ws", 80) };
         let with_port =
             if has_port(authority) { authority.to_owned() } else { format!("{authority}:{port}") };
@@ -115,7 +117,7 @@ impl AgentPort {
             .map_err(|error| no_agent(error.to_string()))?;
         if let Some(token) = &options.token {
             let value = HeaderValue::from_str(&format!("Bearer {token}"))
-                .map_err(|_| no_agent("the token is no token".into()))?;
+                .map_err(|_| no_agent("the token has characters that are not valid in a token".into()))?;
             request.headers_mut().insert(AUTHORIZATION, value);
         }
         let connector = match secure {
@@ -153,7 +155,9 @@ impl AgentPort {
         };
         while port.hello.port.is_empty() {
             if Instant::now() >= end {
-                return Err(no_agent("it does not introduce itself".into()));
+                return Err(no_agent(
+                    "the program at this address did not identify itself as an agent".into(),
+                ));
             }
             port.receive(CONNECTING)?;
         }
@@ -222,7 +226,7 @@ fn has_port(authority: &str) -> bool {
 
 /// Connects to the first address of the host that accepts the connection.
 fn connect(authority: &str) -> io::Result<TcpStream> {
-    let mut last = io::Error::new(io::ErrorKind::NotFound, "this name has no address");
+    let mut last = io::Error::new(io::ErrorKind::NotFound, "this host name has no address");
     for address in authority.to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, CONNECTING) {
             Ok(stream) => return Ok(stream),

@@ -28,7 +28,7 @@ pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
     let (added, _) = roots.add_parsable_certificates(certificates);
     if added == 0 {
         let whose = file.map_or("the system".into(), |path| path.display().to_string());
-        return Err(io::Error::other(format!("{whose} has no certificate to trust")));
+        return Err(io::Error::other(format!("{whose} has no valid certificate")));
     }
     let provider = Arc::new(rustls::crypto::ring::default_provider());
     let config = ClientConfig::builder_with_provider(provider)

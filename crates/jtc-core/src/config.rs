@@ -223,16 +223,16 @@ impl core::fmt::Display for ConfigError {
             Self::Range { joint, value, limit } => {
                 write!(
                     f,
-                    "joint {joint}: lowest position {value} rad is not below the highest one, {limit} rad"
+                    "joint {joint}: lowest position {value} rad is not below the highest position, {limit} rad"
                 )
             }
             Self::Braking { value, limit } => write!(
                 f,
-                "braking_ms_max {value} is below twice stop_ms, {limit}: a stop would end in an error while it goes on"
+                "braking_ms_max {value} is below twice stop_ms, {limit}: a Stop would end in an error before the arm is at rest"
             ),
             Self::TorqueScale { joint, value, limit } => write!(
                 f,
-                "joint {joint}: torque limit times torque gain is {value} N·m, the bus carries {limit} N·m at most"
+                "joint {joint}: torque limit times torque gain is {value} N·m, but the bus transmits {limit} N·m at most"
             ),
             Self::SpeedScale { joint, value, limit } => write!(
                 f,

@@ -111,18 +111,20 @@ pub enum SettingError {
 impl core::fmt::Display for SettingError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {
-            Self::Unknown { setting, joint: 0 } => write!(f, "there is no setting {setting} of the arm"),
-            Self::Unknown { setting, joint } => write!(f, "there is no setting {setting} of a joint {joint}"),
+            Self::Unknown { setting, joint: 0 } => write!(f, "setting {setting} of the arm does not exist"),
+            Self::Unknown { setting, joint } => {
+                write!(f, "setting {setting} of joint {joint} does not exist")
+            }
             Self::Value { name, joint, value, low, high } => {
                 if joint > 0 {
                     write!(f, "joint {joint}, ")?;
                 }
-                write!(f, "{name}: {value} is none of its values, {low} to {high}")
+                write!(f, "{name}: {value} is not a valid value, expected {low} to {high}")
             }
             Self::Config(error) => error.fmt(f),
             Self::Payload(error) => error.fmt(f),
             Self::Bounds(OutOfBounds { what, value, low, high, .. }) => {
-                write!(f, "{what} is {value}, outside {low} to {high}")
+                write!(f, "{what} is {value}, expected {low} to {high}")
             }
         }
     }

@@ -144,21 +144,27 @@ impl fmt::Display for ModelError {
                 write!(f, "{} {index}: {field} is {value}, not a finite number", field.owner())
             }
             Self::AngleTooLarge { index, field, value, limit } => {
-                write!(f, "{} {index}: {field} is {value} rad, limit {limit} rad; degrees?", field.owner())
+                write!(
+                    f,
+                    "{} {index}: {field} is {value} rad, limit {limit} rad; the value may be in degrees",
+                    field.owner()
+                )
             }
             Self::MassNegative { link, mass } => {
                 write!(f, "link {link}: mass is {mass} kg, must not be negative")
             }
-            Self::MassZero { link } => write!(f, "link {link}: mass is 0, only links 0 and 6 may be without"),
+            Self::MassZero { link } => {
+                write!(f, "link {link}: mass is 0, only links 0 and 6 may have no mass")
+            }
             Self::InertiaNegative { link, moment } => write!(
                 f,
-                "link {link}: smallest principal moment of inertia is {moment} kg m2, must not be negative; \
-                 sign of the products of inertia?"
+                "link {link}: smallest principal moment of inertia is {moment} kg m2, must not be negative; check the sign of the products of \
+                 inertia"
             ),
             Self::InertiaTriangle { link, moment, limit } => write!(
                 f,
-                "link {link}: largest principal moment of inertia is {moment} kg m2, more than the sum of the \
-                 others, {limit} kg m2; wrong unit or order of ixx ixy ixz iyy iyz izz?"
+                "link {link}: largest principal moment of inertia is {moment} kg m2, more than the sum of the others, {limit} kg m2; check the unit \
+                 and the order of ixx ixy ixz iyy iyz izz"
             ),
         }
     }

@@ -50,16 +50,15 @@ impl fmt::Display for PayloadError {
             Self::MassNegative { mass } => {
                 write!(f, "payload: mass is {mass} kg, must not be negative; 0 is no payload")
             }
-            Self::MassZero => f.write_str("payload: an inertia without a mass; give the mass in kg"),
+            Self::MassZero => f.write_str("payload: inertia without a mass; give the mass in kg"),
             Self::InertiaNegative { moment } => write!(
                 f,
-                "payload: smallest principal moment of inertia is {moment} kg m2, must not be negative; sign of the \
-                 products of inertia?"
+                "payload: smallest principal moment of inertia is {moment} kg m2, must not be negative; check the sign of the products of inertia"
             ),
             Self::InertiaTriangle { moment, limit } => write!(
                 f,
-                "payload: largest principal moment of inertia is {moment} kg m2, more than the sum of the others, {limit} \
-                 kg m2; wrong unit, or not about the centre of mass?"
+                "payload: largest principal moment of inertia is {moment} kg m2, more than the sum of the others, {limit} kg m2; check the unit, \
+                 and that the inertia is about the centre of mass"
             ),
         }
     }

@@ -120,7 +120,10 @@ fn j06_angles_without_a_meaning_are_refused() {
     model.joints[2].rpy[1] = 1e7;
     let Err(error) = model.check() else { panic!("accepted") };
     assert!(matches!(error, ModelError::AngleTooLarge { index: 2, field: Field::JointRpy(1), .. }));
-    assert_eq!(error.to_string(), "joint 2: origin pitch is 10000000 rad, limit 1000000 rad; degrees?");
+    assert_eq!(
+        error.to_string(),
+        "joint 2: origin pitch is 10000000 rad, limit 1000000 rad; the value may be in degrees"
+    );
 }
 
 /// The error contains the largest allowed angle.
@@ -174,19 +177,19 @@ fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
         let error = ModelError::NotFinite { index: 2, field, value: f64::INFINITY };
         shows(error, &format!("{place} is inf, not a finite number"));
         let error = ModelError::AngleTooLarge { index: 2, field, value: 90.0, limit: 7.0 };
-        shows(error, &format!("{place} is 90 rad, limit 7 rad; degrees?"));
+        shows(error, &format!("{place} is 90 rad, limit 7 rad; the value may be in degrees"));
     }
     shows(ModelError::MassNegative { link: 4, mass: -2.5 }, "link 4: mass is -2.5 kg, must not be negative");
-    shows(ModelError::MassZero { link: 4 }, "link 4: mass is 0, only links 0 and 6 may be without");
+    shows(ModelError::MassZero { link: 4 }, "link 4: mass is 0, only links 0 and 6 may have no mass");
     shows(
         ModelError::InertiaNegative { link: 4, moment: -1.5 },
-        "link 4: smallest principal moment of inertia is -1.5 kg m2, must not be negative; sign of the products of \
-         inertia?",
+        "link 4: smallest principal moment of inertia is -1.5 kg m2, must not be negative; check the sign of the \
+         products of inertia",
     );
     shows(
         ModelError::InertiaTriangle { link: 4, moment: 3.0, limit: 2.5 },
-        "link 4: largest principal moment of inertia is 3 kg m2, more than the sum of the others, 2.5 kg m2; wrong \
-         unit or order of ixx ixy ixz iyy iyz izz?",
+        "link 4: largest principal moment of inertia is 3 kg m2, more than the sum of the others, 2.5 kg m2; check \
+         the unit and the order of ixx ixy ixz iyy iyz izz",
     );
 }
 

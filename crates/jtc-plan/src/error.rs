@@ -11,7 +11,7 @@ use crate::limits::MARGIN_MAX;
 #[non_exhaustive]
 pub enum PlanError {
     /// Fewer than two waypoints.
-    #[error("a motion takes at least 2 waypoints; given: {count}")]
+    #[error("too few waypoints: {count}, expected at least 2")]
     TooFew {
         /// Number of waypoints.
         count: usize,
@@ -41,7 +41,7 @@ pub enum PlanError {
         max: f64,
     },
     /// A limit that permits no motion.
-    #[error("{joint}: {} limit of {value} {} leaves no motion", .limit.name(), .limit.unit())]
+    #[error("{joint}: {} limit of {value} {} permits no motion", .limit.name(), .limit.unit())]
     Limit {
         /// Joint of the limit.
         joint: Joint,
@@ -51,7 +51,7 @@ pub enum PlanError {
         value: f64,
     },
     /// A range without positions.
-    #[error("{joint}: lowest position {min} rad is not below the highest one, {max} rad")]
+    #[error("{joint}: lowest position {min} rad is not below the highest position, {max} rad")]
     Range {
         /// Joint of the range.
         joint: Joint,
@@ -71,7 +71,7 @@ pub enum PlanError {
         share: f64,
     },
     /// An invalid blend.
-    #[error("blend of {value} rad; it is 0 (a stop at each waypoint) or more")]
+    #[error("blend of {value} rad is out of range, expected 0 (a stop at each waypoint) or more")]
     Blend {
         /// Blend, rad.
         value: f64,
@@ -166,12 +166,12 @@ impl PlanError {
     /// waypoint.
     pub fn what(&self) -> String {
         match self {
-            Self::NotFinite { joint, value, .. } => format!("{joint}: {value} is no position"),
+            Self::NotFinite { joint, value, .. } => format!("{joint}: {value} is not a valid position"),
             Self::Position { joint, value, min, max, .. } => {
                 format!("{joint}: {value} rad is outside {min}..{max} rad")
             }
             Self::Torque { joint, torque, limit, whole, holding, .. } => format!(
-                "{joint}: {} takes {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
+                "{joint}: {} needs {torque:.1} N·m, more than {limit:.1} N·m ({:.1} % of its limit of {whole:.1} N·m)",
                 if *holding { "holding the arm there" } else { "the slowest motion from there" },
                 100.0 * limit / whole
             ),
@@ -183,32 +183,32 @@ impl PlanError {
     /// Returns advice on how to correct the error.
     pub fn hint(&self) -> &'static str {
         match self {
-            Self::TooFew { .. } => "give where the motion starts and where it ends",
-            Self::NotFinite { .. } => "correct the waypoint: each joint has a number, in rad",
+            Self::TooFew { .. } => "give the start and the end of the motion",
+            Self::NotFinite { .. } => "correct the waypoint: each joint needs a number, in rad",
             Self::Position { .. } => {
-                "move the waypoint inside the limits; is it in degrees? All positions are in rad (90° = 1.5708)"
+                "move the waypoint inside the limits; all positions are in rad, not in degrees (90° = 1.5708)"
             }
             Self::Limit { .. } | Self::Range { .. } => {
-                "correct the limits of the arm, or ask for a higher speed"
+                "correct the limits of the arm, or request a higher speed"
             }
             Self::Margin { .. } => "give a share of 0 to 0.5 of the torque limit",
             Self::Blend { .. } => "give a blend of 0 rad or more",
             Self::Time { .. } => {
-                "let the times rise from waypoint to waypoint, beginning at 0, or leave them out"
+                "give times that start at 0 and increase from waypoint to waypoint, or omit the times"
             }
             Self::TooEarly { .. } => {
-                "give a later time from there on, or leave the times out: the motion is then as fast as it can be"
+                "give later times from this waypoint on, or omit the times: the motion is then as fast as possible"
             }
             Self::Torque { holding: true, .. } => {
-                "choose a pose that takes less torque (less stretched out), or a lighter payload; speed does not change it"
+                "choose a pose that needs less torque (less stretched out), or a lighter payload; a lower speed does not help"
             }
             Self::Torque { .. } => {
-                "lead the path around poses that take much torque, or carry a lighter payload"
+                "plan the path around poses that need much torque, or use a lighter payload"
             }
-            Self::Path { .. } => "remove waypoints that coincide, and correct those that are no numbers",
+            Self::Path { .. } => "remove waypoints that coincide, and correct waypoints that are not numbers",
             Self::Flange(error) => error.hint(),
             Self::NoTimeLaw { .. } => {
-                "ask for a lower speed or a larger blend; if it stays, report it with the waypoints"
+                "use a lower speed or a larger blend; if the error stays, report it with the waypoints"
             }
         }
     }

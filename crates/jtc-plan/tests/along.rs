@@ -106,7 +106,7 @@ fn bad_input_is_refused_with_waypoint_and_joint() {
     assert_eq!(through(&[], 0.0, &limits, None).unwrap_err(), PlanError::TooFew { count: 0 });
     assert_eq!(through(&[[0.0; 6].into()], 0.0, &limits, None).unwrap_err(), PlanError::TooFew { count: 1 });
     let error = to([0.0, 0.0, f64::NAN, 0.0, 0.0, 0.0]);
-    assert_eq!(error.to_string(), "waypoint 3, joint 3: NaN is no position");
+    assert_eq!(error.to_string(), "waypoint 3, joint 3: NaN is not a valid position");
     let error = to([0.0, 0.0, 0.0, 90.0, 0.0, 0.0]);
     assert_eq!(error.to_string(), "waypoint 3, joint 4: 90 rad is outside -2.97..2.97 rad");
     assert!(error.hint().contains("degrees"));

@@ -185,7 +185,7 @@ fn out_of_reach_says_how_far() {
     let text = error.to_string();
     assert_eq!(
         text,
-        "out of reach: 3.000 m from the origin of the base, and the flange comes no nearer to it than 2.1412 m"
+        "out of reach: 3.000 m from the origin of the base; the nearest position of the flange is 2.1412 m away from it"
     );
     assert!(error.hint().contains("base frame"));
     // The position is in the unreachable column around the axis of joint 1.

@@ -67,26 +67,35 @@ const JOINT_WALL: &str = "[[fault]]\nkind = \"joint-wall\"\nat_s = 1\njoint = 1\
 fn mistakes_are_named() {
     let message = |text: &str| FaultPlan::from_toml(&format!("format = 2\n{text}")).unwrap_err().to_string();
     for (text, part) in [
-        ("[[fault]]\nkind = \"node-quiet\"\nat_s = 1", "there is no kind `node-quiet`"),
+        ("[[fault]]\nkind = \"node-quiet\"\nat_s = 1", "unknown kind `node-quiet`"),
         ("[[fault]]\nkind = \"node-silent\"\nat_s = 1", "exactly one of `joint = 1..6` and `gripper = true`"),
-        ("[[fault]]\nkind = \"bus-off\"\njoint = 1\nat_s = 1", "`joint` means nothing for `bus-off`"),
+        ("[[fault]]\nkind = \"bus-off\"\njoint = 1\nat_s = 1", "`joint` has no meaning for `bus-off`"),
         ("[[fault]]\nkind = \"bus-off\"", "exactly one of at_s, in_state, at_point"),
         ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\nat_point = 2", "exactly one of"),
-        ("[[fault]]\nkind = \"bus-off\"\nin_state = \"holding\"", "there is no state `holding`"),
-        ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\nafter_s = 2", "`after_s` means nothing"),
-        ("[[fault]]\nkind = \"frames-lost\"\nprobability = 2\nat_s = 1", "probability = 2 is outside 0..1"),
-        ("[[fault]]\nkind = \"node-silent\"\njoint = 7\nat_s = 1", "joint = 7 is outside 1..6"),
-        ("[[fault]]\nkind = \"fault-state\"\njoint = 0\nat_s = 1", "joint = 0 is outside 1..6"),
+        ("[[fault]]\nkind = \"bus-off\"\nin_state = \"holding\"", "unknown state `holding`"),
+        ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\nafter_s = 2", "`after_s` has no meaning"),
+        (
+            "[[fault]]\nkind = \"frames-lost\"\nprobability = 2\nat_s = 1",
+            "probability = 2 is out of range, expected 0..1",
+        ),
+        (
+            "[[fault]]\nkind = \"node-silent\"\njoint = 7\nat_s = 1",
+            "joint = 7 is out of range, expected 1..6",
+        ),
+        (
+            "[[fault]]\nkind = \"fault-state\"\njoint = 0\nat_s = 1",
+            "joint = 0 is out of range, expected 1..6",
+        ),
         ("[[fault]]\nkind = \"push\"\njoint = 1\ntorque_nm = 1\nat_s = 1", "`push` needs the key `for_s`"),
         ("[[fault]]\nkind = \"hand\"\nfile = \"a.csv\"\nat_s = 1", "a.csv: files cannot be read here"),
         ("[[fault]]\nkind = \"node-silent\"\njoint = 1.5\nat_s = 1", "joint = 1.5 is not a whole number"),
-        ("[[fault]]\nkind = \"bus-off\"\nat_s = nan", "at_s = NaN is outside"),
+        ("[[fault]]\nkind = \"bus-off\"\nat_s = nan", "at_s = NaN is out of range"),
         ("[[fault]]\nkind = \"bus-off\"\nwhen = 3", "unknown field `when`"),
         (
             &format!("{WALL}position_m = [0, 0]"),
             "position_m has 2 numbers, expected 3: `position_m = [x, y, z]`",
         ),
-        (&format!("{WALL}position_m = [0, 0, 11]"), "position_m = 11 is outside -10..10"),
+        (&format!("{WALL}position_m = [0, 0, 11]"), "position_m = 11 is out of range, expected -10..10"),
         (&format!("{WALL}position_m = 3"), "invalid type"),
         (WALL, "`wall` needs the key `position_m`"),
         (&format!("{WALL}position_m = [0, 0, 0]"), "`wall` needs the key `normal`"),
@@ -96,23 +105,29 @@ fn mistakes_are_named() {
         ),
         (
             &format!("{WALL}position_m = [0, 0, 0]\nnormal = [0, 0, 1]\nstiffness_n_m = 2e6"),
-            "stiffness_n_m = 2000000 is outside 1..1000000",
+            "stiffness_n_m = 2000000 is out of range, expected 1..1000000",
         ),
         (
             &format!(
                 "{WALL}position_m = [0, 0, 0]\nnormal = [0, 0, 1]\nstiffness_n_m = 2\ndamping_ns_m = -1"
             ),
-            "damping_ns_m = -1 is outside 0..10000",
+            "damping_ns_m = -1 is out of range, expected 0..10000",
         ),
-        (&format!("{JOINT_WALL}side = \"left\""), "there is no side `left`; sides are above, below"),
+        (&format!("{JOINT_WALL}side = \"left\""), "unknown side `left`; the sides are above, below"),
         (JOINT_WALL, "`joint-wall` needs the key `side`"),
         (&format!("{JOINT_WALL}side = \"above\""), "`joint-wall` needs the key `stiffness_nm_rad`"),
-        ("[[fault]]\nkind = \"payload\"\nat_s = 1\nmass_kg = 0", "mass_kg = 0 is outside 0.001..100"),
+        (
+            "[[fault]]\nkind = \"payload\"\nat_s = 1\nmass_kg = 0",
+            "mass_kg = 0 is out of range, expected 0.001..100",
+        ),
         (
             "[[fault]]\nkind = \"payload\"\nat_s = 1\nmass_kg = 2\ncom_m = [3, 0, 0]",
-            "com_m = 3 is outside -2..2",
+            "com_m = 3 is out of range, expected -2..2",
         ),
-        ("[[fault]]\nkind = \"bus-off\"\nat_s = 1\ncom_m = [0, 0, 0]", "`com_m` means nothing for `bus-off`"),
+        (
+            "[[fault]]\nkind = \"bus-off\"\nat_s = 1\ncom_m = [0, 0, 0]",
+            "`com_m` has no meaning for `bus-off`",
+        ),
         ("fault = 3", "invalid type"),
     ] {
         let message = message(text);
@@ -130,11 +145,11 @@ fn files_that_counted_from_0_are_refused_with_what_to_change() {
         assert!(message.contains("`format = 2`") && message.contains("add 1 to every `joint`"), "{message}");
     }
     let message = FaultPlan::from_toml(&format!("format = 1\n{old}")).unwrap_err().to_string();
-    assert!(message.contains("format = 1 is none"), "{message}");
+    assert!(message.contains("format = 1 is not supported"), "{message}");
     // An unknown format is refused with any keys.
     let later = "format = 3\nepoch = \"noon\"\n[[fault]]\nkind = \"push\"\nlimb = 1";
     let message = FaultPlan::from_toml(later).unwrap_err().to_string();
-    assert!(message.contains("format = 3 is none"), "{message}");
+    assert!(message.contains("format = 3 is not supported"), "{message}");
     for (node, instead) in [("2", "write joint = 3"), ("6", "write gripper = true")] {
         let text = format!("format = 2\n[[fault]]\nkind = \"node-silent\"\nnode = {node}\nat_s = 1");
         let message = FaultPlan::from_toml(&text).unwrap_err().to_string();

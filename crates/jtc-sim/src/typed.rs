@@ -37,7 +37,9 @@ impl fmt::Display for TypedEvent {
             Self::Push { joint, torque, seconds } => {
                 write!(f, "push: {joint} by {torque} N·m for {seconds} s")
             }
-            Self::Hand { file } => write!(f, "hand: leads along {file} while the arm is taught"),
+            Self::Hand { file } => {
+                write!(f, "hand: a hand leads the arm along {file} while the arm is taught")
+            }
         }
     }
 }
@@ -65,16 +67,19 @@ pub enum TypedEventError {
 impl fmt::Display for TypedEventError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unknown(word) => write!(f, "there is no event `{word}`; events are {TYPED_EVENTS_HELP}"),
+            Self::Unknown(word) => write!(f, "unknown event `{word}`; the events are {TYPED_EVENTS_HELP}"),
             Self::PushWords(count) => write!(
                 f,
-                "push takes a joint, a torque in N·m and a time in s, as in `push 3 12 0.5`; here are {count} words"
+                "push has {count} words, expected a joint, a torque in N·m and a time in s, as in `push 3 12 0.5`"
             ),
             Self::Value { what: "joint", word, .. } => {
-                write!(f, "push: joint `{word}` is none of 1..{JOINTS}; joints count from 1, at the base")
+                write!(
+                    f,
+                    "push: joint `{word}` is out of range, expected 1..{JOINTS}; joints count from 1, at the base"
+                )
             }
             Self::Value { what, word, allowed: (low, high) } => {
-                write!(f, "push: {what} `{word}` is no number in {low}..{high}")
+                write!(f, "push: {what} `{word}` is not a valid number, expected {low}..{high}")
             }
             Self::NoFile => f.write_str("hand takes a trajectory file, as in `hand lead.csv`"),
         }
@@ -137,14 +142,17 @@ mod tests {
     #[test]
     fn mistakes_are_named() {
         for (line, part) in [
-            ("shove 3 12 1", "there is no event `shove`; events are push JOINT TORQUE_NM SECONDS"),
-            ("push 3 12", "as in `push 3 12 0.5`; here are 2 words"),
-            ("push 0 12 1", "joint `0` is none of 1..6; joints count from 1"),
-            ("push 7 12 1", "joint `7` is none of 1..6"),
-            ("push 2.5 12 1", "joint `2.5` is none of 1..6"),
-            ("push 2 1e9 1", "torque (N·m) `1e9` is no number in -400..400"),
-            ("push 2 nan 1", "torque (N·m) `nan` is no number"),
-            ("push 2 12 forever", "time (s) `forever` is no number in 0.001..60"),
+            ("shove 3 12 1", "unknown event `shove`; the events are push JOINT TORQUE_NM SECONDS"),
+            (
+                "push 3 12",
+                "push has 2 words, expected a joint, a torque in N·m and a time in s, as in `push 3 12 0.5`",
+            ),
+            ("push 0 12 1", "joint `0` is out of range, expected 1..6; joints count from 1"),
+            ("push 7 12 1", "joint `7` is out of range, expected 1..6"),
+            ("push 2.5 12 1", "joint `2.5` is out of range, expected 1..6"),
+            ("push 2 1e9 1", "torque (N·m) `1e9` is not a valid number, expected -400..400"),
+            ("push 2 nan 1", "torque (N·m) `nan` is not a valid number"),
+            ("push 2 12 forever", "time (s) `forever` is not a valid number, expected 0.001..60"),
             ("hand", "hand takes a trajectory file"),
         ] {
             let message = TypedEvent::parse(line).unwrap_err().to_string();

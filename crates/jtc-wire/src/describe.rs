@@ -42,7 +42,7 @@ fn wrong(bytes: &[u8], f: &mut Formatter<'_>) -> Result {
     };
     let n = usize::from(u16::from_be_bytes([high, low]));
     if !kind.can_have(n) {
-        return write!(f, "{kind} with a length field of {n}, which it cannot have; {} bytes", bytes.len());
+        return write!(f, "{kind} with an invalid length field, {n}; {} bytes", bytes.len());
     }
     let (covered, crc) = bytes.split_at(bytes.len() - field::CRC_LEN.min(rest.len()));
     match crc {
@@ -59,7 +59,7 @@ impl Display for FrameRef<'_> {
         if self.frame_type == FrameType::JtcStatus {
             return match Status::parse(self.bytes) {
                 Some(status) => status.fmt(f),
-                None => f.write_str("JtcStatus that does not parse"),
+                None => f.write_str("JtcStatus with invalid content"),
             };
         }
         if let Some(answer) = Answer::parse(*self) {

@@ -70,7 +70,7 @@ impl fmt::Display for OutOfScale {
         let unit = channel.unit();
         write!(
             f,
-            "{} of joint {joint} is {value} {unit}, the frame carries -{limit}..{limit} {unit}",
+            "{} of joint {joint} is {value} {unit}, but a frame carries only -{limit}..{limit} {unit}",
             channel.name()
         )
     }
@@ -147,14 +147,20 @@ impl fmt::Display for EncodeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::BufferTooShort { needed, given } => {
-                write!(f, "the frame has {needed} bytes, the buffer {given}")
+                write!(f, "the frame has {needed} bytes, but the buffer has {given}")
             }
-            Self::TooManyPoints { points, limit } => write!(f, "{points} points, a frame carries {limit}"),
+            Self::TooManyPoints { points, limit } => {
+                write!(f, "{points} points, expected at most {limit} in a frame")
+            }
             Self::WrongCount { frame_type, count } => {
-                write!(f, "no {frame_type} frame has {count} numbers")
+                write!(f, "wrong count of numbers for a {frame_type} frame: {count}")
             }
             Self::NotFinite { frame_type, index, value } => {
-                write!(f, "{}: {value} is no number that a frame carries", FloatName(*frame_type, *index))
+                write!(
+                    f,
+                    "{}: {value} is not a number that a frame can carry",
+                    FloatName(*frame_type, *index)
+                )
             }
         }
     }

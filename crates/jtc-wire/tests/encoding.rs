@@ -87,8 +87,14 @@ fn j06_every_number_has_its_name() {
 #[test]
 fn errors_name_what_was_asked_and_the_limit() {
     let shows = |error: EncodeError, text: &str| assert_eq!(error.to_string(), text);
-    shows(EncodeError::BufferTooShort { needed: 126, given: 10 }, "the frame has 126 bytes, the buffer 10");
-    shows(EncodeError::TooManyPoints { points: 1667, limit: 1666 }, "1667 points, a frame carries 1666");
+    shows(
+        EncodeError::BufferTooShort { needed: 126, given: 10 },
+        "the frame has 126 bytes, but the buffer has 10",
+    );
+    shows(
+        EncodeError::TooManyPoints { points: 1667, limit: 1666 },
+        "1667 points, expected at most 1666 in a frame",
+    );
     let error = EncodeError::WrongCount { frame_type: FrameType::PidParam, count: 29 };
-    shows(error, "no PidParam frame has 29 numbers");
+    shows(error, "wrong count of numbers for a PidParam frame: 29");
 }

@@ -119,7 +119,7 @@ fn j06_floats_that_are_none() {
     let mut gains = [[1.0; 5]; 6];
     gains[2][1] = f64::NAN;
     let error = pid_param(&mut out, &gains).expect_err("not a number");
-    assert_eq!(error.to_string(), "PidParam joint 3 Ki: NaN is no number that a frame carries");
+    assert_eq!(error.to_string(), "PidParam joint 3 Ki: NaN is not a number that a frame can carry");
     let mut links = [[0.5; 13]; 7];
     links[6][12] = 1e300;
     let error = arm_model(&mut out, &[[0.0; 6]; 7], &links).expect_err("too large for an f32");
@@ -173,7 +173,7 @@ fn scale_ends() {
     let error = RawPoint::from_si(&zero, &velocity, &zero).expect_err("outside the scale");
     let expected = OutOfScale { joint: 4, channel: Channel::Velocity, value: -6.2832, limit: VELOCITY_SCALE };
     assert_eq!(error, expected);
-    let text = "velocity of joint 4 is -6.2832 rad/s, the frame carries -6.283185..6.283185 rad/s";
+    let text = "velocity of joint 4 is -6.2832 rad/s, but a frame carries only -6.283185..6.283185 rad/s";
     assert_eq!(error.to_string(), text);
 }
 
@@ -341,7 +341,7 @@ fn every_frame_in_words() {
     );
     shows(&fixed::PUMP_OFF, "GripperControl: pump off");
     shows(&fixed::reset_can_devices(0x02), "ResetCanDevices: node 1 (joint 2)");
-    shows(&[0x9B, 0x0B, 0, 9], "TrajSetExecStatus with a length field of 9, which it cannot have; 4 bytes");
+    shows(&[0x9B, 0x0B, 0, 9], "TrajSetExecStatus with an invalid length field, 9; 4 bytes");
     shows(&[0x9B, 0x09, 2, 0x1A, 0, 0], "ArmModel: 6 bytes of 538");
     shows(&[0x00; 7], "7 bytes that begin with 00 instead of 9B");
     let mut out = [0; 200];

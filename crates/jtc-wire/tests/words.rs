@@ -85,7 +85,7 @@ fn what_is_no_frame_in_words() {
     let shows = |bytes: &[u8], text: &str| assert_eq!(Described(bytes).to_string(), text);
     shows(&[0x9B, 0x0C, 0], "3 bytes, too few for a frame");
     shows(&[0x9B, 0x55, 0, 6, 1, 2], "frame of unknown type 55, 6 bytes");
-    shows(&[0x9B, 0x0C, 0, 5], "TeachingModeEnable with a length field of 5, which it cannot have; 4 bytes");
+    shows(&[0x9B, 0x0C, 0, 5], "TeachingModeEnable with an invalid length field, 5; 4 bytes");
     shows(&[0x9B, 0x0C, 0, 6], "TeachingModeEnable: 4 bytes of 6");
     shows(&[0x9B, 0x0C, 0, 6, 0xCD], "TeachingModeEnable: 5 bytes of 6");
     shows(&[0x9B, 0x0C, 0, 6, 0, 1], "TeachingModeEnable of 6 bytes: CRC is 0001, should be CD27");

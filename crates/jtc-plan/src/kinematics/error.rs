@@ -16,20 +16,22 @@ pub enum PoseError {
         value: f64,
     },
     /// A quaternion whose length is not 1.
-    #[error("the quaternion has the length {length:.6}, that of an orientation has 1")]
+    #[error("the quaternion has the length {length:.6}, expected 1")]
     NotUnit {
         /// Length of the quaternion.
         length: f64,
     },
     /// A matrix that is not a rotation matrix.
-    #[error("the matrix is not a rotation: its axes miss length 1 and right angles by {deviation:.2e}")]
+    #[error(
+        "the matrix is not a rotation: its axes differ from length 1 and right angles by {deviation:.2e}"
+    )]
     NotRotation {
         /// Largest entry of RᵀR − 1, or 2 for a reflection.
         deviation: f64,
     },
     /// The arm cannot bring the flange to the position in any orientation: the position is too far away or too close.
     #[error(
-        "out of reach: {distance:.3} m from the origin of the base, and the flange comes no nearer to it than {missing:.4} m"
+        "out of reach: {distance:.3} m from the origin of the base; the nearest position of the flange is {missing:.4} m away from it"
     )]
     OutOfReach {
         /// Distance of the position from the origin of the base, m.
@@ -39,8 +41,8 @@ pub enum PoseError {
     },
     /// The flange can reach the position, but not in this orientation.
     #[error(
-        "out of reach in this orientation: the flange can be there, {distance:.3} m from the origin of the base, but turned by {missing:.3} rad \
-         against it at the nearest"
+        "out of reach in this orientation: the flange reaches this position, {distance:.3} m from the origin of the base, but its nearest \
+         orientation differs by {missing:.3} rad"
     )]
     Orientation {
         /// Distance of the position from the origin of the base, m.
@@ -64,7 +66,7 @@ pub enum PoseError {
     #[error("{0}")]
     Singular(Singularity),
     /// A line of the flange requires a joint to turn far within a short distance.
-    #[error("{joint} would have to turn by {step:.3} rad within {distance:.6} m")]
+    #[error("{joint} would need to turn by {step:.3} rad within {distance:.6} m")]
     JointStep {
         /// Joint.
         joint: Joint,
@@ -75,20 +77,22 @@ pub enum PoseError {
     },
     /// Three points that are not on a circle.
     #[error(
-        "the arc's three points are on no circle: the second is {distance:.2e} m from the line through the others"
+        "the three points of the arc are not on a circle: the second is {distance:.2e} m from the line through the others"
     )]
     Arc {
         /// Distance of the second point from the straight line, m; 0 if the first and the last point are the same.
         distance: f64,
     },
     /// Two orientations that are half a turn apart.
-    #[error("the orientation is half a turn from that of the waypoint before: which way to turn is open")]
+    #[error(
+        "the orientation is half a turn from that of the waypoint before, so the direction of the turn is ambiguous"
+    )]
     HalfTurn,
     /// An arc's `via` point without an arc after it.
-    #[error("a point on the way of an arc (`via`), and the waypoint behind it is not the end of an arc")]
+    #[error("a point on an arc (`via`) is not followed by the end of the arc")]
     NoArc,
     /// An arc without its `via` point.
-    #[error("the end of an arc, and the waypoint before it is not a point on the arc's way (`via`)")]
+    #[error("the end of an arc does not follow a point on the arc (`via`)")]
     NoVia,
     /// Joint positions at the end of a line that the arm does not have in its current configuration.
     #[error(
@@ -103,7 +107,7 @@ pub enum PoseError {
         wanted: f64,
     },
     /// An invalid blend radius.
-    #[error("a blend radius of {radius} m")]
+    #[error("a blend radius of {radius} m is out of range, expected a finite value of 0 or more")]
     Blend {
         /// Given radius, m.
         radius: f64,
@@ -154,22 +158,23 @@ impl PoseError {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NotFinite { .. } => {
-                "positions are three numbers in m, orientations four (x, y, z, w) or three in rad"
+                "give a position as three numbers in m, and an orientation as four numbers (x, y, z, w) or three in rad"
             }
             Self::NotUnit { .. } => {
-                "quaternions are given as x, y, z, w, the scalar last, and have length 1: divide the four by their length"
+                "give a quaternion as x, y, z, w, with the scalar last, and divide the four numbers by their length"
             }
             Self::NotRotation { .. } => {
                 "the columns of a rotation matrix are the axes of the flange in the base frame, each of length 1"
             }
             Self::OutOfReach { .. } => {
-                "positions are those of the flange in the base frame, in m; a tool's length is not part of it. Move the pose nearer, or the arm"
+                "give positions of the flange in the base frame, in m, without the length of a tool. Move the pose nearer to the arm, or move the \
+                 arm"
             }
             Self::Orientation { .. } => {
                 "turn the pose, or move it towards the middle of the workspace; roll, pitch and yaw are about the fixed x, y and z axes, in rad"
             }
             Self::OutsideLimits { .. } => {
-                "choose another pose, or a line that begins with the arm in another configuration (elbow or wrist the other way)"
+                "choose another pose, or begin the line with the arm in another configuration (elbow or wrist flipped)"
             }
             Self::Singular(_) => {
                 "move the line away from the singular pose, begin it with the arm in another configuration, or go there with a motion in joint space"
@@ -178,17 +183,17 @@ impl PoseError {
                 "the line passes near a singular pose: move it away from there, or go there with a motion in joint space"
             }
             Self::Arc { .. } => {
-                "an arc needs three different points that are not in line; a full circle is two arcs"
+                "give three different points that are not on one line; use two arcs for a full circle"
             }
             Self::NoArc | Self::NoVia => {
-                "an arc is two waypoints: a point on its way (`via`), and behind it its end (`arc`)"
+                "give an arc as two waypoints: a point on the arc (`via`), then the end of the arc (`arc`)"
             }
             Self::Configuration { .. } => {
                 "begin the line with the arm in the configuration of its end, give the end as a pose of the flange, or go there with a motion in joint space"
             }
             Self::HalfTurn => "give a waypoint in between",
-            Self::Blend { .. } => "a blend radius is a length in m, 0 for a stop at each waypoint",
-            Self::NoMotion => "give at least one waypoint whose pose is another than the one before",
+            Self::Blend { .. } => "give the blend radius in m, or 0 for a stop at each waypoint",
+            Self::NoMotion => "give at least one waypoint with another pose than the waypoint before",
             Self::Waypoint { source, .. } | Self::Leg { source, .. } => source.hint(),
         }
     }

@@ -146,7 +146,7 @@ mod tests {
         let at = |orientation: Orientation| orientation.at([0.0; 3]);
         let long = at(Orientation::Quaternion([0.0, 0.0, 1.0, 1.0])).unwrap_err();
         assert_eq!(long, PoseError::NotUnit { length: 2f64.sqrt() });
-        assert_eq!(long.to_string(), "the quaternion has the length 1.414214, that of an orientation has 1");
+        assert_eq!(long.to_string(), "the quaternion has the length 1.414214, expected 1");
         // Three digits are precise enough.
         at(Orientation::Quaternion([0.0, 0.0, 0.707, 0.707])).unwrap();
         let nan = at(Orientation::Rpy([0.0, f64::NAN, 0.0])).unwrap_err();

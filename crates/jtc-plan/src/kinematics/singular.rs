@@ -45,9 +45,7 @@ impl fmt::Display for Singularity {
         let (name, why) = match self.kind {
             SingularKind::Wrist => ("wrist singularity", " (the axes of joints 4 and 6 in line)"),
             SingularKind::Elbow => ("elbow singularity", " (the arm stretched or folded)"),
-            SingularKind::Shoulder => {
-                ("shoulder singularity", " (the wrist where joint 1 cannot move it sideways)")
-            }
+            SingularKind::Shoulder => ("shoulder singularity", " (joint 1 cannot move the wrist sideways)"),
             SingularKind::Other => ("singular pose", ""),
         };
         write!(f, "{name}{why}: {} ", if self.joints.len() > 1 { "joints" } else { "joint" })?;
@@ -63,7 +61,7 @@ impl fmt::Display for Singularity {
         }
         write!(
             f,
-            " would move far for a small way of the flange; smallest singular value {:.2e}, limit {:.2e}",
+            " would move far for a small motion of the flange; smallest singular value {:.2e}, limit {:.2e}",
             self.smallest, SINGULAR
         )
     }

@@ -124,19 +124,18 @@ impl fmt::Display for FaultFileError {
         match self {
             Self::Syntax(text) => f.write_str(text),
             Self::Format { found: None } => f.write_str(
-                "the file has no `format = 2`. In files without it joints counted from 0. To change it: add 1 to every \
-                 `joint`, write `joint = N + 1` for every `node = N` of 0..5 and `gripper = true` for `node = 6`, then put \
-                 `format = 2` in the first line",
+                "the file has no `format = 2`, so its joints count from 0. To convert the file: add 1 to every `joint`, write `joint = N + 1` for \
+                 every `node = N` of 0..5 and `gripper = true` for `node = 6`, then put `format = 2` in the first line",
             ),
             Self::Format { found: Some(found) } => {
-                write!(f, "format = {found} is none that this program reads; it reads `format = 2`")
+                write!(f, "format = {found} is not supported, expected `format = 2`")
             }
             Self::Node { fault, node } => {
-                write!(f, "fault {fault}: there is no key `node` in format 2: instead of node = {node} write ")?;
+                write!(f, "fault {fault}: format 2 has no key `node`: instead of node = {node} write ")?;
                 if *node == JOINTS as f64 {
                     f.write_str("gripper = true")
                 } else {
-                    write!(f, "joint = {} if it was meant as a number on the bus; joints count from 1", node + 1.0)
+                    write!(f, "joint = {} if it is a node number on the bus; joints count from 1", node + 1.0)
                 }
             }
             Self::Device { fault, kind } => write!(
@@ -145,14 +144,14 @@ impl fmt::Display for FaultFileError {
             ),
             Self::Hand { fault, text } => write!(f, "fault {fault}: {text}"),
             Self::UnknownKind { fault, kind } => {
-                write!(f, "fault {fault}: there is no kind `{kind}`; kinds are {}", FaultKind::NAMES.join(", "))
+                write!(f, "fault {fault}: unknown kind `{kind}`; the kinds are {}", FaultKind::NAMES.join(", "))
             }
             Self::Missing { fault, kind, key } => write!(f, "fault {fault}: `{kind}` needs the key `{key}`"),
             Self::Superfluous { fault, kind, key } => {
-                write!(f, "fault {fault}: the key `{key}` means nothing for `{kind}`; remove it")
+                write!(f, "fault {fault}: the key `{key}` has no meaning for `{kind}`; remove the key")
             }
             Self::Range { fault, key, value, allowed: (low, high) } => {
-                write!(f, "fault {fault}: {key} = {value} is outside {low}..{high}")
+                write!(f, "fault {fault}: {key} = {value} is out of range, expected {low}..{high}")
             }
             Self::NotWhole { fault, key, value } => {
                 write!(f, "fault {fault}: {key} = {value} is not a whole number")
@@ -167,11 +166,11 @@ impl fmt::Display for FaultFileError {
             ),
             Self::UnknownSide { fault, side } => {
                 let names: Vec<_> = SIDES.iter().map(|(name, _)| *name).collect();
-                write!(f, "fault {fault}: there is no side `{side}`; sides are {}", names.join(", "))
+                write!(f, "fault {fault}: unknown side `{side}`; the sides are {}", names.join(", "))
             }
             Self::UnknownState { fault, state } => {
                 let names: Vec<_> = STATES.iter().map(|(name, _)| *name).collect();
-                write!(f, "fault {fault}: there is no state `{state}`; states are {}", names.join(", "))
+                write!(f, "fault {fault}: unknown state `{state}`; the states are {}", names.join(", "))
             }
             Self::Trigger { fault } => {
                 write!(f, "fault {fault}: needs exactly one of at_s, in_state, at_point")

@@ -306,7 +306,7 @@ impl fmt::Display for Info {
             write!(f, "; missing: {}", Bits(missing.into(), &words::JTC_INIT))?;
         }
         if f.alternate() {
-            write!(f, "\n  boots: {}, the last by {}", self.boots, self.boot_cause)?;
+            write!(f, "\n  boots: {}, cause of the last: {}", self.boots, self.boot_cause)?;
             write!(f, "\n  up for {} ms, {} records lost", self.uptime_ms, self.lost_records)?;
             let stored = if self.defaults_stored { "stored" } else { "built in" };
             write!(f, "\n  defaults: {stored}; memory: {}, number {}", self.store, self.sequence)?;

@@ -83,40 +83,40 @@ impl fmt::Display for StopCause {
         let Self { kind, joint, value, limit } = *self;
         let unit = kind.unit();
         match kind {
-            StopKind::Overload => write!(f, "joint {joint} needed {:.1} of its {limit:.1} {unit}", value.abs()),
+            StopKind::Overload => write!(f, "joint {joint} needed {:.1} {unit}, limit {limit:.1} {unit}", value.abs()),
             StopKind::Shove => write!(
                 f,
-                "joint {joint} was pushed: it moved away at {:.2} {unit} more than commanded, and {limit:.2} {unit} are a push",
+                "joint {joint} was pushed: it moved {:.2} {unit} faster than commanded, limit {limit:.2} {unit}",
                 value.abs()
             ),
             StopKind::Push => write!(
                 f,
-                "joint {joint} was pushed: the controller held {:.1} {unit} against it, and {limit:.1} {unit} are a push",
+                "joint {joint} was pushed: the controller held {:.1} {unit} against the push, limit {limit:.1} {unit}",
                 value.abs()
             ),
             StopKind::PositionError => write!(
                 f,
-                "joint {joint} was {:.3} {unit} from where it was commanded to be ({limit:.3} {unit} allowed)",
+                "joint {joint} was {:.3} {unit} from its commanded position, limit {limit:.3} {unit}",
                 value.abs()
             ),
             StopKind::Position | StopKind::Velocity | StopKind::Acceleration => {
-                write!(f, "joint {joint}: {kind}, {value:.3} {unit} ({limit:.3} {unit} allowed)")
+                write!(f, "joint {joint}: {kind}, {value:.3} {unit}, limit {limit:.3} {unit}")
             }
             StopKind::FrictionTable => write!(f, "joint {joint}: {kind} at {value:.3} {unit}"),
             StopKind::Unstable => write!(
                 f,
-                "joint {joint} swings more and more: its gains make the position controller unstable, and softer ones hold it now"
+                "joint {joint} oscillates more and more: its gains make the position controller unstable; softer gains hold the joint now"
             ),
             StopKind::EncoderJump => write!(f, "the encoder of joint {joint} jumped by {value:.4} {unit}"),
             StopKind::SpeedScale => write!(
                 f,
-                "the drive of joint {joint} reports positions that move {value:.2} times as fast as its speed says"
+                "the drive of joint {joint} reports positions that change {value:.2} times as fast as the speed that it reports"
             ),
             StopKind::Gains if joint == 0 => f.write_str(
-                "the arm was released while its new gains were on trial, and those before are in use again",
+                "the arm was released during the trial of its new gains; the previous gains are in use again",
             ),
             StopKind::Gains => {
-                write!(f, "joint {joint} did not bear its new gains, and those before are in use again")
+                write!(f, "joint {joint} failed the trial of its new gains; the previous gains are in use again")
             }
             StopKind::Approach => f.write_str(
                 "when the drives were enabled, the arm was too far from the path, or had too little torque left to approach it",

@@ -41,8 +41,7 @@ impl Arm {
         let marked = self.sources.marked(joint);
         if !marked.is_empty() {
             let names: Vec<String> = marked.into_iter().map(quoted).collect();
-            let _ =
-                writeln!(out, "proposed = [{}] # nobody has measured or looked these up", names.join(", "));
+            let _ = writeln!(out, "proposed = [{}] # not measured and not looked up", names.join(", "));
         }
     }
 
@@ -54,8 +53,8 @@ impl Arm {
         }
         self.write_marks(&mut out, None);
         if self.sources.proposed().next().is_some() {
-            out += "\n# What `proposed` names are starting values, made by these rules. Put in what was measured or looked up, and take the\n\
-                    # name out of the list; `jtc arm check` names what is left.\n";
+            out += "\n# The values in `proposed` are starting values from these rules. Enter a value that was measured or looked up, and\n\
+                    # remove its name from the list; `jtc arm check` lists the remaining names.\n";
             for Rule { name, rule } in RULES {
                 if self.sources.proposed().any(|(_, key)| key == name) {
                     let _ = writeln!(out, "#   {name}: {rule}");

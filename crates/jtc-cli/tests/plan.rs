@@ -285,7 +285,7 @@ fn the_report_names_what_binds_when() {
     let (file, out, page) = (dir.file("w.csv", WAYPOINTS), dir.path("out.csv"), dir.path("plan.html"));
     let value = json(&[&file, "-o", &out, "--report", &page], 0);
     let text = std::fs::read_to_string(&page).unwrap();
-    assert!(text.contains("What binds when") && text.contains("planned, not run"));
+    assert!(text.contains("Limits over time") && text.contains("planned, not run"));
     let bound = &value["binding"][0];
     assert!(text.contains(&format!("\"plan\":[{bound}")), "{bound}");
     assert!(text.contains("Limiting constraints and their time") && text.contains("[\"joint 6\","));

@@ -48,7 +48,7 @@
   $("title").textContent = data.trajectory || "Recorded run";
   const when = data.start_unix_ms ? new Date(data.start_unix_ms).toLocaleString() + " · " : "";
   $("lede").textContent = `${when}${round(last, 2)} s ${plan ? "planned" : "recorded"}, ${data.samples.toLocaleString("en")} ${plan ? "points" : "samples"}` +
-    (data.thinned > 1 ? `; the plots show the extremes of every ${data.thinned}.` : ".");
+    (data.thinned > 1 ? `; the plots show the extremes of each group of ${data.thinned} samples.` : ".");
   const tile = (value, unit, text) => $("tiles").append(make("div", { class: "tile" }, make("b", {}, value, make("small", {}, unit)), make("span", {}, text)));
   const [rms, rmsJoint] = best("rms_error_mrad");
   const [max, maxJoint] = best("max_error_mrad");
@@ -63,7 +63,7 @@
     const most = Math.max(...seconds);
     if (most > 0) tile(round(most / last * 100, 0), "%", `of the time ${names[seconds.indexOf(most)].toLowerCase()} is at a limit`);
   }
-  tile(round(summary.executed_s || last, 2), "s", failed ? "executed before it failed" : summary.executed_s ? "of motion" : "recorded");
+  tile(round(summary.executed_s || last, 2), "s", failed ? "executed before the failure" : summary.executed_s ? "of motion" : "recorded");
 
   // --- plots ---------------------------------------------------------------------------------------------------------
   const plots = [];
@@ -193,7 +193,7 @@
   // What binds a plan: a row a joint on the same time axis.
   const limitColours = { velocity: "--st3", acceleration: "--st2", jerk: "--st4", torque: "--st5", stop: "--friction", friction: "--friction", "given time": "--st1" };
   if (plan && time.length) {
-    const c = card(main, "What binds when", "the joint that is at a limit, and at which");
+    const c = card(main, "Limits over time", "the joint that is at a limit, and the kind of limit");
     const rows = (u) => {
       const { ctx } = u;
       const ratio = devicePixelRatio || 1;
@@ -233,7 +233,7 @@
     for (const limit of [...new Set(plan.map((b) => b.limit))].sort()) {
       c.keys.append(make("span", { class: "key block", style: `--c: var(${limitColours[limit] || "--st0"})` }, make("i"), limit));
     }
-    if (!plan.length) c.keys.append(make("span", { class: "key" }, "no limit binds"));
+    if (!plan.length) c.keys.append(make("span", { class: "key" }, "no joint is at a limit"));
   }
 
   // Timeline of states: two rows of bands on the same time axis.
@@ -314,7 +314,7 @@
       ["friction", "torque_friction_nm", "--friction", 1.5, 1], ["model", "torque_model_nm", "--model", 1.5, 1],
     ].filter(([, name]) => has(name));
     const keys = make("div", { class: "keys" });
-    main.append(make("div", { class: "section" }, make("h2", {}, "Torque", make("small", {}, "N·m, and its parts; bars: peak as a share of the limit")), keys));
+    main.append(make("div", { class: "section" }, make("h2", {}, "Torque", make("small", {}, "N·m, with its parts; bars: peak as a share of the limit")), keys));
     const grid = make("div", { class: "grid3" });
     main.append(grid);
     let toLimit = false;
@@ -376,7 +376,7 @@
     ["RMS error, mrad", "rms_error_mrad", 3], ["max error, mrad", "max_error_mrad", 3], ["peak speed, rad/s", "peak_velocity_rad_s", 3],
     ["peak torque, N·m", "peak_torque_nm", 2], ["limit, N·m", "torque_limit_nm", 1], ["share of limit", "torque_share"], ["hottest, °C", "peak_temperature_c", 0],
   ].filter(([, name]) => summary.joints.some((s) => known(s[name])));
-  main.append(table(failed ? "Figures up to the failure" : "Figures", ["Joint", ...figures.map(([head]) => head)],
+  main.append(table(failed ? "Figures until the failure" : "Figures", ["Joint", ...figures.map(([head]) => head)],
     summary.joints.map((s, j) => [
       make("td", {}, make("i", { class: "dot", style: `--c: var(--j${j})` }), names[j]),
       ...figures.map(([, name, digits]) => name !== "torque_share" ? round(s[name], digits) : known(s.torque_share) ? make("td", s.torque_share > 1 ? { class: "over" } : {}, `${round(s.torque_share * 100, 0)} %`,
@@ -389,7 +389,7 @@
 
   // --- joints shown, theme, zoom -------------------------------------------------------------------------------------
   const chips = J.map((j) => {
-    const b = make("button", { class: "chip", style: `--c: var(--j${j})`, title: "click: show or hide · double-click: this one only", "aria-pressed": "true" }, make("i"), names[j]);
+    const b = make("button", { class: "chip", style: `--c: var(--j${j})`, title: "click: show or hide · double-click: only this joint", "aria-pressed": "true" }, make("i"), names[j]);
     b.addEventListener("click", () => { shown[j] = !shown[j]; select(); });
     b.addEventListener("dblclick", () => { const alone = J.every((i) => shown[i] === (i === j)); J.forEach((i) => { shown[i] = alone || i === j; }); select(); });
     $("joints").append(b);

@@ -214,10 +214,10 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         (
             vec![&pose, "--arm", &arm],
             2,
-            "pose.csv, line 3, column 1: the arm avena has no pose \"above-tabel\"; it has above-table",
+            "pose.csv, line 3, column 1: the arm avena has no pose \"above-tabel\"; the arm has above-table",
         ),
         (vec![&one], 2, "too few waypoints: 1, expected at least 2"),
-        (vec![&same], 4, "all 2 waypoints are at the same place"),
+        (vec![&same], 4, "all 2 waypoints are at the same position"),
         (vec![&outside], 4, "outside.csv, line 3: waypoint 2, joint 2: 1.6 rad is outside -1.57..1.57 rad"),
         (vec![&far], 4, "far.csv, line"),
         (

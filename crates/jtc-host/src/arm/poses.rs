@@ -301,7 +301,7 @@ mod tests {
         };
         assert!(
             message(save_pose(&path, "home", &[0.0; 6], false))
-                .contains("\"home\" is there already | choose another")
+                .contains("\"home\" exists already | choose another")
         );
         for name in ["", "1", "1e3", "nan", "NaN", "inf", "Infinity", "a b", "a,b", "-x", "ä\n"] {
             assert!(
@@ -311,7 +311,7 @@ mod tests {
         }
         let unknown = message(remove_pose(&path, "hone"));
         assert!(
-            unknown.contains("avena has no pose \"hone\"; it has home | is \"home\" meant?"),
+            unknown.contains("avena has no pose \"hone\"; the arm has home | did you mean \"home\"?"),
             "{unknown}"
         );
         assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
@@ -324,7 +324,7 @@ mod tests {
         for (line, problem) in [
             ("home = [0, 0, 0]", "poses, home: 3 numbers, expected 6"),
             ("home = [0, 0, 0, 0, 0, nan]", "poses, home: NaN is not a finite number"),
-            ("\"a b\" = [0, 0, 0, 0, 0, 0]", "poses, a b: \"a b\" is no name"),
+            ("\"a b\" = [0, 0, 0, 0, 0, 0]", "poses, a b: \"a b\" is not a valid name"),
             ("home = \"here\"", "line"),
         ] {
             let error = Arm::parse(&format!("{AVENA_TOML}\n[poses]\n{line}\n")).unwrap_err().to_string();

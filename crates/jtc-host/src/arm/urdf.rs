@@ -104,7 +104,8 @@ impl<'a> Chain<'a> {
                 let kind = format!("{:?}", joint.joint_type).to_lowercase();
                 let follows =
                     joint.mimic.as_ref().map_or(String::new(), |m| format!(", follows {}", m.joint));
-                let problem = format!("{kind}{follows}: is not one of the six joints and is held at 0");
+                let problem =
+                    format!("{kind}{follows}: is held at 0, because it is not one of the six joints");
                 chain.warn(Change::LeftOut, format!("joint {}", joint.name), problem);
             }
         }

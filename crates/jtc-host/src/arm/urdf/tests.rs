@@ -204,7 +204,7 @@ fn j40_fingers_and_what_follows_them_are_left_out() {
     let arm = Arm::from_urdf(&robot(&parts(), &follower)).unwrap();
     assert_eq!(
         changes(&arm, Change::LeftOut),
-        ["joint right: prismatic, follows a1: is not one of the six joints and is held at 0"]
+        ["joint right: prismatic, follows a1: is held at 0, because it is not one of the six joints"]
     );
     let text = robot(&parts(), &(finger + &mimic));
     let error = Arm::from_urdf(&text).unwrap_err().in_file("a.urdf".as_ref());

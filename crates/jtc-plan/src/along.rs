@@ -187,7 +187,7 @@ fn without_interior(
             break;
         }
     }
-    Ok((best.ok_or("its time is not finite")?, shares))
+    Ok((best.ok_or("the time of the motion is not finite")?, shares))
 }
 
 /// Returns the highest squared speed of each cell that velocity limits and friction permit.

@@ -100,7 +100,7 @@ impl Kinematics {
     pub fn solve(&self, target: &Pose, near: &JointVec) -> Result<JointVec, PoseError> {
         let goal = orientation::checked(target)?;
         if let Some(&bad) = near.iter().find(|q| !q.is_finite()) {
-            return Err(PoseError::NotFinite { what: "a joint position to be near to", value: bad });
+            return Err(PoseError::NotFinite { what: "a nearby joint position", value: bad });
         }
         let mut found = self.solutions(&goal, near);
         // In a singular pose this solution may be nearer than the one of the closed form. Full turns are handled below.

@@ -82,7 +82,7 @@ pub enum ExtensionError {
 /// Formats the first difference and the number of further differences.
 fn listed(differences: &[Difference]) -> String {
     match differences {
-        [] => "it reports no difference".into(),
+        [] => "no difference was reported".into(),
         [one] => one.to_string(),
         [one, rest @ ..] => format!("{one}, and {} more", rest.len()),
     }

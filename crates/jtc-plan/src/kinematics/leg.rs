@@ -138,7 +138,7 @@ impl Drawn {
 /// Returns the arc from a pose through a point to another pose.
 fn circle(from: &Frame, via: &[f64; 3], to: &Frame) -> Result<Circle, PoseError> {
     if let Some(&value) = via.iter().find(|v| !v.is_finite()) {
-        return Err(PoseError::NotFinite { what: "the point that an arc passes", value });
+        return Err(PoseError::NotFinite { what: "the `via` point of an arc", value });
     }
     let (u, v) = (Vector3::from(*via) - from.position, to.position - from.position);
     let normal = u.cross(&v);

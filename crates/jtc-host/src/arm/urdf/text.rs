@@ -70,7 +70,9 @@ fn end_of_tag(rest: &str) -> Option<usize> {
 pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
     if deepest > DEPTH_MAX {
-        return Err(FileError::form(format!("XML with {deepest} levels is not a description of an arm")));
+        return Err(FileError::form(format!(
+            "XML nested {deepest} levels deep is not a description of an arm"
+        )));
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ pub enum OpenError {
     #[error(transparent)]
     Url(#[from] UrlError),
     /// This system cannot open buses of this kind.
-    #[error("`{url}`: {kind} buses are those of the Linux kernel; this system has {}", crate::url::OPENABLE)]
+    #[error("`{url}`: {kind} buses need a Linux kernel; this system supports {}", crate::url::OPENABLE)]
     Unsupported {
         /// The URL.
         url: String,
@@ -21,7 +21,7 @@ pub enum OpenError {
         kind: &'static str,
     },
     /// The adapter's protocol does not support the rate.
-    #[error("{url}: {what} of {rate} bit/s is not supported; possible are {possible}")]
+    #[error("{url}: {what} {rate} bit/s is not supported, expected one of {possible}")]
     Rate {
         /// The bus.
         url: String,
@@ -45,8 +45,8 @@ pub enum OpenError {
 pub enum AttachError {
     /// A multicast group could not be joined.
     #[error(
-        "cannot join multicast group {group} port {port}: {step}: {source}; has this host a network \
-         interface with multicast (`ip -br link`), and may others share the port?"
+        "cannot join multicast group {group} port {port}: {step}: {source}; check that this host has a \
+         network interface with multicast (`ip -br link`) and that the port can be shared"
     )]
     Join {
         /// The group.
@@ -59,7 +59,7 @@ pub enum AttachError {
         source: io::Error,
     },
     /// The connection to a server failed.
-    #[error("{url}: cannot connect: {source}; is the server running there, and is that its port?")]
+    #[error("{url}: cannot connect: {source}; check that the server runs there and uses this port")]
     Connect {
         /// The bus.
         url: String,
@@ -68,8 +68,8 @@ pub enum AttachError {
     },
     /// A serial port could not be opened.
     #[error(
-        "{url}: cannot open the port: {source}; is the adapter plugged in, is the name right, may this user open it, and is no \
-             other program using it?"
+        "{url}: cannot open the port: {source}; check that the adapter is plugged in, the name, the rights \
+         of this user, and that no other program uses the port"
     )]
     Port {
         /// The bus.
@@ -108,7 +108,9 @@ pub enum CanError {
         source: io::Error,
     },
     /// The connection has ended; the bus must be opened again.
-    #[error("{url}: the other side has ended the connection; open the bus again when it is back")]
+    #[error(
+        "{url}: the other side has closed the connection; open the bus again when the other side is available"
+    )]
     Closed {
         /// The bus.
         url: String,
@@ -160,7 +162,9 @@ pub enum AnswerError {
 
 /// Reason why a server could not listen.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot listen at {address}: {source}; is another server running there? Port 0 takes a free one")]
+#[error(
+    "cannot listen at {address}: {source}; another server may use this address. Port 0 selects a free port"
+)]
 pub struct ListenError {
     /// Requested address.
     pub address: String,

@@ -187,7 +187,7 @@ impl fmt::Debug for CanFrame {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidFrame {
     /// The value is too large for an 11-bit identifier.
-    #[error("identifier 0x{value:X} has more than 11 bits (0x7FF); is it an extended one?")]
+    #[error("identifier 0x{value:X} has more than 11 bits (0x7FF); it may be an extended identifier")]
     StandardId {
         /// The number.
         value: u32,

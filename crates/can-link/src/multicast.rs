@@ -38,7 +38,7 @@ impl MulticastBus {
         let (listener, sender) = open_sockets(group, port, ttl, Ipv4Addr::UNSPECIFIED)
             .or_else(|first| open_sockets(group, port, ttl, Ipv4Addr::LOCALHOST).map_err(|_| first))
             .map_err(failed)?;
-        let own = sender.local_addr().map_err(|source| failed(("asking for the own address", source)))?;
+        let own = sender.local_addr().map_err(|source| failed(("reading the own address", source)))?;
         let url = CanUrl::Multicast { group, port, ttl }.to_string();
         Ok(Self { url, listener, sender, own, timeout: None, ignored: 0 })
     }

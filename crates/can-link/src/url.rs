@@ -76,7 +76,7 @@ impl CanUrl {
 pub enum UrlError {
     /// The text has no scheme, or an unknown one.
     #[error(
-        "`{url}` is no CAN URL; there are socketcan:can0, slcan:/dev/ttyACM0@1000000, \
+        "`{url}` is not a valid CAN URL, expected socketcan:can0, slcan:/dev/ttyACM0@1000000, \
          socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME"
     )]
     Scheme {
@@ -104,7 +104,7 @@ impl FromStr for CanUrl {
         let wrong = |what, form| UrlError::Part { url: url.to_owned(), what, form };
         match scheme {
             "socketcan" => match rest {
-                "" => Err(wrong("no interface", "socketcan:can0")),
+                "" => Err(wrong("the interface is missing", "socketcan:can0")),
                 interface => Ok(Self::SocketCan { interface: interface.to_owned() }),
             },
             "slcan" => slcan(rest).map_err(|what| wrong(what, "slcan:/dev/ttyACM0@1000000")),
@@ -112,11 +112,12 @@ impl FromStr for CanUrl {
             "multicast" => multicast(rest).map_err(|what| {
                 wrong(
                     what,
-                    "multicast:239.74.163.2:43113 or multicast:[ff15::1]:43113, then ?ttl=1 if it may leave",
+                    "multicast:239.74.163.2:43113 or multicast:[ff15::1]:43113, then ?ttl=1 to send to the \
+                     local network",
                 )
             }),
             "virtual" => match rest {
-                "" => Err(wrong("no name", "virtual:NAME")),
+                "" => Err(wrong("the name is missing", "virtual:NAME")),
                 name => Ok(Self::Virtual { name: name.to_owned() }),
             },
             _ => Err(unknown()),
@@ -127,7 +128,7 @@ impl FromStr for CanUrl {
 fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
     let (rest, query) = rest.split_once('?').unwrap_or((rest, ""));
     let (device, rate) = match rest.rsplit_once('@') {
-        Some((device, rate)) => (device, Some(rate.parse().map_err(|_| "the rate is no number")?)),
+        Some((device, rate)) => (device, Some(rate.parse().map_err(|_| "the rate is not a number")?)),
         None => (rest, None),
     };
     if device.is_empty() {
@@ -136,9 +137,11 @@ fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
     let (mut data_rate, mut baud) = (None, SlcanOptions::BAUD);
     for setting in query.split('&').filter(|setting| !setting.is_empty()) {
         match setting.split_once('=') {
-            Some(("data", text)) => data_rate = Some(text.parse().map_err(|_| "the data rate is no number")?),
-            Some(("baud", text)) => baud = text.parse().map_err(|_| "the baud rate is no number")?,
-            _ => return Err("the settings are data and baud"),
+            Some(("data", text)) => {
+                data_rate = Some(text.parse().map_err(|_| "the data rate is not a number")?)
+            }
+            Some(("baud", text)) => baud = text.parse().map_err(|_| "the baud rate is not a number")?,
+            _ => return Err("unknown setting, expected data or baud"),
         }
     }
     if rate == Some(0) || data_rate == Some(0) || baud == 0 {
@@ -150,7 +153,7 @@ fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
 /// Splits a host or bracketed IPv6 address from its port, if it has one.
 fn host_and_port(text: &str, default: u16) -> Result<(&str, u16), &'static str> {
     let port = |text: &str| match text.parse() {
-        Ok(0) | Err(_) => Err("the port is none of 1..65535"),
+        Ok(0) | Err(_) => Err("the port is out of range (1..65535)"),
         Ok(port) => Ok(port),
     };
     if let Some(rest) = text.strip_prefix('[') {
@@ -158,7 +161,7 @@ fn host_and_port(text: &str, default: u16) -> Result<(&str, u16), &'static str> 
         return match rest.strip_prefix(':') {
             Some(text) => Ok((host, port(text)?)),
             None if rest.is_empty() => Ok((host, default)),
-            None => Err("something follows the bracket"),
+            None => Err("there is text after the closing bracket"),
         };
     }
     match text.split_once(':') {
@@ -169,13 +172,13 @@ fn host_and_port(text: &str, default: u16) -> Result<(&str, u16), &'static str> 
 }
 
 fn socketcand(rest: &str) -> Result<CanUrl, &'static str> {
-    let (address, channel) = rest.split_once('/').ok_or("no bus behind a slash")?;
+    let (address, channel) = rest.split_once('/').ok_or("the slash and the bus name are missing")?;
     let (host, port) = host_and_port(address, SOCKETCAND_PORT)?;
     if host.is_empty() {
-        return Err("no host");
+        return Err("the host is missing");
     }
     if channel.is_empty() {
-        return Err("no bus behind the slash");
+        return Err("the bus name after the slash is missing");
     }
     Ok(CanUrl::Socketcand { host: host.to_owned(), port, channel: channel.to_owned() })
 }
@@ -183,15 +186,15 @@ fn socketcand(rest: &str) -> Result<CanUrl, &'static str> {
 fn multicast(rest: &str) -> Result<CanUrl, &'static str> {
     let (address, ttl) = match rest.split_once('?') {
         Some((address, query)) => {
-            let ttl = query.strip_prefix("ttl=").ok_or("the only setting is ttl")?;
-            (address, ttl.parse().map_err(|_| "the ttl is none of 0..255")?)
+            let ttl = query.strip_prefix("ttl=").ok_or("unknown setting, expected ttl")?;
+            (address, ttl.parse().map_err(|_| "the ttl is out of range (0..255)")?)
         }
         None => (rest, 0),
     };
     let (host, port) = host_and_port(address, MULTICAST_PORT)?;
-    let group: IpAddr = host.parse().map_err(|_| "the group is no IP address")?;
+    let group: IpAddr = host.parse().map_err(|_| "the group is not an IP address")?;
     if !group.is_multicast() {
-        return Err("the address is none of multicast (224.0.0.0/4 or ff00::/8)");
+        return Err("the address is not a multicast address (224.0.0.0/4 or ff00::/8)");
     }
     Ok(CanUrl::Multicast { group, port, ttl })
 }
@@ -258,28 +261,28 @@ mod tests {
     #[test]
     fn other_texts_are_errors_that_name_the_cause() {
         for (url, part) in [
-            ("can0", "there are socketcan:can0"),
-            ("usb:can0", "there are socketcan:can0"),
-            ("socketcan:", "no interface"),
+            ("can0", "expected socketcan:can0"),
+            ("usb:can0", "expected socketcan:can0"),
+            ("socketcan:", "the interface is missing"),
             ("slcan:@5", "no serial port"),
-            ("slcan:/dev/x@fast", "the rate is no number"),
+            ("slcan:/dev/x@fast", "the rate is not a number"),
             ("slcan:/dev/x@0", "the rate is 0"),
             ("slcan:/dev/x@5?data=0", "the rate is 0"),
-            ("slcan:/dev/x@5?data=x", "the data rate is no number"),
-            ("slcan:/dev/x@5?baud", "the settings are data and baud"),
-            ("socketcand:host:1", "no bus"),
-            ("socketcand:host:1/", "no bus"),
-            ("socketcand::1/can0", "no host"),
+            ("slcan:/dev/x@5?data=x", "the data rate is not a number"),
+            ("slcan:/dev/x@5?baud", "unknown setting, expected data or baud"),
+            ("socketcand:host:1", "the bus name are missing"),
+            ("socketcand:host:1/", "the bus name after the slash"),
+            ("socketcand::1/can0", "the host is missing"),
             ("socketcand:host:0/can0", "the port"),
-            ("multicast:10.0.0.1:5", "none of multicast"),
-            ("multicast:nowhere:5", "no IP address"),
+            ("multicast:10.0.0.1:5", "not a multicast address"),
+            ("multicast:nowhere:5", "not an IP address"),
             ("multicast:ff15::1:5", "in brackets"),
             ("multicast:[ff15::1:5", "not closed"),
-            ("multicast:[ff15::1]5", "follows the bracket"),
+            ("multicast:[ff15::1]5", "after the closing bracket"),
             ("multicast:239.1.1.1:70000", "the port"),
-            ("multicast:239.1.1.1:5?hops=1", "the only setting is ttl"),
+            ("multicast:239.1.1.1:5?hops=1", "unknown setting, expected ttl"),
             ("multicast:239.1.1.1:5?ttl=256", "the ttl"),
-            ("virtual:", "no name"),
+            ("virtual:", "the name is missing"),
         ] {
             let message = url.parse::<CanUrl>().unwrap_err().to_string();
             assert!(message.contains(part) && message.contains(url), "{message}");

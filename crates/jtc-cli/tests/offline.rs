@@ -62,7 +62,7 @@ fn a_bus_that_cannot_carry_the_joints_is_refused() {
         output.err
     );
     let output = jtc(&["sim", "--bus", "can0"]).ends(2);
-    assert!(output.err.contains("is no CAN URL"), "{}", output.err);
+    assert!(output.err.contains("is not a valid CAN URL"), "{}", output.err);
 }
 
 #[test]

@@ -150,9 +150,10 @@ impl SlcanBus {
                 return Ok(());
             }
         }
-        let hint = "is it an SLCAN adapter, is its firmware the right one, and does the line have this rate (?baud=N)?";
+        let hint =
+            "check that the device is an SLCAN adapter, its firmware, and the rate of the line (?baud=N)";
         let seconds = VERSION_TIMEOUT.as_secs() * u64::from(VERSION_QUESTIONS);
-        Err(AnswerError::NoAnswer { url: self.url.clone(), step: "asking for the version", seconds, hint }
+        Err(AnswerError::NoAnswer { url: self.url.clone(), step: "the version request", seconds, hint }
             .into())
     }
 
@@ -169,7 +170,8 @@ impl SlcanBus {
         }
         if self.last_answer == Some(Answer::No) {
             let answer =
-                "the adapter answers with a bell: it does not know that, or does not do it now".to_owned();
+                "the adapter answered with a bell: it does not know this command, or cannot carry it out now"
+                    .to_owned();
             return Err(AnswerError::Refused { url: self.url.clone(), step, answer }.into());
         }
         Ok(())
@@ -267,8 +269,8 @@ impl SlcanBus {
         if frame.refused {
             if late {
                 self.outstanding = None;
-                let answer = "the adapter refused the frame for 2 s: its transmit queue is full; does anybody acknowledge \
-                              on the bus, and has the bus this bit rate?";
+                let answer = "the adapter refused the frame for 2 s because its transmit queue is full; \
+                              check that a node acknowledges, and the bit rate";
                 let (url, answer) = (self.url.clone(), answer.to_owned());
                 return Err(AnswerError::Refused { url, step: "sending", answer }.into());
             }
@@ -285,7 +287,7 @@ impl SlcanBus {
             return Ok(true);
         } else if late {
             self.outstanding = None;
-            let hint = "does anybody acknowledge on the bus? Unplug the adapter and try again";
+            let hint = "check that a node on the bus acknowledges; unplug the adapter and try again";
             let seconds = SEND_TIMEOUT.as_secs();
             let url = self.url.clone();
             return Err(AnswerError::NoAnswer { url, step: "sending a frame", seconds, hint }.into());

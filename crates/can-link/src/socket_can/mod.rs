@@ -74,15 +74,16 @@ fn hint(error: &io::Error, interface: &str) -> String {
     let up = format!("sudo ip link set {interface} up type can bitrate 1000000");
     match error.raw_os_error() {
         Some(EAFNOSUPPORT | EPROTONOSUPPORT) => {
-            "this kernel has no CAN: try `sudo modprobe -a can can_raw`; where that fails, use an slcan adapter, or \
+            "this kernel has no CAN: try `sudo modprobe -a can can_raw`; if that fails, use an slcan adapter, or \
              multicast:ADDR:PORT between programs of one computer"
                 .to_owned()
         }
         Some(ENODEV | ENXIO) => format!(
-            "there is no such CAN interface; `ip -brief link show type can` lists them; plug in the adapter, then `{up}`"
+            "this CAN interface does not exist; `ip -brief link show type can` lists the interfaces; plug \
+             in the adapter, then `{up}`"
         ),
         Some(ENETDOWN) => format!("the interface is down: `{up}`"),
-        Some(EPERM | EACCES) => "this user may not; see `id` and the rights of the container".to_owned(),
+        Some(EPERM | EACCES) => "this user has no permission; check `id` and the rights of the container".to_owned(),
         _ => format!("see `ip -details link show {interface}`"),
     }
 }
@@ -95,7 +96,8 @@ impl CanBus for SocketCanBus {
             Some(EINVAL) if frame.is_fd() => CanError::NotCarried {
                 url: self.url.clone(),
                 frame: *frame,
-                why: "the interface is a classic one; if its adapter has CAN FD, set it up with `dbitrate 5000000 fd on`",
+                why: "the interface is set up for classic CAN; if its adapter supports CAN FD, set it up \
+                      with `dbitrate 5000000 fd on`",
             },
             _ => self.failed("sending", source),
         })
@@ -166,7 +168,7 @@ mod tests {
             (EAFNOSUPPORT, "modprobe -a can can_raw"),
             (ENODEV, "ip link set can0 up type can bitrate 1000000"),
             (ENETDOWN, "is down: `sudo ip link set can0 up type can bitrate 1000000`"),
-            (EPERM, "may not"),
+            (EPERM, "no permission"),
             (EINVAL, "ip -details link show can0"),
         ] {
             let hint = hint(&io::Error::from_raw_os_error(number), "can0");

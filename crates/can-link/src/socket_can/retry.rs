@@ -22,8 +22,8 @@ pub(super) fn retry_while_full(
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) if is_full(&error) => {
                 if waited >= TIMEOUT {
-                    let cause = "the transmit queue has been full for 10 s: does anybody acknowledge on the bus, \
-                                 has it this bit rate, is it terminated?";
+                    let cause = "the transmit queue has been full for 10 s: check that a node acknowledges, \
+                                 the bit rate and the termination";
                     return Err(io::Error::new(io::ErrorKind::TimedOut, cause));
                 }
                 pause(PAUSE);

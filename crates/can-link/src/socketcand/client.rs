@@ -65,7 +65,7 @@ impl SocketcandBus {
         bus.set_up().map_err(bus.failed("setting the socket"))?;
         bus.expect("connecting", &Reply::Hi)?;
         bus.ask("opening the bus", &format!("< open {channel} >"))?;
-        bus.ask("raw mode", "< rawmode >")?;
+        bus.ask("setting raw mode", "< rawmode >")?;
         Ok(bus)
     }
 
@@ -102,7 +102,7 @@ impl SocketcandBus {
                 false => self.read(&mut buffer, Some(left))?,
             };
             let Some(count) = count else {
-                let hint = "is it a socketcand server, and does it still take clients?";
+                let hint = "check that a socketcand server runs there and accepts more clients";
                 let (url, seconds) = (self.url.clone(), TIMEOUT.as_secs());
                 return Err(AnswerError::NoAnswer { url, step, seconds, hint }.into());
             };

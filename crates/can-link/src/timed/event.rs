@@ -79,7 +79,7 @@ pub enum QueueError {
     #[error("the member is bus-off; its controller must recover first")]
     BusOff,
     /// The member's queue is full.
-    #[error("{0} frames of this member wait already; is the bus overloaded, or does nobody acknowledge?")]
+    #[error("{0} frames of this member are already waiting; the bus is overloaded, or no node acknowledges")]
     Full(usize),
     /// The member has left the bus.
     #[error("the member has left the bus")]

@@ -71,7 +71,7 @@ pub enum FaultError {
     #[error("{0}")]
     Form(String),
     /// The kind does not exist.
-    #[error("fault {fault}: there is no kind `{kind}`; kinds are {}", kinds().join(", "))]
+    #[error("fault {fault}: unknown kind `{kind}`, expected one of {}", kinds().join(", "))]
     Kind {
         /// Number in the file, from 1.
         fault: usize,
@@ -89,7 +89,7 @@ pub enum FaultError {
         key: &'static str,
     },
     /// A key that has no meaning for this kind.
-    #[error("fault {fault}: {key} means nothing for {kind}; remove it")]
+    #[error("fault {fault}: {key} has no effect for {kind}; remove the key")]
     Superfluous {
         /// Number in the file, from 1.
         fault: usize,
@@ -217,7 +217,7 @@ impl Entry {
             (_, None, Some(_)) => return Err(superfluous("on_count")),
         };
         if kind == FaultKind::SameNumber && board < 2 {
-            return Err(range("board", "2 to 31: it takes the number of the board before it"));
+            return Err(range("board", "2 to 31, because the board takes the number of the board before it"));
         }
         if matches!(kind, FaultKind::Crash | FaultKind::SameNumber) && self.for_s.is_some() {
             return Err(superfluous("for_s"));
@@ -266,23 +266,23 @@ mod tests {
     #[test]
     fn what_cannot_be_is_refused_with_its_place() {
         for (line, part) in [
-            ("fire board=1", "kinds are power-loss"),
+            ("fire board=1", "expected one of power-loss"),
             ("silent", "needs board"),
             ("silent board=32", "1 to 31"),
             ("lost", "needs share"),
             ("lost share=2", "0 to 1"),
-            ("lost share=0.1 board=1", "board means nothing"),
-            ("silent board=1 share=0.1", "share means nothing"),
-            ("wire-broken board=1 share=0.1", "share means nothing"),
-            ("same-number board=2 for_s=1", "for_s means nothing"),
+            ("lost share=0.1 board=1", "board has no effect"),
+            ("silent board=1 share=0.1", "share has no effect"),
+            ("wire-broken board=1 share=0.1", "share has no effect"),
+            ("same-number board=2 for_s=1", "for_s has no effect"),
             ("same-number board=1", "2 to 31"),
-            ("crash board=1 for_s=1", "for_s means nothing"),
+            ("crash board=1 for_s=1", "for_s has no effect"),
             ("silent board=1 at_s=-1", "seconds"),
-            ("silent board=1 at_s=1 on_id=1", "on_id means nothing"),
+            ("silent board=1 at_s=1 on_id=1", "on_id has no effect"),
             ("silent board=1 on_id=0x800", "identifier"),
-            ("silent board=1 on_count=2", "on_count means nothing"),
+            ("silent board=1 on_count=2", "on_count has no effect"),
             ("silent bord=1", "bord"),
-            ("", "kinds are"),
+            ("", "unknown kind"),
         ] {
             let text = Fault::from_line(line).unwrap_err().to_string();
             assert!(text.contains(part), "{line}: {text}");

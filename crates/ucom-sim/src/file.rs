@@ -58,13 +58,13 @@ pub enum ChainFileError {
     #[error("{0}")]
     Form(String),
     /// The chain has more boards than a bus has numbers.
-    #[error("{count} boards; a bus numbers at most {MOST_BOARDS}")]
+    #[error("the chain has {count} boards, expected at most {MOST_BOARDS}")]
     Boards {
         /// Number of boards.
         count: usize,
     },
     /// A board has no axis, or more axes than it has words for.
-    #[error("board {board}: {count} axes; a board has 1 to {MOST_AXES}")]
+    #[error("board {board}: {count} axes are out of range, expected 1 to {MOST_AXES}")]
     Axes {
         /// Position in the file, from 1.
         board: usize,
@@ -83,7 +83,7 @@ pub enum ChainFileError {
     },
     /// A description that the protocol cannot carry.
     #[error(
-        "board {board}: the description has {count} characters of at most 512, or some that Latin-1 does not have"
+        "board {board}: the description has {count} characters, expected at most 512 characters of Latin-1"
     )]
     Description {
         /// Position in the file, from 1.
@@ -234,7 +234,11 @@ impl Board {
                 source,
             })?;
         }
-        profile.check().map_err(|source| ChainFileError::Profile { board, key: "in all".into(), source })?;
+        profile.check().map_err(|source| ChainFileError::Profile {
+            board,
+            key: "combination".into(),
+            source,
+        })?;
         Ok(BoardConfig {
             flash_id: self.flash_id,
             description: self.description,
@@ -275,19 +279,22 @@ fn sound(axis: &AxisConfig) -> Result<(), &'static str> {
         axis.gravity_deg_s2,
     ];
     if figures.iter().any(|f| !f.is_finite() || f.abs() > 1e6) {
-        return Err("a figure is none, or above 1e6");
+        return Err("a value is not a number, or outside -1e6..1e6");
     }
     if axis.min_deg >= axis.max_deg || axis.min_deg < -327.0 || axis.max_deg > 327.0 {
-        return Err("min_deg must be below max_deg, both within -327..327: words of 0.01 deg hold no more");
+        return Err(
+            "min_deg must be below max_deg, and both within -327..327 (the range of a 16-bit word of 0.01 \
+             deg)",
+        );
     }
     if !(axis.min_deg..=axis.max_deg).contains(&axis.start_deg) {
         return Err("start_deg is not between min_deg and max_deg");
     }
     if axis.damping_per_s < 0.0 || axis.friction_deg_s2 < 0.0 {
-        return Err("damping_per_s and friction_deg_s2 cannot be negative");
+        return Err("damping_per_s and friction_deg_s2 must not be negative");
     }
     if axis.name.chars().any(|c| !c.is_ascii_alphanumeric() && c != '_') || axis.name.len() > 32 {
-        return Err("name must be at most 32 letters, digits and _");
+        return Err("name must have at most 32 characters: letters, digits and _");
     }
     Ok(())
 }
@@ -333,7 +340,7 @@ mod tests {
         let axis = |text: &str| refused(&format!("[[board]]\nflash_id = 1\naxis = [{{{text}}}]"));
         assert!(axis("min_deg = 5, max_deg = 3").contains("below max_deg"));
         assert!(axis("start_deg = 100").contains("between"));
-        assert!(axis("damping_per_s = nan").contains("none"));
+        assert!(axis("damping_per_s = nan").contains("not a number"));
         assert!(axis("name = 'a b'").contains("letters"));
         assert!(refused("[[board]]\nflash_id = 1\n[board.profile]\nendan = 'big'").contains("endan"));
         assert!(refused("[[board]]\nflash_id = 1\ndescription = '語'").contains("Latin-1"));

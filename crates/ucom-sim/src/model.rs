@@ -93,7 +93,7 @@ impl Model {
             if beyond && !self.limited[i] {
                 let name = if axis.config().name.is_empty() { "axis" } else { &axis.config().name };
                 reported =
-                    Some(format!("{name}: set point {:.2} deg is beyond its limit", command.set_position));
+                    Some(format!("{name}: set point {:.2} deg is outside its limits", command.set_position));
             }
             self.limited[i] = beyond;
         }

@@ -191,7 +191,8 @@ impl<'a> ChainServer<'a> {
                 let time_s = event.at_ns as f64 * 1e-9;
                 let id = frame.id();
                 (self.note)(format!(
-                    "{time_s:.3} s: two members send {id} at once with different data; both are destroyed (D-05)"
+                    "{time_s:.3} s: two members sent {id} at the same time with different data; both frames \
+                     were destroyed (D-05)"
                 ));
             }
             BusEvent::State { member, state } => self.is_in_state(*member, state.errors, event.at_ns),
@@ -226,11 +227,11 @@ impl<'a> ChainServer<'a> {
         let client = self.client_of(member).map(|client| client.to_string());
         let who = match self.inside.iter().position(|m| *m == member) {
             Some(i) => format!("the board at position {}", i + 1),
-            None => client.unwrap_or_else(|| "a client that has gone".into()),
+            None => client.unwrap_or_else(|| "a client that has disconnected".into()),
         };
         let time_s = at_ns as f64 * 1e-9;
         (self.note)(format!(
-            "{time_s:.3} s: {who} is bus-off; its controller is back after 128 times 11 recessive bits"
+            "{time_s:.3} s: {who} is bus-off; its controller recovers after 128 times 11 recessive bits"
         ));
     }
 
@@ -263,7 +264,7 @@ impl<'a> ChainServer<'a> {
                 self.chain.inject(fault);
                 (self.note)(format!("fault: {line}"));
             }
-            Err(e) => (self.note)(format!("{e}; ucom help faults lists them")),
+            Err(e) => (self.note)(format!("{e}; ucom help faults lists the faults")),
         }
     }
 }

@@ -26,8 +26,8 @@ impl fmt::Display for Foreign {
             Self::Remote => f.write_str("remote frame"),
             Self::Fd => f.write_str("CAN FD frame"),
             Self::Bit5 => f.write_str("bit 5 of the identifier is set"),
-            Self::NoFunction(number) => write!(f, "there is no function {number}"),
-            Self::Malformed => f.write_str("identifier or data longer than classic CAN has"),
+            Self::NoFunction(number) => write!(f, "unknown function {number}"),
+            Self::Malformed => f.write_str("identifier or data too long for classic CAN"),
         }
     }
 }

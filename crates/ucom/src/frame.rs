@@ -232,8 +232,8 @@ mod tests {
             (Foreign::Extended, "29-bit identifier"),
             (Foreign::Fd, "CAN FD frame"),
             (Foreign::Bit5, "bit 5 of the identifier is set"),
-            (Foreign::NoFunction(28), "there is no function 28"),
-            (Foreign::Malformed, "identifier or data longer than classic CAN has"),
+            (Foreign::NoFunction(28), "unknown function 28"),
+            (Foreign::Malformed, "identifier or data too long for classic CAN"),
         ] {
             assert_eq!(error.to_string(), text);
         }

@@ -76,8 +76,8 @@ impl fmt::Display for HeaderError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Magic(word) => write!(f, "header starts with {word:04X}, not 5543"),
-            Self::Version(word) => write!(f, "header version {word}, only 1 is known"),
-            Self::Sum(word) => write!(f, "the words of the header add up to {word:04X}, not 0"),
+            Self::Version(word) => write!(f, "header version {word} is unknown, expected 1"),
+            Self::Sum(word) => write!(f, "the sum of the header's words is {word:04X}, expected 0"),
         }
     }
 }
@@ -188,8 +188,8 @@ mod tests {
     fn errors_in_words() {
         for (error, text) in [
             (HeaderError::Magic(0x4355), "header starts with 4355, not 5543"),
-            (HeaderError::Version(2), "header version 2, only 1 is known"),
-            (HeaderError::Sum(0x10), "the words of the header add up to 0010, not 0"),
+            (HeaderError::Version(2), "header version 2 is unknown, expected 1"),
+            (HeaderError::Sum(0x10), "the sum of the header's words is 0010, expected 0"),
         ] {
             assert_eq!(std::format!("{error}"), text);
         }

@@ -66,11 +66,11 @@ impl Status {
         if self.has(Self::EXLRUN) == self.has(Self::MSTART) {
             Some("EXLRUN must be the opposite of MSTART")
         } else if self.has(Self::MCARUN) && !self.has(Self::MSTART) {
-            Some("MCARUN without MSTART")
+            Some("MCARUN is set without MSTART")
         } else if !self.has(Self::INIT) && (self.has(Self::MSTART) || self.has(Self::OPINIT)) {
-            Some("MSTART or OPINIT without INIT")
+            Some("MSTART or OPINIT is set without INIT")
         } else if self.has(Self::PROG) && !self.has(Self::EXLRUN) {
-            Some("PROG without EXLRUN")
+            Some("PROG is set without EXLRUN")
         } else {
             None
         }

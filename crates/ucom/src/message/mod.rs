@@ -55,12 +55,12 @@ impl fmt::Display for DecodeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Foreign(foreign) => write!(f, "{foreign}"),
-            Self::Direction(function) => write!(f, "{function} of the other side"),
+            Self::Direction(function) => write!(f, "{function} is not sent in this direction"),
             Self::TooShort { function, len, need } => {
-                write!(f, "{function} with {len} of at least {need} bytes")
+                write!(f, "{function} has {len} bytes, expected at least {need}")
             }
             Self::Length { function, len } => write!(f, "{function} cannot have {len} bytes"),
-            Self::Value(function) => write!(f, "{function} with a flag that is neither 0 nor 1"),
+            Self::Value(function) => write!(f, "{function} has a flag that is neither 0 nor 1"),
         }
     }
 }

@@ -135,10 +135,13 @@ fn errors_in_words() {
     let function = Function::SetStatus;
     for (error, text) in [
         (DecodeError::Foreign(crate::foreign::Foreign::Remote), "remote frame"),
-        (DecodeError::Direction(function), "PC_SETSTATUS of the other side"),
-        (DecodeError::TooShort { function, len: 1, need: 2 }, "PC_SETSTATUS with 1 of at least 2 bytes"),
+        (DecodeError::Direction(function), "PC_SETSTATUS is not sent in this direction"),
+        (
+            DecodeError::TooShort { function, len: 1, need: 2 },
+            "PC_SETSTATUS has 1 bytes, expected at least 2",
+        ),
         (DecodeError::Length { function, len: 3 }, "PC_SETSTATUS cannot have 3 bytes"),
-        (DecodeError::Value(function), "PC_SETSTATUS with a flag that is neither 0 nor 1"),
+        (DecodeError::Value(function), "PC_SETSTATUS has a flag that is neither 0 nor 1"),
     ] {
         assert_eq!(std::format!("{error}"), text);
     }

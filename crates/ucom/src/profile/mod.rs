@@ -26,7 +26,7 @@ pub enum ProfileError {
 impl core::fmt::Display for ProfileError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::UnknownKey => f.write_str("no such key"),
+            Self::UnknownKey => f.write_str("unknown key"),
             Self::Value(key) => write!(f, "{} must be {}", key.name, key.range),
             Self::Contradiction(why) => f.write_str(why),
         }
@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(profile, Profile::default());
         assert_eq!(profile.set("prog.chksum", "crc16"), Err(ProfileError::UnknownKey));
         assert_ne!(KEYS[0], KEYS[1]);
-        assert_eq!(ProfileError::UnknownKey.to_string(), "no such key");
+        assert_eq!(ProfileError::UnknownKey.to_string(), "unknown key");
         let refused = profile.set("addr.first", "2").unwrap_err();
         assert_eq!(refused.to_string(), "addr.first must be 0 or 1");
         assert_eq!(std::format!("{refused:?}"), "Value(addr.first)");

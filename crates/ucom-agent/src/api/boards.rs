@@ -19,8 +19,8 @@ pub(super) fn unknown(number: u8) -> Problem {
 pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Problem> {
     match boards.into_iter().find(|board| *board > 31) {
         Some(board) => {
-            let message = format!("{board} is no number of a board: they are 0 to 31");
-            Err(Problem::new("board", message, "GET /api/boards lists what there is")
+            let message = format!("board number {board} is out of range (0 to 31)");
+            Err(Problem::new("board", message, "GET /api/boards lists the boards")
                 .kind(host_kit::ErrorKind::Usage))
         }
         None => Ok(()),
@@ -89,9 +89,14 @@ pub(super) async fn values(
     if snapshot.competing_us.is_some() {
         // Even questions could mix with those of the other PC.
         let message = format!(
-            "the names of board {number} are not known, and another PC commands on this bus: it is not asked"
+            "the names of board {number} are not known, and the agent cannot request them while another PC \
+             is master of this bus"
         );
-        return Err(Problem::new("competing-master", message, "end the other program, or ask it"));
+        return Err(Problem::new(
+            "competing-master",
+            message,
+            "end the other program, or read the values there",
+        ));
     }
     let asked = agent.shared.call(None, move |worker| {
         let known = worker.known_to_viewers(number)?;

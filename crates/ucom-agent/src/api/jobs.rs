@@ -110,7 +110,7 @@ pub(super) async fn init(
         let Outcome::Init(report) = outcome? else { return Err(SessionError::NoBoards) };
         let findings = texts(&report.findings);
         let error = report.failure().map(|kind| {
-            Problem::new("init", findings.join("; "), "POST /api/doctor looks for the reason").kind(kind)
+            Problem::new("init", findings.join("; "), "find the cause with POST /api/doctor").kind(kind)
         });
         Ok((Done::Chain(report.boards, findings), error))
     })
@@ -300,6 +300,6 @@ pub(super) async fn cancel(
     if agent.shared.cancel_job(number) {
         return Ok(StatusCode::NO_CONTENT);
     }
-    let message = format!("job {number} does not go on");
-    Err(Problem::new("over", message, "GET /api/jobs shows how each ended").kind(ErrorKind::Refused))
+    let message = format!("job {number} has already ended");
+    Err(Problem::new("over", message, "GET /api/jobs shows the result of each job").kind(ErrorKind::Refused))
 }

@@ -138,8 +138,9 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
         if leases.holds(client.id, now) && agent.shared.moves_for(client.id) {
             return Err(Problem::new(
                 "busy",
-                "something goes on for this client that may move boards: nobody would command them",
-                "wait until it is over, or cancel it with DELETE /api/jobs/NUMBER",
+                "a job of this client may still move boards, and without the lease no client could control \
+                 them",
+                "wait until the job has ended, or cancel it with DELETE /api/jobs/NUMBER",
             ));
         }
         leases.release(asker.key().unwrap_or_default(), now);

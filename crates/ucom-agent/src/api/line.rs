@@ -34,6 +34,6 @@ impl Line {
 
 impl Drop for Line {
     fn drop(&mut self) {
-        self.write(Some("who had asked for it was gone before its turn came"));
+        self.write(Some("the client disconnected before the agent carried out its request"));
     }
 }

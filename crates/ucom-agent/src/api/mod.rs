@@ -248,8 +248,8 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
         None => agent.gate.note_repeated("halt", asker.caller.peer, facts),
     }
     if let Some(lost) = lost {
-        let message = format!("{lost}: nothing was sent; boards that run become safe without heartbeats");
-        return Err(Problem::new("no-link", message, "cut the power of the outputs, if anything moves")
+        let message = format!("{lost}: nothing was sent; running boards become safe without heartbeats");
+        return Err(Problem::new("no-link", message, "cut the power of the outputs if a board still moves")
             .kind(host_kit::ErrorKind::NoLink));
     }
     let last_event = agent.shared.journal.last();

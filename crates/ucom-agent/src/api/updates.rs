@@ -107,7 +107,7 @@ fn usage(message: impl Into<String>, next: &'static str) -> Problem {
 fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
     let bytes = STANDARD
         .decode(text)
-        .map_err(|e| usage(format!("the image is no base64: {e}"), "encode the file as base64"))?;
+        .map_err(|e| usage(format!("the image is not valid base64: {e}"), "encode the file as base64"))?;
     let format = request.format.map(|format| match format {
         ImageFormat::Bin => Format::Bin,
         ImageFormat::Hex => Format::IntelHex,
@@ -127,15 +127,15 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
-        ImageAdvice::FillGaps => "fill_gaps fills them with FF, if the board may get FF there",
+        ImageAdvice::FillGaps => "if the board may get FF there, fill the gap with fill_gaps",
         ImageAdvice::OtherUnit(AddressUnit::Byte) => {
-            "addresses byte if the tool chain counts bytes, fill_gaps if the gap is meant"
+            "set addresses to byte if the tool chain counts bytes, or set fill_gaps if the gap is intended"
         }
         ImageAdvice::OtherUnit(AddressUnit::Word) => {
-            "addresses word if the tool chain counts words, fill_gaps if the gap is meant"
+            "set addresses to word if the tool chain counts words, or set fill_gaps if the gap is intended"
         }
         ImageAdvice::MakeAgain | ImageAdvice::NameRaw | ImageAdvice::Rename | ImageAdvice::Addresses => {
-            "make the file again with the tool chain; forms are hex, srec and bin"
+            "make the file again with the tool chain; valid formats are hex, srec and bin"
         }
     }
 }
@@ -144,8 +144,8 @@ fn advice(error: &ImageError) -> &'static str {
 fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Problem> {
     let wrong = |text: &str| {
         usage(
-            format!("{text}: no day of the form YYYY-MM-DD that boards can keep"),
-            "leave date out for today",
+            format!("{text} is not a valid date, expected a date YYYY-MM-DD that boards can store"),
+            "omit date to use today's date",
         )
     };
     let date = match asked {
@@ -168,7 +168,10 @@ fn parsed(text: &str) -> Option<Date> {
 
 fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, Problem> {
     if request.boards.is_empty() {
-        return Err(usage("no board is named", "boards lists them, each with its number"));
+        return Err(usage(
+            "no board is selected",
+            "list the boards in the field boards, each with its number",
+        ));
     }
     numbers(request.boards.iter().map(|target| target.board))?;
     let target = |t: &TargetRequest| UpdateTarget { board: t.board, flash_number: t.flash_number };
@@ -222,7 +225,7 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
     let code = if cancelled { "cancelled" } else { "update" };
     let (message, next) = match texts.is_empty() {
         true => report.unproven(),
-        false => (texts.join("; "), "the job's update has what became of each board"),
+        false => (texts.join("; "), "the field update of the job shows the result of each board"),
     };
     let facts = Facts { board, ..Facts::default() };
     Some(Problem::new(code, message, next).kind(kind).with(facts))

@@ -59,13 +59,18 @@ impl Shared {
         if let Some(job) = place.tags().find_map(|tag| tag.job) {
             return Err(Problem::new(
                 "busy",
-                format!("job {job} is going on: one thing at a time"),
-                "wait until it is over; a Stop is taken meanwhile, and DELETE /api/jobs/NUMBER cancels it",
+                format!("job {job} is still running, and the agent runs one job at a time"),
+                "wait until the job has ended; a Stop is always accepted, and DELETE /api/jobs/NUMBER \
+                 cancels the job",
             ));
         }
         let most = if is_question { QUESTIONS_MAX } else { WAITING_MAX };
         if place.waiting(|kind| (kind == Kind::Question) == is_question) >= most {
-            return Err(Problem::new("busy", "too much is asked at once", "ask again in a moment"));
+            return Err(Problem::new(
+                "busy",
+                "too many requests are waiting",
+                "repeat the request after a moment",
+            ));
         }
         Ok(place)
     }
@@ -116,7 +121,11 @@ impl Shared {
                 true => {
                     // Before its client learns of it.
                     own.queue.done();
-                    Err(Problem::new("busy", "its turn did not come in time: it is not done", "ask again"))
+                    Err(Problem::new(
+                        "busy",
+                        "the request waited too long and was not carried out",
+                        "repeat the request",
+                    ))
                 }
                 false => Ok(worker),
             });
@@ -177,19 +186,20 @@ impl Shared {
 
 /// Returns the problem for a fault of the agent itself.
 pub(crate) fn fault() -> Problem {
-    Problem::new("fault", "the agent has a fault", "look at what the agent printed").kind(ErrorKind::Fault)
+    Problem::new("fault", "the agent has an internal error", "read the output of the agent")
+        .kind(ErrorKind::Fault)
 }
 
 /// Returns the problem for a cancelled request.
 pub(super) fn cancelled() -> Problem {
-    Problem::new(CANCELLED, "it was cancelled", "ask for it again")
+    Problem::new(CANCELLED, "the request was cancelled", "repeat the request")
 }
 
 fn gone() -> Problem {
     Problem::new(
         "gone",
-        "the bus is gone, or the agent ends",
-        "GET /api/status shows whether the bus is there",
+        "the bus is lost, or the agent is shutting down",
+        "GET /api/status shows if the bus is available",
     )
     .kind(ErrorKind::NoLink)
 }

@@ -191,7 +191,7 @@ impl Shared {
             && client.policy == Policy::Stop
             && (self.runs.load(Ordering::Relaxed) || self.moves_for(client.id))
         {
-            self.halt(&format!("the policy of {}, who has gone,", client.name), None);
+            self.halt(&format!("the policy of the disconnected client {}", client.name), None);
         }
         (leases, now)
     }
@@ -229,8 +229,8 @@ impl Shared {
     pub(super) fn too_late(&self, asked: Asked) -> Option<Problem> {
         let may = !asked.moves || lock(&self.leases).holds(asked.client, self.now());
         (!may).then(|| {
-            let message = "its client commanded no more when its turn came: it is not done";
-            Problem::new("late", message, "take the lease again, and ask again")
+            let message = "the request was not carried out, because its client had lost the lease";
+            Problem::new("late", message, "take the lease again and repeat the request")
         })
     }
 
@@ -269,6 +269,6 @@ impl Shared {
 }
 
 fn stopped(by: &str) -> Problem {
-    let message = format!("{by} has stopped the boards: what was asked for before that is not done");
-    Problem::new(STOPPED, message, "wait three seconds, and ask again when the boards may move")
+    let message = format!("{by} has stopped the boards: requests from before the Stop are not carried out");
+    Problem::new(STOPPED, message, "wait three seconds, and repeat the request when the boards may move")
 }

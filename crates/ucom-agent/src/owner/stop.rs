@@ -31,7 +31,9 @@ impl Worker {
                 let failed: BTreeSet<u8> = stopped.failed.iter().map(|(board, _)| *board).collect();
                 let rest =
                     wanted.iter().filter(|board| !confirmed.contains(board) && !failed.contains(board));
-                not_stopped.extend(rest.map(|board| format!("board {board}: it was not asked")));
+                not_stopped.extend(
+                    rest.map(|board| format!("board {board}: the board was not asked to confirm the Stop")),
+                );
             }
             Err(error) => not_stopped.push(error.to_string()),
         }

@@ -141,7 +141,7 @@ def test_d62_what_nobody_has_written_here_is_not_verified(numbered: ucom.Simulat
         accepted = chain.update(image, 1, unverified=True)
         assert (accepted.boards[0].outcome, accepted.verified) == ("program-up-to-date", False)
         assert chain.update(image, 1, rewrite=True).boards[0].outcome == "verified"
-        with pytest.raises(errors.UsageError, match="its characters are no program"):
+        with pytest.raises(errors.UsageError, match="these characters are not a program"):
             chain.update(b":00000001FF\n", 1, raw=True)
 
 

@@ -104,7 +104,7 @@ def test_outputs_that_are_enabled_before_one_fails_are_named(
         chain.init()
         chain.run()
         begun = silent(sim, 2)
-        with pytest.raises(errors.NoLinkError, match="changed already: board 1") as failed:
+        with pytest.raises(errors.NoLinkError, match="already changed: board 1") as failed:
             chain.outputs(True)
         assert failed.value.board == 2 and bus.came(ADMIN_TO + 1, ACTIVE) and not bus.came(ADMIN_TO + 3, ACTIVE)
         time.sleep(max(0.0, begun + SILENT_S - time.monotonic()) + 0.2)

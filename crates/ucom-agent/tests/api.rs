@@ -121,7 +121,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     for (name, given, status, part) in [
         ("set_positon", json!(1), 422, "set_position"),
         ("set_position", json!(99999), 409, "set_position"),
-        ("set_position", json!("warm"), 422, "no value"),
+        ("set_position", json!("warm"), 422, "not a value"),
     ] {
         let request = format!("PUT /api/boards/1/inputs/{name}");
         let (got, error) = served.api(&request, Some(&key), Some(json!({ "value": given })));
@@ -263,7 +263,7 @@ fn d08_with_another_master_on_the_bus_commands_are_refused() {
     let mut peer = other.chain.peer();
     let job = other.job("POST /api/doctor", &theirs, None);
     let found = job["findings"].to_string();
-    assert!(found.contains("another PC talks on this bus"), "{job}");
+    assert!(found.contains("another PC sends on this bus"), "{job}");
     while let Some(frame) = peer.receive(Duration::ZERO).expect("the bus is there") {
         assert!([0x680, 0x21F].contains(&frame.id().value()), "{frame:?}");
     }

@@ -39,8 +39,9 @@ impl LinkArgs {
     /// Returns the URL of the bus.
     pub fn url(&self) -> Result<&str, Failure> {
         self.bus.as_deref().ok_or_else(|| {
-            Failure::usage("which bus? there is neither --bus URL nor UCOM_BUS")
-                .next("as --bus socketcan:can0; ucom sim makes a simulated one and prints its URL")
+            Failure::usage("no bus is selected: neither --bus URL nor UCOM_BUS is given").next(
+                "give a bus, such as --bus socketcan:can0; ucom sim makes a simulated bus and prints its URL",
+            )
         })
     }
 

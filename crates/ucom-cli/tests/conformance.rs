@@ -49,7 +49,10 @@ fn running_loops_are_stopped_first() {
     sim.peer().wait("381#");
     let output = sim.json(&["conformance", "1", "--run", "--force"], 4);
     assert_eq!(output["error"]["code"], "running", "{output}");
-    assert_eq!(output["error"]["hint"], "`ucom stop all` first; --force does not cover this", "{output}");
+    assert_eq!(
+        output["error"]["hint"], "`ucom stop all` first; --force does not override this check",
+        "{output}"
+    );
     ended_by(run, "-INT").ends(0);
 }
 

@@ -90,7 +90,7 @@ fn count_records_and_gaps() {
         sim.ucom(&[&["update", "1", &file, "--flash-id", "0x21", "--dry-run"], more].concat()).ends(code).err
     };
     let output = dry("count.s19", format!("{data}S5030001FB\n"), &[], 0);
-    assert!(output.contains("the count record shows that all 1 data records are there"), "{output}");
+    assert!(output.contains("the count record confirms all 1 data records"), "{output}");
     let output = dry("wrong.s19", format!("{data}S5030002FA\n"), &[], 2);
     assert!(output.contains("line 2") && output.contains("make the file again"), "{output}");
     let hole = ":0400000001020304F2\n:0400100001020304E2\n:00000001FF\n";
@@ -127,7 +127,7 @@ fn s_records_count_words_or_bytes() {
     assert!(output.contains("64 bytes from word 0x40, addresses in words"), "{output}");
     let output = update("bytes.s19", file(16, 4), &[], 0);
     assert!(output.contains("64 bytes from word 0x20, addresses in bytes"), "{output}");
-    assert!(output.contains("only so the records follow each other"), "{output}");
+    assert!(output.contains("because only then the records are contiguous"), "{output}");
     // Two records may have an intended gap between them.
     peer.all(100);
     let output = update("two.s19", file(16, 2), &[], 2);
@@ -136,5 +136,5 @@ fn s_records_count_words_or_bytes() {
     let output = update("two.s19", file(16, 2), &["--addresses", "byte"], 0);
     assert!(output.contains("32 bytes from word 0x20, addresses in bytes"), "{output}");
     let output = update("bytes.s19", file(16, 4), &["--addresses", "word"], 2);
-    assert!(output.contains("are in no record"), "{output}");
+    assert!(output.contains("no record contains the"), "{output}");
 }

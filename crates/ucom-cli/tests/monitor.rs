@@ -30,7 +30,7 @@ fn the_view_shows_boards_and_its_stop_key_stops() {
         let mut peer = sim.peer();
         terminal.press("s");
         peer.wait("600#00000000");
-        terminal.until_it_shows("stop sent to all boards");
+        terminal.until_it_shows("Stop sent to all boards");
         terminal.press("q");
         assert_eq!(terminal.ends(&mut child), 0);
         assert!(terminal.is_as_before());

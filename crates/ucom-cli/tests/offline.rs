@@ -163,7 +163,7 @@ fn a_recording_that_is_cut_off_is_decoded_up_to_there() {
     let output = ucom(&["--json", "decode", file.to_str().unwrap()]).ends(0);
     assert_eq!(output.out.lines().count(), 2, "{}", output.out);
     assert!(
-        output.err.contains("line 3") && output.err.contains("the 2 frames before are whole"),
+        output.err.contains("line 3") && output.err.contains("the 2 frames before this point are complete"),
         "{}",
         output.err
     );

@@ -37,7 +37,7 @@ fn d11_values_have_the_units_of_the_signal_table() {
     // Without the table this value would be the word 61, which is 0.61 degrees.
     let bare = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
     let message = bare["error"]["message"].as_str().unwrap();
-    assert!(message.contains("the unit is missing: `61deg`"), "{bare}");
+    assert!(message.contains("the unit is missing: give `61deg`"), "{bare}");
     let io = ucom(&["io", "1"]).ends(0);
     assert!(io.err.contains("has no SO `nobody`"), "{}", io.err);
     let io = io.json();
@@ -57,7 +57,7 @@ fn d11_values_have_the_units_of_the_signal_table() {
     // This signal has a scale and no unit. A bare number is refused, because without the table it would be the raw
     // word.
     let output = ucom(&["par", "1", "min_position=2"]).ends(4).json();
-    assert!(output["error"]["message"].as_str().unwrap().contains("names no unit"), "{output}");
+    assert!(output["error"]["message"].as_str().unwrap().contains("but no unit for this signal"), "{output}");
     ucom(&["par", "1", "min_position=0x0004"]).ends(0);
     // A number that would wrap is refused like any other value.
     assert!(sim.ucom(&["ci", "1", "set_position=40000"]).ends(4).err.contains("outside -32768..32767"));
@@ -81,7 +81,10 @@ fn d11_a_table_without_the_program_refuses_bare_numbers() {
         [["ci", "1", "set_position=15"], ["par", "1", "kp=12"], ["run", "1", "--ci=1.set_position=15"]]
     {
         let output = ucom(&words).ends(4).err;
-        assert!(output.contains("it knows nothing of program 0x") && output.contains("0x0000"), "{output}");
+        assert!(
+            output.contains("the table does not contain program 0x") && output.contains("0x0000"),
+            "{output}"
+        );
     }
     let file = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      kp: 12\n";
     let output = ucom(&["par", "--apply", &sim.file("bare.yaml", file.as_bytes())]).ends(4).err;
@@ -143,7 +146,7 @@ fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     let output = sim.json(&["par", "all", "kp=3"], 5);
     let message = output["error"]["message"].as_str().unwrap_or_default();
     assert!(message.contains("board 2") && message.contains("unknown"), "{output}");
-    assert!(message.contains("written before: board 1"), "{output}");
+    assert!(message.contains("already written: board 1"), "{output}");
 }
 
 /// D-35: values that were written earlier are remembered, and never shown as the current ones.
@@ -176,7 +179,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 10..]);
     let output = apply(&of_second("kq: 1")).ends(4);
     assert!(
-        output.err.contains("bad.yaml: line 21") && output.err.contains("there is `kp [mA/deg]`"),
+        output.err.contains("bad.yaml: line 21") && output.err.contains("similar: `kp [mA/deg]`"),
         "{}",
         output.err
     );
@@ -185,17 +188,22 @@ fn a_file_is_applied_whole_or_not_at_all() {
         apply(&good.replace("0x0022", "0x0055"))
             .ends(4)
             .err
-            .contains("flash number is 0x0022, the file is for 0x0055")
+            .contains("flash number is 0x0022, but the file is for 0x0055")
     );
     let program = good.find("program_id: 0x").unwrap() + 14;
     let other = format!("{}0001{}", &good[..program], &good[program + 4..]);
     assert!(apply(&other).ends(4).err.contains("belong to 0x0001"));
-    assert!(apply(&good.replace("board: 2", "board: 7")).ends(4).err.contains("board 7: it does not answer"));
+    assert!(
+        apply(&good.replace("board: 2", "board: 7"))
+            .ends(4)
+            .err
+            .contains("board 7: the board does not answer")
+    );
     assert!(apply(&of_second("kp: [1")).ends(2).err.contains("line"));
     assert!(apply(&of_second("kp: x")).ends(2).err.contains("board 2, `kp`"));
     // Without quotation marks, a signal selected by its number is a comment.
     let empty = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      #0: 5\n";
-    assert!(apply(empty).ends(2).err.contains("no value in it"));
+    assert!(apply(empty).ends(2).err.contains("the file contains no value"));
     sim.ucom(&["par", "3", "--apply", &file]).ends(2);
     sim.ucom(&["par", "1", "kp=1", "--apply", &file]).ends(2);
     sim.ucom(&["par", "1", "--dry-run"]).ends(2);

@@ -117,9 +117,9 @@ fn what_an_agent_has_started_is_stopped_with_it() {
 #[test]
 fn what_does_not_go_together_is_refused_before_anything_is_opened() {
     for (words, part) in [
-        (&["--sim", "--bus", "socketcand:127.0.0.1:1/can0"][..], "owns one of them"),
-        (&["--bus", "x", "--boards", "2"], "simulated boards"),
-        (&[], "which bus?"),
+        (&["--sim", "--bus", "socketcand:127.0.0.1:1/can0"][..], "cannot be used together"),
+        (&["--bus", "x", "--boards", "2"], "--boards needs --sim"),
+        (&[], "no bus is selected"),
     ] {
         let refused = common::ucom(&[&["serve", "--listen", "127.0.0.1:0"], words].concat()).ends(2);
         assert!(refused.err.contains(part), "{words:?}: {}", refused.err);

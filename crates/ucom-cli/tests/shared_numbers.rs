@@ -53,7 +53,7 @@ fn d24_every_command_names_it_and_changes_nothing() {
     }
     let doctor = sim.ucom(&["doctor"]).ends(1).out;
     assert!(
-        doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire behind"),
+        doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire after"),
         "{doctor}"
     );
     // After `init` has given new numbers, the commands succeed.
@@ -70,7 +70,7 @@ fn d24_stop_stops_both_and_says_so() {
         let output = sim.ucom(&words).ends(0);
         assert_eq!(output.json()["shared_numbers"][0]["board"], 1, "{words:?}");
         assert_eq!(output.json()["shared_numbers"][0]["flash_numbers"], serde_json::json!([0x21, 0x42]));
-        assert!(output.err.contains("both were commanded to stop"), "{}", output.err);
+        assert!(output.err.contains("both boards received the Stop"), "{}", output.err);
         let all = peer.all(50);
         let first = all.iter().find(|f| !f.starts_with("680"));
         assert!(first.is_some_and(|f| f.starts_with("60") && f.ends_with("#00000000")), "{all:?}");

@@ -11,12 +11,12 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     let sim = Sim::start(&["--boards", "2"]);
     let file = sim.path("silent.log");
     let output = sim.ucom(&["record", &file, "--for", "4"]).ends(0);
-    assert_eq!(output.err.matches("nothing has come from the bus yet").count(), 1, "{}", output.err);
+    assert_eq!(output.err.matches("no frame was received yet").count(), 1, "{}", output.err);
     assert!(output.err.contains("ucom doctor"), "{}", output.err);
     let piped = sim.ucom(&["record", "-", "--for", "3"]).ends(0);
-    assert!(piped.out.is_empty() && piped.err.contains("nothing has come"), "{}", piped.err);
+    assert!(piped.out.is_empty() && piped.err.contains("no frame was received"), "{}", piped.err);
     let program = sim.ucom(&["--json", "record", &file, "--for", "3", "--overwrite"]).ends(0);
-    assert!(!program.err.contains("nothing has come"), "{}", program.err);
+    assert!(!program.err.contains("no frame was received"), "{}", program.err);
     let mut peer = sim.peer();
     let child = sim.spawn(&["record", &file, "--count", "1", "--overwrite"]);
     let recorded = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
@@ -31,7 +31,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     let output = ended(child).ends(0);
     recorded.store(true, std::sync::atomic::Ordering::Relaxed);
     ask.join().unwrap();
-    assert!(!output.err.contains("nothing has come"), "{}", output.err);
+    assert!(!output.err.contains("no frame was received"), "{}", output.err);
 }
 
 /// Each board without names is reported with the cause and the next command.

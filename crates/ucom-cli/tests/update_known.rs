@@ -112,7 +112,7 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     std::fs::remove_file(sim.path("inventory.toml")).unwrap();
     let output = ended(update).ends(4);
     assert_eq!(of(&output.json()), ("cancelled", false), "{}", output.out);
-    assert!(output.err.contains("ends before anything more is erased"), "{}", output.err);
+    assert!(output.err.contains("ends before it erases more memory"), "{}", output.err);
     assert!(!peer.all(50).iter().any(|frame| frame.starts_with("2C1#")), "no program data");
     assert_eq!(sim.json(&["info", "1"], 0)["boards"][0]["program_id"], shown);
 }

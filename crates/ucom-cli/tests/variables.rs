@@ -126,7 +126,7 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
     for off in ["0", "False", "no", "OFF", ""] {
         let output = with(&sim, ("UCOM_JSON", off), &["scan"]).ends(0);
-        assert!(output.out.contains("1 board is there"), "{off}: {}", output.out);
+        assert!(output.out.contains("1 board is connected"), "{off}: {}", output.out);
         assert!(!output.err.contains("UCOM_JSON"), "{off}: {}", output.err);
     }
 }

@@ -12,7 +12,7 @@ pub enum ProfileFileError {
     #[error("profile: {0}")]
     Toml(String),
     /// The key does not exist.
-    #[error("profile: there is no key `{key}`{}; the keys are: {}", near(.nearest), known())]
+    #[error("profile: unknown key `{key}`{}; the keys are: {}", near(.nearest), known())]
     UnknownKey {
         /// The key in the file.
         key: String,
@@ -20,7 +20,7 @@ pub enum ProfileFileError {
         nearest: Option<&'static str>,
     },
     /// A value is outside the key's range.
-    #[error("profile: {key} = {value}, but it must be {range}; see `ucom help profile`")]
+    #[error("profile: {key} = {value} is not valid, expected {range}; see `ucom help profile`")]
     Value {
         /// The key.
         key: &'static str,

@@ -31,11 +31,13 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let (set, clear) = (args.set.unwrap_or_default(), args.clear.unwrap_or_default());
     let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
     if both != Status(0) {
-        return Err(Failure::usage(format!("{both}: cannot be set and cleared at once")));
+        return Err(Failure::usage(format!("{both}: a bit cannot be set and cleared in one command")));
     }
     if mirrors != Status(0) {
-        return Err(Failure::usage(format!("{mirrors}: mirrors reality and cannot be written"))
-            .next("ucom start, ucom stop and ucom init change what these bits show"));
+        return Err(Failure::usage(format!(
+            "{mirrors}: this bit mirrors the real state and cannot be written"
+        ))
+        .next("ucom start, ucom stop and ucom init change what these bits show"));
     }
     if let Some(bytes) = args.raw {
         return raw_status(args, bytes, link, out);
@@ -76,16 +78,19 @@ fn raw_status(
         let outside = Status(value & !mask);
         let mut text = format!("sent: new = (old & ~0x{mask:02X}) | 0x{value:02X}\n");
         if outside != Status(0) {
-            text += &format!("value bits outside the mask, set all the same: {outside}\n");
+            text +=
+                &format!("these value bits are outside the mask, and the board sets them too: {outside}\n");
         }
         if Status(mask | value) & Status::MIRRORS != Status(0) {
-            text +=
-                &format!("{}: mirror reality, whatever is written\n", Status(mask | value) & Status::MIRRORS);
+            text += &format!(
+                "{}: these bits mirror the real state, and a write does not change them\n",
+                Status(mask | value) & Status::MIRRORS
+            );
         }
         for b in &all {
             let after = match b.after {
                 Some(info) => format!("0x{:02X} {}", info.status.0, info.status),
-                None => "no answer under this number any more".into(),
+                None => "the board no longer answers to this number".into(),
             };
             let verdict = match b.as_expected() {
                 true => String::new(),
@@ -111,7 +116,7 @@ fn lines_of(all: &[Numbered]) -> String {
     let line = |(n, info): &Numbered| {
         let (status, words) = (info.status, bits(info.status).join(" "));
         if !status.has(Status::INIT) {
-            return format!("board {n:<3} has forgotten its number; `ucom init` gives one\n");
+            return format!("board {n:<3} has lost its number; `ucom init` assigns a new number\n");
         }
         format!("board {n:<3} 0x{:02X}  {:12} {words}\n", status.0, state_name(status))
     };
@@ -136,13 +141,13 @@ pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     }
     if reports.ids.is_empty() {
         return Err(Failure::new(ErrorKind::NoLink, "no-boards", "no board reported after the reset")
-            .next("ucom doctor looks for the reason"));
+            .next("find the cause with ucom doctor"));
     }
     out.result(&json!({ "reports": reports.ids }), || {
         let ids: Vec<String> = reports.ids.iter().map(|id| format!("0x{id:02X}")).collect();
         let whose = if ids.len() == 1 { "its number is" } else { "their numbers are" };
         let boards = counted(ids.len(), "board");
-        format!("{boards} reported: {}\n{whose} gone; next: ucom init\n", ids.join(" "))
+        format!("{boards} reported: {}\n{whose} withdrawn; next: ucom init\n", ids.join(" "))
     });
     Ok(())
 }
@@ -181,7 +186,7 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     // command.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
-        driver.note(format!("{error}; both were commanded to stop\n  {}", error.hint()));
+        driver.note(format!("{error}; both boards received the Stop\n  {}", error.hint()));
     }
     let boards = all.iter().map(|(n, info)| info_value(*n, info, &profile)).collect::<Vec<_>>();
     let mut failures: Vec<(u8, Failure)> = failed.into_iter().map(|(board, e)| (board, e.into())).collect();

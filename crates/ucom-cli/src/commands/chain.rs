@@ -28,7 +28,7 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     }
     if report.boards.is_empty() && report.reports.ids.is_empty() {
         let failure = Failure::new(ErrorKind::NoLink, "no-boards", "no board answers")
-            .next("ucom doctor looks for the reason");
+            .next("find the cause with ucom doctor");
         return Err(failure);
     }
     out.result(&value, || {
@@ -38,7 +38,7 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         }
         let (numbered, there) = (report.boards.len(), report.reports.ids.len());
         let are = if there == 1 { "is" } else { "are" };
-        text += &format!("{} {are} there, {numbered} with a number\n", counted(there, "board"));
+        text += &format!("{} {are} connected, {numbered} with a number\n", counted(there, "board"));
         let unnumbered = report.findings.iter().filter(|f| is_unnumbered(f)).count();
         if unnumbered > 0 {
             text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
@@ -114,10 +114,10 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     out.result(&value, || {
         let end = match (written, report.boards.len()) {
             (true, n) => format!("{} numbered; inventory: {name}\n", counted(n, "board")),
-            (false, n) => format!("{} numbered; the inventory {name} is not touched\n", counted(n, "board")),
+            (false, n) => format!("{} numbered; the inventory {name} was not changed\n", counted(n, "board")),
         };
         let renew = match compared {
-            Some(_) if !written => "if the chain was changed on purpose: ucom init --renew\n",
+            Some(_) if !written => "if you changed the chain: ucom init --renew\n",
             _ => "",
         };
         board_table(&report.boards, &profile) + &lines(&report.findings) + &end + renew

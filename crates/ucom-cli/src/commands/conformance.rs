@@ -25,10 +25,10 @@ fn date(profile: &Profile) -> u16 {
 pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(wrong) = args.only.iter().find(|o| !test_names().any(|id| id.eq_ignore_ascii_case(o))) {
         let all: Vec<&str> = test_names().collect();
-        return Err(Failure::usage(format!("there is no test {wrong}; there are {}", all.join(" "))));
+        return Err(Failure::usage(format!("unknown test {wrong}, expected one of {}", all.join(" "))));
     }
     if args.init && args.boards != Boards::All {
-        return Err(Failure::usage("--init numbers the whole chain: it goes with all boards only"));
+        return Err(Failure::usage("--init numbers the whole chain and needs `all` as the boards"));
     }
     let profile = link.profile()?;
     let program = match &args.program {
@@ -48,7 +48,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
     let outcome = driver.run(Request::Conformance(options)).map_err(|e| match e {
         SessionError::Procedure(Error::Running(
             RunningError::Running { .. } | RunningError::LoopRuns { .. },
-        )) => Failure::from(e).next("`ucom stop all` first; --force does not cover this"),
+        )) => Failure::from(e).next("`ucom stop all` first; --force does not override this check"),
         e => e.into(),
     });
     let report = match outcome? {
@@ -73,8 +73,10 @@ fn program(
     let board = match &args.boards {
         Boards::Some(numbers) if numbers.len() == 1 => numbers.first().copied().unwrap_or_default(),
         _ => {
-            return Err(Failure::usage("--program IMAGE programs one board: name it")
-                .next("ucom conformance 1 --flash-id 0x21 --program IMAGE"));
+            return Err(Failure::usage(
+                "--program IMAGE programs one board, but no single board is selected",
+            )
+            .next("ucom conformance 1 --flash-id 0x21 --program IMAGE"));
         }
     };
     let flash_number = match args.flash_id {
@@ -106,7 +108,7 @@ fn print(report: &ConformanceReport, out: &Output) {
             text += &format!("ended before the last test: {error}\n");
         }
         for left in &report.left {
-            text += &format!("not as it was found: {left}\n");
+            text += &format!("not restored: {left}\n");
         }
         text + &format!("{passed} passed, {failed} failed, {skipped} skipped\n")
     });
@@ -124,7 +126,7 @@ fn line(test: &ConformanceTest) -> String {
             };
             head("✗")
                 + &format!(
-                    "    came: {came}\n    sent: {}\n    all that came: {}\n",
+                    "    result: {came}\n    sent: {}\n    received: {}\n",
                     tail(&test.sent),
                     tail(&test.came)
                 )

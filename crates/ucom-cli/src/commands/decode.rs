@@ -33,7 +33,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         Box::new(received(&stop)?)
     } else {
         let recording = Recording::read(&args.file)
-            .map_err(|e| Failure::usage(e).next("forms are candump -L, FZI-CAN 1.2 and MCAP"))?;
+            .map_err(|e| Failure::usage(e).next("valid formats are candump -L, FZI-CAN 1.2 and MCAP"))?;
         report_broken_off(&recording, &args.file, out);
         // The profile of the recording is used, unless the user gives another.
         if let (None, Some(text)) = (&link.profile, &recording.profile) {
@@ -55,7 +55,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
     if frames == 0 && !stop.asked() {
         return Err(Failure::usage("no frame in the input")
-            .next("a candump log, or bare frames, one a line: 141#2100011934126E38"));
+            .next("give a candump log, or one frame in each line: 141#2100011934126E38"));
     }
     Ok(())
 }
@@ -132,6 +132,6 @@ pub fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
     match CandumpReader::new(full.as_bytes()).next()? {
         Ok(record) => Some(Ok(record)),
         Err(e) => Some(Err(Failure::usage(format!("line {number}: \"{line}\": {e}"))
-            .next("a candump log, or bare frames, one a line: 141#2100011934126E38"))),
+            .next("give a candump log, or one frame in each line: 141#2100011934126E38"))),
     }
 }

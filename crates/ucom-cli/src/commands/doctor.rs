@@ -60,15 +60,16 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     if report.boards.is_empty() && report.reports == 0 {
         // Without measurements the file would contain only defaults, which would look like the profile of these
         // boards.
-        let what = "no board answers: nothing was measured, no profile written";
+        let what = "no board answers: nothing was measured, and no profile was written";
         return Err(
-            Failure::new(ErrorKind::NoLink, "no-boards", what).next("ucom doctor looks for the reason")
+            Failure::new(ErrorKind::NoLink, "no-boards", what).next("find the cause with ucom doctor")
         );
     }
     if report.boards.is_empty() {
         let n = report.reports;
         out.note(format!(
-            "{n} board{s} without a number: only reports were measured; ucom probe --init measures more, or ucom init first",
+            "{n} board{s} without a number: only reports were measured; use ucom probe --init, or run ucom \
+             init first",
             s = if n == 1 { "" } else { "s" }
         ));
     }

@@ -11,8 +11,8 @@ pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let (query, all) = (args.word.join(" "), words());
     let found = if query.is_empty() { all.iter().collect() } else { find(&all, &query) };
     if found.is_empty() {
-        return Err(Failure::usage(format!("nothing is known about \"{query}\""))
-            .next("ucom explain lists every word; a number is that of an error"));
+        return Err(Failure::usage(format!("unknown word or number: \"{query}\""))
+            .next("ucom explain lists all words; a number is the number of a board error"));
     }
     let value = |w: &&Word| -> Value {
         json!({ "name": w.shown[0], "family": w.family, "shown": w.shown, "meaning": w.meaning, "next": w.next })

@@ -24,8 +24,9 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         args.template.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
     // An existing file is a table that a user has filled in.
     let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
-        true => Failure::nothing_sent(e)
-            .next("--template - shows the table, to be added by hand; --overwrite writes over it"),
+        true => Failure::nothing_sent(e).next(
+            "--template - prints the table, so that you can add it by hand; --overwrite writes over it",
+        ),
         false => Failure::nothing_sent(e),
     })?;
     let mut driver = link.session()?;
@@ -56,7 +57,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         let text = SignalTable::template(&programs);
         return deliver(file, &text, json!({ "programs": ids }), out, |file| {
             format!(
-                "{file}: a table of {} to be looked over; `ucom help edges` explains it",
+                "{file}: a table of {}; check types, scales and units (`ucom help edges`)",
                 counted(ids.len(), "program")
             )
         });
@@ -172,7 +173,7 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         let end = if running {
             ""
         } else {
-            "the control loop does not run: ucom run, or ucom ci … --for S, makes things move\n"
+            "nothing moves, because the control loop does not run: use ucom run, or ucom ci … --for S\n"
         };
         words.iter().map(line).collect::<String>() + end
     });
@@ -231,7 +232,7 @@ fn move_for(
     let words = last.map(|s| s.words).unwrap_or_default();
     if words.is_empty() {
         return Err(Failure::new(ErrorKind::NoLink, "no-outputs", format!("board {board} sent no outputs"))
-            .next("ucom doctor looks for the reason"));
+            .next("find the cause with ucom doctor"));
     }
     print_words("so", known, Kind::So, &words, out);
     Ok(())
@@ -286,7 +287,9 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
 /// Notes that `--force` skips no check in this command, because older scripts use it to overwrite a file.
 fn note_force(force: bool, out: &Output) {
     if force {
-        out.note("--force has no effect here: there is no check of the bus; --overwrite writes over a file");
+        out.note(
+            "--force has no effect, because this command does not check the bus; --overwrite replaces a file",
+        );
     }
 }
 

@@ -16,7 +16,7 @@ use crate::args::{LinkArgs, SoArgs};
 pub fn finish(stdout: &mut Lines, driver: &Driver) {
     let unseen = stdout.finish();
     if unseen > 0 && !stdout.gone() {
-        driver.note(format!("{unseen} lines were dropped: nobody read them in time"));
+        driver.note(format!("{unseen} lines were dropped, because the reader was too slow"));
     }
 }
 
@@ -57,12 +57,13 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
                 return Err(Failure::new(
                     ErrorKind::NoLink,
                     "no-outputs",
-                    "no board sends outputs: no control loop runs",
+                    "no board sends outputs, because no control loop runs",
                 )
                 .next("ucom run, in another terminal"));
             }
-            driver
-                .note("no board sends outputs: no control loop runs (ucom run, in another terminal)".into());
+            driver.note(
+                "no board sends outputs, because no control loop runs (ucom run, in another terminal)".into(),
+            );
             patient = false;
         }
     }
@@ -81,8 +82,8 @@ fn head(all: &BTreeMap<u8, Known>) -> Result<String, Failure> {
     let mut heads = all.values().map(columns);
     let first = heads.next().unwrap_or_default();
     if heads.any(|other| other != first) {
-        return Err(Failure::usage("boards with different outputs do not fit into one table")
-            .next("one board at a time, or --json"));
+        return Err(Failure::usage("boards with different outputs cannot share one table")
+            .next("select one board, or use --json"));
     }
     Ok(format!("time_s,board,{first}"))
 }

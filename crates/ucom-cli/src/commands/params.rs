@@ -21,7 +21,7 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
         return apply(args, file, link, out);
     }
     if args.dry_run {
-        return Err(Failure::usage("--dry-run goes with --apply FILE"));
+        return Err(Failure::usage("--dry-run needs --apply FILE"));
     }
     let signals = link.signal_table()?;
     let file = args.save.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
@@ -79,7 +79,9 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
         let mut text = String::new();
         for p in all {
             let row = |(i, name, assumed): (usize, &String, Option<u16>)| {
-                let shown = |word: u16| p.known.signals.get(Kind::Par, i).map_or_else(String::new, |e| e.text_with_unit(word));
+                let shown = |word: u16| {
+                    p.known.signals.get(Kind::Par, i).map_or_else(String::new, |e| e.text_with_unit(word))
+                };
                 let value = assumed.map_or_else(|| "unknown".into(), |w| format!("{} (assumed)", shown(w)));
                 let last = p.history.last(i).map(|w| format!("{} on {}", shown(w.word), w.when()));
                 vec![i.to_string(), name.clone(), value, last.unwrap_or_else(|| "-".into())]
@@ -90,7 +92,7 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
             }
             text += &table(&[">#", "name", "value", "last written by this tool"], &rows);
         }
-        text + "the protocol has no way to read parameters back: after a restart of the application they are gone\n"
+        text + "the protocol cannot read parameters back, and a restart of the application resets them\n"
     });
 }
 
@@ -132,7 +134,8 @@ fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Outp
     let result = json!({ "boards": numbers, "values": values, "parameters": whole });
     deliver(file, &params_text(&saved), result, out, |file| {
         format!(
-            "{file}: {values} of {whole} parameters of {} with the value this tool wrote last; the others are comments",
+            "{file}: {values} of {whole} parameters of {} with the last value that this tool wrote; the \
+             others are comments",
             counted(numbers.len(), "board")
         )
     })
@@ -172,10 +175,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     if let Boards::Some(numbers) = &args.boards
         && let Some(missing) = numbers.iter().find(|n| !file.numbers().contains(n))
     {
-        return Err(Failure::usage(format!(
-            "{}: there is nothing for board {missing} in it",
-            path.display()
-        )));
+        return Err(Failure::usage(format!("{}: the file has no entry for board {missing}", path.display())));
     }
     let mut driver = link.session()?;
     file.identities(&mut driver)?;
@@ -218,11 +218,11 @@ fn report(all: &[Parameters], inputs: usize, dry_run: bool, out: &Output) {
         text += &match dry_run {
             true => format!("{count} parameters fit; nothing was written\n"),
             false => {
-                format!("{count} parameters written; there is no answer to them, and a restart ends them\n")
+                format!("{count} parameters written; boards do not confirm them, and a restart resets them\n")
             }
         };
         if inputs > 0 {
-            text += &format!("{inputs} first inputs are left to: ucom run --params FILE\n");
+            text += &format!("{inputs} initial inputs were not written; use: ucom run --params FILE\n");
         }
         text
     });

@@ -18,7 +18,7 @@ use crate::session::shared_numbers;
 const FLUSH: Duration = Duration::from_secs(1);
 
 fn failed(e: RecordingError) -> Failure {
-    Failure::new(ErrorKind::Fault, "recording", e).next("is the disk full?")
+    Failure::new(ErrorKind::Fault, "recording", e).next("check if the disk is full")
 }
 
 /// Reports an incomplete recording.
@@ -26,7 +26,7 @@ pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     if let Some(why) = &recording.broken_off {
         let (file, whole) = (file.display(), recording.records.len());
         let are = if whole == 1 { "is" } else { "are" };
-        out.note(format!("{file}: {why}; the {} before {are} whole", counted(whole, "frame")));
+        out.note(format!("{file}: {why}; the {} before this point {are} complete", counted(whole, "frame")));
     }
 }
 
@@ -52,8 +52,8 @@ impl Silence {
         }
         if !std::mem::replace(&mut self.over, true) && !came {
             out.note(
-                "nothing has come from the bus yet: boards that nobody asks and whose control loop does not run send nothing \
-                 (`ucom scan` asks them, in another terminal); `ucom doctor` looks at bus and boards",
+                "no frame was received yet: boards send nothing until a PC requests it or their control \
+                 loop runs (run `ucom scan` in another terminal); `ucom doctor` checks bus and boards",
             );
         }
     }
@@ -112,8 +112,11 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let (file, time_s) = (args.file.display().to_string(), start.elapsed().as_secs_f64());
     let value = json!({ "file": file, "frames": frames, "left_out": left_out, "time_s": time_s, "shared_numbers": shared });
     out.result(&value, || {
-        let missing =
-            if left_out > 0 { format!(", {left_out} foreign ones left out") } else { String::new() };
+        let missing = if left_out > 0 {
+            format!(", {left_out} frames of other protocols not written")
+        } else {
+            String::new()
+        };
         format!("{file}: {} in {time_s:.1} s{missing}", counted(frames as usize, "frame"))
     });
     Ok(())
@@ -124,8 +127,8 @@ fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>
     let ending = args.file.extension().map(|e| e.to_string_lossy().into_owned());
     let known = ["log", "candump", "fzi", "fzican", "mcap"];
     if let Some(other) = ending.filter(|e| !known.contains(&e.as_str())) {
-        let what = format!("{}: nothing writes .{other} here", args.file.display());
-        let forms = "forms go by the ending: .log candump, .fzi FZI-CAN, .mcap MCAP";
+        let what = format!("{}: recordings cannot have the format .{other}", args.file.display());
+        let forms = "the file name selects the format: .log candump, .fzi FZI-CAN, .mcap MCAP";
         return Err(Failure::usage(what).next(forms));
     }
     let beside = (format != RecordingFormat::Mcap).then(|| profile_path(&args.file));
@@ -152,7 +155,10 @@ impl Operator for Player<'_> {
 /// Sends the frames of a recording at their times.
 pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if !(args.speed.is_finite() && args.speed > 0.0) {
-        return Err(Failure::usage(format!("--speed {}: it must be above 0", args.speed)));
+        return Err(Failure::usage(format!(
+            "--speed {} is out of range, expected a value above 0",
+            args.speed
+        )));
     }
     let recording = Recording::read(&args.file).map_err(Failure::usage)?;
     report_broken_off(&recording, &args.file, out);
@@ -163,7 +169,7 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     let player = Player { stop: listen(&cleanup)?, out };
     let mut bus = link.open()?;
     if args.intrusive {
-        cleanup.begin_other("what the boards took of the recording is not known", "ucom scan");
+        cleanup.begin_other("it is not known which frames of the recording the boards received", "ucom scan");
     }
     let bar = out.bar(due.len() as u64, "replay");
     let sent = session::replay(&due, args.speed, &mut bus, &player, || bar.inc(1))?;
@@ -173,7 +179,8 @@ pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         let hint = match guarded.len() {
             0 => String::new(),
             n => format!(
-                ", {n} left out that reset, number, program, start or move boards (--intrusive sends them)"
+                ", {n} not sent because they reset, number, program, start or move boards (--intrusive \
+                 sends them)"
             ),
         };
         format!("{} sent{hint}", counted(sent as usize, "frame"))

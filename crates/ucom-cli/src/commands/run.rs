@@ -73,7 +73,10 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     finish(&mut stdout, &driver);
     result?;
     if !running.is_empty() {
-        let next = format!("without heartbeats they become safe by themselves; ucom stop {}", list.join(","));
+        let next = format!(
+            "without heartbeats these boards become safe by themselves; ucom stop {}",
+            list.join(",")
+        );
         return Err(Failure::new(ErrorKind::Fault, "not-stopped", not_stopped).next(next));
     }
     driver.nobody_lost(&boards)?;
@@ -174,7 +177,7 @@ fn supervise(
             }
         }
         if followed.is_over(&driver.master, driver.now_us()) {
-            driver.note("no board is in its control loop any more: the run ends".into());
+            driver.note("the run ends, because no board is in its control loop".into());
             return Ok(());
         }
         if driver.stop_asked() || args.duration.is_some_and(|d| start.elapsed() >= d) {

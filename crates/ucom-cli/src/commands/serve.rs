@@ -27,15 +27,16 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Owns the bus until SIGINT or SIGTERM. Then stops the boards that the agent has started.
 pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if args.sim && link.bus.is_some() {
-        return Err(Failure::usage("a bus and --sim: the agent owns one of them")
-            .next("leave --bus out, and unset UCOM_BUS"));
+        return Err(
+            Failure::usage("--bus and --sim cannot be used together").next("omit --bus, and unset UCOM_BUS")
+        );
     }
     if args.boards.is_some() && !args.sim {
-        return Err(Failure::usage("--boards is for simulated boards").next("add --sim"));
+        return Err(Failure::usage("--boards needs --sim").next("add --sim"));
     }
     let token_file = args.token_file.clone().or_else(|| token_file("ucom-tokens.toml")).ok_or_else(|| {
-        Failure::usage("no place for a token file: neither XDG_STATE_HOME nor HOME is set")
-            .next("name one with --token-file FILE")
+        Failure::usage("the token file has no folder: neither XDG_STATE_HOME nor HOME is set")
+            .next("give the file with --token-file FILE")
     })?;
     let config = Config {
         profile: link.profile()?,
@@ -48,14 +49,14 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     let stop = listen(&config.cleanup)?;
     let log = CommandLog::open(args.command_log.as_deref(), args.command_log_limit, log_failure(out));
     let log = log.map_err(|error| {
-        let path = args.command_log.as_deref().unwrap_or("the log of commands".as_ref());
+        let path = args.command_log.as_deref().unwrap_or("the command log".as_ref());
         Failure::usage(format!("{}: {error}", path.display()))
     })?;
     let tls = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
     let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;
     let listener = TcpListener::bind(args.listen).map_err(|error| {
         Failure::usage(format!("{}: {error}", args.listen))
-            .next("another agent may listen there: name another address with --listen")
+            .next("another agent may use this address: give another address with --listen")
     })?;
     let address = listener.local_addr()?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
@@ -64,7 +65,10 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     let bus = simulated.as_ref().map_or_else(|| link.url().map(str::to_owned), |sim| Ok(sim.url.clone()))?;
     let owner = Owner::open(&bus, config)?;
     if !address.ip().is_loopback() && tls.is_none() {
-        out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it, or --tls-cert and --tls-key");
+        out.note(
+            "note: tokens and commands are sent without encryption: use --tls-cert and --tls-key, \
+             unless you trust everyone on this network",
+        );
     }
     let url = format!("{}://{address}", if tls.is_some() { "https" } else { "http" });
     let asked =
@@ -81,8 +85,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     owner.end();
     drop(simulated);
     gone.map_or(Ok(()), |why| {
-        Err(Failure::new(ErrorKind::NoLink, "bus", why)
-            .next("is the bus still there? ucom doctor looks at it"))
+        Err(Failure::new(ErrorKind::NoLink, "bus", why).next("check the bus with ucom doctor"))
     })
 }
 
@@ -90,7 +93,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
 fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + use<> {
     let out = *out;
     move |error| {
-        out.note(format!("the log of commands cannot be written: {error}; commands are taken all the same"));
+        out.note(format!("the command log cannot be written: {error}; the agent still accepts commands"));
     }
 }
 
@@ -122,7 +125,9 @@ impl Simulated {
                 server.turn(LOOK);
             }
         });
-        let url = url.recv().unwrap_or_else(|_| Err("the simulated chain has a fault".into()));
+        let url = url
+            .recv()
+            .unwrap_or_else(|_| Err("the simulated chain ended because of a fault in the program".into()));
         Ok(Self { url: url.map_err(Failure::usage)?, ended, thread: Some(thread) })
     }
 }

@@ -35,7 +35,7 @@ pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let chain = ChainSim::new(&config, faults, args.seed, &profile);
     let mut server =
         ChainServer::bind(&args.listen, chain, profile.bitrate, args.seed, |text| out.note(text))
-            .map_err(|e| Failure::usage(e).next("--listen 127.0.0.1:0 takes a free port"))?;
+            .map_err(|e| Failure::usage(e).next("--listen 127.0.0.1:0 selects a free port"))?;
     let url = server.url();
     out.result(&json!({ "ready": url, "boards": boards }), || format!("ready: {url}"));
     let typed = typed();
@@ -68,7 +68,7 @@ fn config(args: &SimArgs, profile: &Profile) -> Result<ChainConfig, Failure> {
     };
     if args.flash_ids.len() > count {
         let (given, wanted) = (args.flash_ids.len(), count);
-        return Err(Failure::usage(format!("--flash-ids names {given} boards, --boards {wanted}")));
+        return Err(Failure::usage(format!("--flash-ids has {given} entries, but --boards is {wanted}")));
     }
     Ok(config.with_boards(count, profile).with_flash_ids(&args.flash_ids))
 }

@@ -52,7 +52,7 @@ fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignmen
 pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) -> Result<(), Failure> {
     let form = || {
         Failure::usage(format!(
-            "\"{line}\": known are ci N NAME=VALUE, par N NAME=VALUE, active on|off, stop"
+            "\"{line}\" is not a command, expected ci N NAME=VALUE, par N NAME=VALUE, active on|off, or stop"
         ))
     };
     let mut parts = line.split_whitespace();
@@ -81,7 +81,7 @@ pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared
         }
         Some(kind @ ("ci" | "par")) => {
             let board: u8 = parts.next().and_then(|n| n.parse().ok()).ok_or_else(form)?;
-            let not_run = || Failure::usage(format!("board {board} is not among those that run"));
+            let not_run = || Failure::usage(format!("board {board} is not one of the running boards"));
             let known = prepared.known.get(&board).ok_or_else(not_run)?;
             let values = assignments(parts)?;
             only(&[board], &values, "set")?;

@@ -108,8 +108,11 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
     if let Some(flash) = args.flash_id {
         return match numbers {
             [board] => Ok(vec![UpdateTarget { board: *board, flash_number: Some(flash) }]),
-            _ => Err(Failure::usage(format!("--flash-id names one board, but {} are meant", numbers.len()))
-                .next("a list takes the flash ids from the inventory that ucom init writes")),
+            _ => Err(Failure::usage(format!(
+                "--flash-id is for one board, but {} boards are selected",
+                numbers.len()
+            ))
+            .next("for several boards, ucom reads the flash ids from the inventory that ucom init writes")),
         };
     }
     // For a single board its number is enough. For a list, the identity of each board is needed.

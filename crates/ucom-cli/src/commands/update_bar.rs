@@ -41,7 +41,7 @@ impl<'a> Bar<'a> {
             drop(end);
         };
         std::thread::Builder::new().name("progress".into()).spawn(draw).map_err(|e| {
-            Failure::new(ErrorKind::Fault, "thread", format!("no thread for the progress bar: {e}"))
+            Failure::new(ErrorKind::Fault, "thread", format!("the progress bar cannot start: {e}"))
         })?;
         Ok(Self { out, bar: None, serial: 0, steps, ended })
     }

@@ -29,7 +29,7 @@ impl Files {
     pub fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
         if args.name_target && !has_header(profile) {
             return Err(Failure::usage(
-                "--name-target: the name goes into the header, and the profile sends none",
+                "--name-target: the name is part of the header, but the profile sends no header",
             ));
         }
         let other = second(args, profile.prog_plan)?;
@@ -76,20 +76,21 @@ fn advice(error: &ImageError) -> String {
     match error.advice() {
         ImageAdvice::None => String::new(),
         ImageAdvice::MakeAgain => {
-            "make the file again with the tool chain; images are Intel HEX, S-record, and raw bytes in a .bin"
+            "make the file again with the tool chain; images are Intel HEX, S-record, or raw bytes in a \
+             .bin file"
                 .into()
         }
         ImageAdvice::NameRaw => {
-            "are these the raw bytes of a program? name the file .bin, or take any name with --raw".into()
+            "if these are the raw bytes of a program, rename the file to .bin, or use --raw".into()
         }
         ImageAdvice::Rename => "if these are the raw bytes of a program, rename the file to .bin".into(),
-        ImageAdvice::FillGaps => "--fill-gaps fills them with FF, if the board may get FF there".into(),
+        ImageAdvice::FillGaps => "if the board may get FF there, fill the gap with --fill-gaps".into(),
         ImageAdvice::OtherUnit(unit) => format!(
-            "--addresses {unit} if the tool chain counts {unit}s: then the records follow each other. --fill-gaps if the gap is meant: it \
-             is filled with FF"
+            "if the tool chain counts {unit}s, use --addresses {unit}: then the records are contiguous. If \
+             the gap is intended, use --fill-gaps to fill it with FF"
         ),
         ImageAdvice::Addresses => {
-            "make the file again: its addresses fit neither as those of bytes nor as those of words".into()
+            "make the file again: its addresses are valid neither in bytes nor in words".into()
         }
     }
 }
@@ -103,8 +104,9 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
     ];
     for (option, fits, given) in options {
         if given.is_some() && plan != fits {
-            let text = format!("{option} goes with `prog.plan` {fits}, but the profile has {plan}");
-            let hint = "--profile FILE names the boards' profile; ucom help profile lists its keys and plans";
+            let text = format!("{option} needs `prog.plan` {fits}, but the profile has {plan}");
+            let hint =
+                "give the boards' profile with --profile FILE; ucom help profile lists its keys and plans";
             return Err(Failure::usage(text).next(hint));
         }
     }
@@ -113,10 +115,12 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
             Some(given) => return Ok(Some(given)),
             None if plan == fits && plan != Plan::Raw => {
                 let text =
-                    format!("`prog.plan` {plan} sends two images, and there is only one: {option} FILE");
+                    format!("`prog.plan` {plan} sends two images, but only one was given: add {option} FILE");
                 return Err(Failure::usage(text).next(match plan {
-                    Plan::ExloaderApp => "IMAGE is the application, the other one the exloader for RAM",
-                    _ => "IMAGE is for program memory, the other one for data memory",
+                    Plan::ExloaderApp => {
+                        "IMAGE is the application, and the other file is the exloader for RAM"
+                    }
+                    _ => "IMAGE is for program memory, and the other file is for data memory",
                 }));
             }
             None => {}
@@ -130,25 +134,29 @@ pub fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let form = profile.prog_date;
     let date = match asked {
         Some(_) if !has_header(profile) => {
-            return Err(Failure::usage("--date: the date goes into the header, and the profile sends none")
-                .next("see prog.plan and prog.header in ucom help profile"));
+            return Err(Failure::usage(
+                "--date: the date is part of the header, but the profile sends no header",
+            )
+            .next("see prog.plan and prog.header in ucom help profile"));
         }
         None if !has_header(profile) => return Ok(0),
         Some(text) => match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
             Some(hex) => {
                 return u16::from_str_radix(hex, 16)
-                    .map_err(|_| Failure::usage(format!("--date {text}: no 16 bits")));
+                    .map_err(|_| Failure::usage(format!("--date {text}: the number has more than 16 bits")));
             }
             None => parsed(text).ok_or_else(|| {
-                Failure::usage(format!("--date {text}: no day of the form YYYY-MM-DD, no number as 0x3AC1"))
+                Failure::usage(format!(
+                    "--date {text} is not a valid date, expected YYYY-MM-DD or a number such as 0x3AC1"
+                ))
             })?,
         },
         None => OffsetDateTime::now_utc().date(),
     };
     let year = u16::try_from(date.year()).ok();
     year.and_then(|year| form.encode(year, date.month().into(), date.day())).ok_or_else(|| {
-        Failure::usage(format!("{date} is no date that prog.date = {form} can hold"))
-            .next("--date takes its 16 bits as well, as 0x3AC1")
+        Failure::usage(format!("prog.date = {form} cannot store the date {date}"))
+            .next("give the date as a 16-bit number, such as --date 0x3AC1")
     })
 }
 

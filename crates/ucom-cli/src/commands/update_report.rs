@@ -69,8 +69,8 @@ fn taken_on_trust(b: &UpdateResult, report: &UpdateReport) -> bool {
 fn not_known(report: &UpdateReport) -> String {
     match report.boards.iter().any(|b| b.outcome == UpdateOutcome::ProgramUpToDate) {
         true if report.accept_unverified => "program-up-to-date is accepted, NOT verified\n".into(),
-        true => "nothing was sent: a board cannot show load address and content, and the inventory has no record of this image; \
-                 --rewrite writes it, --unverified accepts it\n"
+        true => "nothing was sent: a board cannot show load address and content, and the inventory has no \
+                 record of this image; write it with --rewrite, or accept it with --unverified\n"
             .into(),
         false => String::new(),
     }
@@ -98,7 +98,11 @@ fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     if lines.is_empty() {
         return lines;
     }
-    let accept = if report.accept_unverified { "" } else { "; or accept it: --unverified" };
+    let accept = if report.accept_unverified {
+        ""
+    } else {
+        "; or accept the program without verification: --unverified"
+    };
     format!("{lines}{why};\n{}{accept}\n", why.hint())
 }
 

@@ -59,7 +59,8 @@ fn hash_of(bytes: &[u8]) -> [u8; 32] {
 /// Reads a hash of 64 hexadecimal digits.
 fn hash<'de, D: Deserializer<'de>>(input: D) -> Result<[u8; 32], D::Error> {
     let text = String::deserialize(input)?;
-    let wrong = || de::Error::custom(format!("\"{text}\" is not a SHA-256: expected 64 hexadecimal digits"));
+    let wrong =
+        || de::Error::custom(format!("\"{text}\" is not a valid SHA-256, expected 64 hexadecimal digits"));
     let mut out = [0; 32];
     let (pairs, []) = text.as_bytes().as_chunks::<2>() else { return Err(wrong()) };
     if pairs.len() != out.len() {

@@ -77,7 +77,7 @@ pub enum InventoryError {
         source: std::io::Error,
     },
     /// The file is larger than any inventory.
-    #[error("{}: {bytes} bytes are too many for an inventory (limit {MAX_BYTES})", path.display())]
+    #[error("{}: the inventory has {bytes} bytes, expected at most {MAX_BYTES}", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -94,13 +94,16 @@ pub enum InventoryError {
         number: u8,
     },
     /// Two boards have the same position.
-    #[error("board {number} is given twice")]
+    #[error("board {number} has two entries")]
     Twice {
         /// Board number.
         number: u8,
     },
     /// A board has two positions.
-    #[error("flash number 0x{flash_number:04X} is given to boards {first} and {second}; it must be unique")]
+    #[error(
+        "boards {first} and {second} have the same flash number 0x{flash_number:04X}; each flash number \
+         must be unique"
+    )]
     FlashTwice {
         /// The flash number.
         flash_number: u16,
@@ -115,7 +118,7 @@ pub enum InventoryError {
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
     /// The inventory does not exist.
-    #[error("which board stands at number {board}? there is no inventory {}", path.display())]
+    #[error("the flash number of board {board} is not known: there is no inventory {}", path.display())]
     NoInventory {
         /// The board number.
         board: u8,
@@ -141,12 +144,12 @@ impl Diagnose for IdentifyError {
             Self::NoInventory { .. } => (
                 ErrorKind::Refused,
                 "no-inventory",
-                "ucom init writes one; or name the board and its --flash-id",
+                "write the inventory with ucom init, or give --flash-id for this board",
             ),
             Self::NotListed { .. } => (
                 ErrorKind::Refused,
                 "not-in-inventory",
-                "ucom init --renew writes it anew; or name the board's --flash-id",
+                "write the inventory again with ucom init --renew, or give --flash-id for this board",
             ),
             Self::Inventory(_) => (ErrorKind::Usage, "usage", ""),
         };

@@ -21,7 +21,7 @@ pub enum TextError {
         source: std::io::Error,
     },
     /// The file is larger than any file of its kind.
-    #[error("{}: more than {MAX_BYTES} bytes are too many", path.display())]
+    #[error("{}: the file is too large, expected at most {MAX_BYTES} bytes", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,

@@ -67,7 +67,7 @@ fn bus(o: &Observation, f: &mut Findings) {
     let rate = o.profile.bitrate;
     if let Some(other) = o.other_bitrate.filter(|other| *other != rate) {
         let next = format!("set `bitrate = {other}` in the profile and the adapter to the same rate");
-        f.problem(format!("wrong bit rate: frames come at {other} bit/s, not at {rate}"), "", next);
+        f.problem(format!("wrong bit rate: frames are received at {other} bit/s, not at {rate}"), "", next);
     }
     if let Some(c) = &o.controller {
         let counters = format!("TEC {}, REC {}", count(c.tec), count(c.rec));
@@ -78,25 +78,28 @@ fn bus(o: &Observation, f: &mut Findings) {
         } else if c.times_bus_off > 0 {
             let times =
                 if c.times_bus_off == 1 { "once".into() } else { format!("{} times", c.times_bus_off) };
-            let what = format!("the adapter has left the bus {times} meanwhile (bus-off) and is back");
+            let what = format!(
+                "the adapter left the bus {times} while ucom listened (bus-off), and is on the bus again"
+            );
             f.problem(what, off_why, "check rate, cable and termination, then ucom doctor again");
         } else if c.no_acknowledge > 0 && received == 0 {
-            let why = "no powered board is connected, or all of them listen at another bit rate";
+            let why = "no board with power is connected, or all boards use another bit rate";
             f.problem(
-                format!("nobody acknowledges our frames ({} times)", c.no_acknowledge),
+                format!("no node acknowledges the frames of this PC ({} times)", c.no_acknowledge),
                 why,
                 "check power and cable of the boards; other rates: 500000, 250000, 125000 (`bitrate` in the profile)",
             );
         } else if c.protocol_errors > 0 && received == 0 {
-            let why = "frames are there but none can be read: usually another bit rate";
+            let why = "frames are on the bus but cannot be read: usually the bit rate is wrong";
             f.problem(
-                format!("{} bus errors and no frame", c.protocol_errors),
+                format!("{} bus errors and no valid frame", c.protocol_errors),
                 why,
                 "try `bitrate` 500000, 250000, 125000",
             );
         } else if c.protocol_errors > 0 || c.passive || c.tec.max(c.rec).is_some_and(|n| n >= 96) {
-            let why = "reflections: termination missing or doubled (120 Ω at both ends, 60 Ω measured across the bus), a stub too long, a ground missing";
-            let what = format!("bus errors beside good frames: {} ({counters})", c.protocol_errors);
+            let why = "reflections: termination missing or doubled (120 Ω at both ends, 60 Ω measured \
+                       across the bus), a stub that is too long, a missing ground";
+            let what = format!("bus errors between valid frames: {} ({counters})", c.protocol_errors);
             f.warn(what, why, "measure the resistance between CAN_H and CAN_L with the power off");
         } else {
             f.good(format!("the adapter is error active ({counters})"));
@@ -107,11 +110,15 @@ fn bus(o: &Observation, f: &mut Findings) {
     {
         let s = o.listened_us as f64 * 1e-6;
         let why = if o.scan.is_some() {
-            "no board is powered or connected to this bus, or none reads the protocol as the profile does"
+            "no board with power is connected to this bus, or the profile does not match the boards"
         } else {
-            "nobody talks without being asked"
+            "boards may send nothing until a PC requests it"
         };
-        f.problem(format!("no frame within {s:.1} s"), why, "`ucom scan`; is it the right interface?");
+        f.problem(
+            format!("no frame within {s:.1} s"),
+            why,
+            "`ucom scan`; check that this is the right interface",
+        );
     }
 }
 
@@ -122,17 +129,17 @@ fn count(counter: Option<u16>) -> String {
 fn traffic(o: &Observation, f: &mut Findings) {
     let load = o.statistics.load_percent(o.now_us);
     if load > f64::from(o.profile.load_limit) {
-        let why = "heartbeats rank behind all process data and starve first";
+        let why = "heartbeats have a lower priority than all process data and are delayed first";
         f.warn(
             format!("bus load {load:.0} %, limit {} %", o.profile.load_limit),
             why,
-            "longer `so.period` or `ci.period`, fewer boards on this bus",
+            "increase `so.period` or `ci.period`, or use fewer boards on this bus",
         );
     }
     if o.statistics.foreign_count() > 0 {
         let kinds: Vec<String> =
             o.statistics.foreign.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
-        let why = "another protocol shares the bus, or the identifiers are read otherwise";
+        let why = "another protocol uses this bus, or the boards use the identifiers differently";
         f.warn(
             format!("frames that are not of this protocol: {}", kinds.join(", ")),
             why,
@@ -142,14 +149,14 @@ fn traffic(o: &Observation, f: &mut Findings) {
     if let Some((function, to)) = o.competing_master {
         let why = "exactly one PC may be master";
         f.warn(
-            format!("another PC talks on this bus ({} to {to})", function.name()),
+            format!("another PC sends on this bus ({} to {to})", function.name()),
             why,
-            "end the other program before anything that changes boards",
+            "end the other program before you change boards",
         );
     }
     if o.statistics.undecodable > 0 {
-        let why =
-            "too short or impossible values: another reading of the protocol, or two boards with one number";
+        let why = "the frames are too short or have impossible values: the profile does not match the \
+                   boards, or two boards share a number";
         f.warn(
             format!("{} of boards cannot be read", counted(o.statistics.undecodable as usize, "frame")),
             why,
@@ -187,7 +194,8 @@ fn after_init(finding: &InitFinding) -> String {
     match finding {
         InitFinding::NoBoards => "check power, cable and bit rate, then `ucom doctor` again".to_owned(),
         InitFinding::NotReached { after: 0, .. } => {
-            "the first board does not take number 1: is its incoming init pin strapped active?".into()
+            "the first board does not take number 1: check that its incoming init pin is strapped active"
+                .into()
         }
         InitFinding::NotReached { after, .. } => {
             format!("check the init wire from board {after} to the next one, then `ucom init`")
@@ -196,7 +204,7 @@ fn after_init(finding: &InitFinding) -> String {
             "give one of the boards another flash number".into()
         }
         InitFinding::UnexpectedOrder { .. } | InitFinding::Missing { .. } => {
-            "were boards swapped? `ucom init --inventory FILE` writes the new order".into()
+            "if boards were swapped, `ucom init --inventory FILE` writes the new order".into()
         }
         InitFinding::Refused { error, .. } => error.hint(),
         InitFinding::ByteOrder { .. } => BYTE_ORDER.into(),
@@ -224,7 +232,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
             }
             ScanFinding::Disagrees { .. } => "`ucom probe`",
             ScanFinding::Status { .. } => "`ucom probe`; then `ucom reset` and `ucom init`",
-            ScanFinding::Contradicts { .. } => "`ucom init` numbers them anew",
+            ScanFinding::Contradicts { .. } => "`ucom init` numbers the boards again",
             _ => "`ucom scan` again",
         };
         f.warn(finding.to_string(), "", next);
@@ -250,21 +258,19 @@ fn numbers(scan: &ScanReport, f: &mut Findings) {
                 1 => "1 board, without a number".into(),
                 n => format!("{n} boards, none has a number"),
             },
-            "powered up or reset since they were numbered",
+            "the boards were powered up or reset after they got numbers",
             "`ucom init`",
         );
     } else if unnumbered > 0 {
         let after = scan.boards.last().map_or(0, |b| b.number);
-        let why = format!("a reboot, or the init wire behind board {after} is broken");
+        let why = format!("a board rebooted, or the init wire after board {after} is broken");
         f.problem(
             match (unnumbered, scan.boards.len()) {
-                (n, numbered) if n + numbered == 2 => "1 board has no number beside 1 that has one".into(),
-                (n, 1) => format!("{n} boards have no number beside 1 that has one"),
-                (1, numbered) => format!("1 board has no number beside {numbered} that have one"),
-                (n, numbered) => format!("{n} boards have no number beside {numbered} that have one"),
+                (1, numbered) => format!("1 of {} boards has no number", numbered + 1),
+                (n, numbered) => format!("{n} of {} boards have no number", n + numbered),
             },
             why,
-            "`ucom init` names the place",
+            "`ucom init` shows the position",
         );
     } else if !scan.boards.is_empty() {
         f.good(match scan.boards.len() {
@@ -279,19 +285,19 @@ fn boards(o: &Observation, f: &mut Findings) {
         if board.rebooted {
             f.problem(
                 format!("board {n} rebooted and lost its number"),
-                "power, watchdog or a crash of its application",
+                "a power loss, a watchdog reset or a crash of its application",
                 "`ucom init`",
             );
         }
         match board.life {
             Life::Lost => f.problem(
                 format!("board {n} gives no heartbeat"),
-                "it lost power or the bus",
+                "the board lost power or its connection to the bus",
                 format!("`ucom info {n}`, cable and power of this board"),
             ),
             Life::Late => f.warn(
                 format!("board {n} is late with its heartbeats"),
-                "the bus is overloaded or frames get lost",
+                "the bus is overloaded or frames are lost",
                 "`ucom monitor`",
             ),
             Life::Unarmed | Life::Alive => {}

@@ -24,7 +24,8 @@ impl BusOff {
         (self.reported, self.reported_us) = (times, Some(now_us));
         let often = if new == 1 { String::new() } else { format!(" ({new} times)") };
         Some(format!(
-            "the CAN controller of this computer is bus-off{often}: {WHY}; what it was sending is lost\n  next: {}",
+            "the CAN controller of this computer is bus-off{often}: {WHY}; the frames that it was sending \
+             are lost\n  next: {}",
             next(url)
         ))
     }
@@ -35,9 +36,10 @@ impl BusOff {
 pub fn next(url: &str) -> String {
     match url.strip_prefix("socketcan:") {
         Some(interface) => format!(
-            "sudo ip link set {interface} type can restart brings it back (restart-ms 100 at the interface's set-up does so by itself), then ucom doctor"
+            "run sudo ip link set {interface} type can restart (with restart-ms 100 in its set-up, the interface \
+             restarts by itself), then ucom doctor"
         ),
-        None => "ucom doctor looks at the bus".into(),
+        None => "check the bus with ucom doctor".into(),
     }
 }
 

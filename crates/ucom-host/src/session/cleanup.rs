@@ -37,7 +37,7 @@ impl State {
         });
         let steps: Vec<Cleanup> = [runs, under_way, started].into_iter().flatten().collect();
         if steps.is_empty() {
-            let what = if self.changed { "what was begun is complete" } else { "nothing was changed" };
+            let what = if self.changed { "all started steps are complete" } else { "nothing was changed" };
             return format!("ucom: ended at once; {what}\n");
         }
         let lines =
@@ -98,8 +98,8 @@ impl CleanupList {
 fn cleanup_of_running(boards: &[u8]) -> Cleanup {
     let list = |separator: &str| boards.iter().map(u8::to_string).collect::<Vec<_>>().join(separator);
     let what = match boards.len() {
-        1 => "may run; without heartbeats it becomes safe by itself",
-        _ => "may run; without heartbeats they become safe by themselves",
+        1 => "may run; without heartbeats the board becomes safe by itself",
+        _ => "may run; without heartbeats the boards become safe by themselves",
     };
     (format!("{} {what}", several(boards.len(), &list(", "))), format!("ucom stop {}", list(",")))
 }
@@ -124,7 +124,7 @@ fn cleanup_of(request: &Request) -> Option<Cleanup> {
             (format!("board {board} may be in its exloader"), format!("ucom start {board}"))
         }
         Request::Start { board, .. } | Request::Stop { board, .. } => (
-            format!("board {board} may be started; if it runs, it becomes safe without heartbeats"),
+            format!("board {board} may be started; if the board runs, it becomes safe without heartbeats"),
             format!("ucom stop {board}"),
         ),
         Request::Run(options) => {
@@ -133,21 +133,21 @@ fn cleanup_of(request: &Request) -> Option<Cleanup> {
         Request::Update(options) if options.dry_run => return None,
         Request::Update(options) => {
             let boards: Vec<String> = options.targets.iter().map(|t| t.board.to_string()).collect();
-            let next = "the same ucom update again; boards that are done are passed over";
+            let next = "repeat the same ucom update; boards that are up to date are skipped";
             let boards = several(boards.len(), &boards.join(", "));
             (format!("{boards} may be without a valid application"), next.into())
         }
         Request::SetStatus { board, .. } | Request::Admin { board, .. } => {
-            (format!("what board {board} took of it is not known"), format!("ucom status {board}"))
+            (format!("the state of board {board} is not known"), format!("ucom status {board}"))
         }
         Request::RawStatus { seen, .. } => {
             let boards = seen.iter().map(u8::to_string).collect::<Vec<_>>();
-            let what = format!("what {} took of it is not known", several(boards.len(), &boards.join(", ")));
+            let what = format!("the state of {} is not known", several(boards.len(), &boards.join(", ")));
             (what, format!("ucom status {}", boards.join(",")))
         }
         // These requests may have started a board or renumbered the chain.
         Request::Probe(_) | Request::Conformance(_) => {
-            ("what the boards do is not known".into(), "ucom scan".into())
+            ("the state of the boards is not known".into(), "ucom scan".into())
         }
     };
     Some((what, next))
@@ -181,7 +181,7 @@ mod tests {
         cleanup.forget();
         cleanup.begin(&Request::Scan);
         let words = cleanup.words();
-        assert!(words.contains("what was begun is complete"), "{words}");
+        assert!(words.contains("all started steps are complete"), "{words}");
     }
 
     /// During any request, the list contains the boards that earlier requests of the same command have started.

@@ -268,8 +268,8 @@ pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> 
             format!("board {board} reports {code}: {} {}", code.meaning(), code.reaction())
         }
         Event::Supervision { board, change } => match change {
-            Supervision::Late => format!("board {board}: heartbeat is late"),
-            Supervision::Lost => format!("board {board}: lost, no heartbeat any more"),
+            Supervision::Late => format!("board {board}: the heartbeat is late"),
+            Supervision::Lost => format!("board {board}: lost, its heartbeats have stopped"),
             Supervision::Back => format!("board {board}: back"),
             Supervision::Rebooted { ucom_id } => {
                 format!(
@@ -283,7 +283,7 @@ pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> 
         Event::Debug { board, text } => format!("board {board} sends: {text}"),
         Event::Foreign(kind) => format!("frames of another protocol are on the bus: {kind}"),
         Event::CompetingMaster { function, to } => {
-            format!("another PC talks on the bus: {} to {to}", function.name())
+            format!("another PC sends on the bus: {} to {to}", function.name())
         }
         Event::NumberShared { board, found } => Error::Identity(IdentityError::NumberShared {
             board: *board,

@@ -40,7 +40,7 @@ pub enum SessionError {
         url: String,
     },
     /// A board failed after other boards had been changed.
-    #[error("{failure}; changed already: board {}", list(done))]
+    #[error("{failure}; already changed: board {}", list(done))]
     Partly {
         /// The failure.
         failure: Box<SessionError>,
@@ -51,7 +51,7 @@ pub enum SessionError {
     #[error("no board answers")]
     NoBoards,
     /// Boards are present, but none of them has a number.
-    #[error("{}", if *boards == 1 { "1 board is there, without a number".to_owned() } else { format!("{boards} boards are there, none has a number") })]
+    #[error("{}", if *boards == 1 { "1 board reports, but it has no number".to_owned() } else { format!("{boards} boards report, but none has a number") })]
     NoNumbers {
         /// Number of boards.
         boards: usize,
@@ -110,7 +110,7 @@ pub enum ValuesError {
         error: Box<ValueError>,
     },
     /// A signal has two values.
-    #[error("board {board}: {} `{name}` is given twice", kind.name())]
+    #[error("board {board}: {} `{name}` has two values", kind.name())]
     Twice {
         /// The board.
         board: u8,
@@ -120,7 +120,7 @@ pub enum ValuesError {
         name: String,
     },
     /// A value is for a board that is not selected.
-    #[error("{board}.{name}: board {board} is not among those to {to}")]
+    #[error("{board}.{name}: board {board} is not one of the boards to {to}")]
     NotMeant {
         /// The board.
         board: u8,
@@ -130,7 +130,7 @@ pub enum ValuesError {
         to: &'static str,
     },
     /// Values were sent, but the application was not running and could not receive them.
-    #[error("board {board}: values were sent, but {why}: what it has now is unknown{}", before(written))]
+    #[error("board {board}: values were sent, but {why}: its values are unknown now{}", before(written))]
     Unknown {
         /// The board.
         board: u8,
@@ -194,17 +194,20 @@ impl Diagnose for SessionError {
             Self::Open(e) if matches!(**e, OpenError::Url(_)) => {
                 (Usage, "usage", "ucom --help shows the forms of --bus")
             }
-            Self::Open(_) => (NoLink, "bus", "is the bus there and up? ucom sim makes a simulated one"),
+            Self::Open(_) => {
+                (NoLink, "bus", "check that the bus exists and is up; ucom sim makes a simulated bus")
+            }
             Self::Partly { failure, .. } => return failure.diagnosis(),
-            Self::Bus(_) => (NoLink, "bus", "is the bus still there? ucom doctor looks at it"),
+            Self::Bus(_) => (NoLink, "bus", "check the bus with ucom doctor"),
             Self::Frame(_) => (Fault, "frame", ""),
-            Self::NoBoards => (NoLink, "no-boards", "ucom doctor looks for the reason"),
-            Self::NoNumbers { .. } => (NoLink, "no-numbers", "ucom init numbers them"),
-            Self::Lost { .. } => (Fault, "lost", "ucom doctor looks at bus and boards"),
+            Self::NoBoards => (NoLink, "no-boards", "find the cause with ucom doctor"),
+            Self::NoNumbers { .. } => (NoLink, "no-numbers", "number the boards with ucom init"),
+            Self::Lost { .. } => (Fault, "lost", "check bus and boards with ucom doctor"),
             Self::LeftLoop { .. } => (
                 Fault,
                 "left-loop",
-                "ucom doctor: another PC on the bus, heartbeats that did not arrive, an application that stops",
+                "find the cause with ucom doctor: another PC on the bus, lost heartbeats, or an application \
+                 that stops",
             ),
             Self::NoNames { failed } => {
                 let started = failed.iter().all(|(_, e)| e.is_not_started());
@@ -216,7 +219,7 @@ impl Diagnose for SessionError {
                 }
                 return diagnosis;
             }
-            Self::Unexpected(_) => (Fault, "internal", "this is a mistake in ucom; please report it"),
+            Self::Unexpected(_) => (Fault, "internal", "this is an error in ucom; please report it"),
         };
         Diagnosis::new(kind, code, next)
     }
@@ -247,7 +250,7 @@ impl Diagnose for ValuesError {
         use ErrorKind::{Fault, Refused, Usage};
         match self {
             Self::NoSignal { .. } | Self::NotMeant { .. } => Diagnosis::new(Usage, "usage", ""),
-            Self::Twice { .. } => Diagnosis::new(Usage, "usage", "give each name once: nothing was sent"),
+            Self::Twice { .. } => Diagnosis::new(Usage, "usage", "give each name once; nothing was sent"),
             Self::Value { error, program_id, .. } if matches!(**error, ValueError::Meaning { .. }) => {
                 let next = format!(
                     "add program 0x{program_id:04X} to the signal table (ucom help edges), or give the word as 0x0000"
@@ -303,8 +306,8 @@ fn unnamed(failed: &[(u8, SessionError)]) -> String {
 fn losses(lost: usize, rebooted: usize) -> String {
     let times = |n: usize, what: &str| match n {
         0 => None,
-        1 => Some(format!("once a board {what}")),
-        n => Some(format!("{n} times a board {what}")),
+        1 => Some(format!("a board {what} once")),
+        n => Some(format!("a board {what} {n} times")),
     };
     let what = [times(lost, "was lost"), times(rebooted, "has rebooted")];
     what.into_iter().flatten().collect::<Vec<_>>().join(", ")
@@ -324,7 +327,7 @@ fn left(boards: &[u8]) -> String {
 fn before(written: &Option<Vec<u8>>) -> String {
     match written.as_deref() {
         None => String::new(),
-        Some([]) => "; no board was written to before".into(),
-        Some(boards) => format!("; written before: board {}", list(boards)),
+        Some([]) => "; no other board was written".into(),
+        Some(boards) => format!("; already written: board {}", list(boards)),
     }
 }

@@ -72,14 +72,14 @@ impl Driver {
             match event {
                 Event::FlashBegins { id, flash_number } => {
                     if let Err(error) = records.set(*flash_number, None) {
-                        notes.push(format!("{error}; the update ends before anything more is erased"));
+                        notes.push(format!("{error}; the update ends before it erases more memory"));
                         master.cancel(*id);
                     }
                 }
                 Event::FlashVerified { info, .. } => {
                     let record = FlashRecord::new(&image.bytes, image.address_words, info);
                     if let Err(error) = records.set(info.flash_number, Some(record)) {
-                        notes.push(format!("what was written is not kept in the inventory: {error}"));
+                        notes.push(format!("the written program is not recorded in the inventory: {error}"));
                     }
                 }
                 _ => {}

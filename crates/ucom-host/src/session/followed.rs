@@ -76,13 +76,13 @@ impl Notice {
     /// Returns the text; `None` if the driver shows the event itself.
     pub fn text(&self) -> Option<String> {
         let board = self.board;
-        let age = self.age_s.map_or_else(|| "none came".to_owned(), |s| format!("{s:.1} s old"));
+        let age = self.age_s.map_or_else(|| "none received".to_owned(), |s| format!("{s:.1} s old"));
         let what = match self.change {
             Change::LeftLoop => {
                 format!("has left its control loop by itself; its last outputs: {age}, stale")
             }
             Change::StoppedByPolicy => {
-                format!("was stopped, as a board was lost; its last outputs: {age}, stale")
+                format!("was stopped because a board was lost; its last outputs: {age}, stale")
             }
             Change::InLoop => "is in its control loop again".into(),
             _ => return None,

@@ -139,7 +139,7 @@ fn with_signals(
     let mut signals = BoardSignals::new(&names, program, &profile);
     // The user has a table and therefore expects units. Without an entry for this program, values would be sent unscaled.
     if table.is_given() && program.is_none() && info.has_application() {
-        strays.push(format!("it knows nothing of {who}"));
+        strays.push(format!("the table does not contain {who}"));
         signals = signals.raw_only();
     }
     Known { board, info, names, signals, strays }

@@ -69,8 +69,8 @@ pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
     let unknown = |why: String| Err(ValuesError::Unknown { board, why, written: None });
     match driver.seen(board) {
         Ok(found) if found.info.status.has(Status::MSTART) => Ok(()),
-        Ok(_) => unknown("its application does not run any more".into()),
-        Err(e) => unknown(format!("it does not answer since ({e})")),
+        Ok(_) => unknown("its application has stopped".into()),
+        Err(e) => unknown(format!("the board no longer answers ({e})")),
     }
 }
 
@@ -107,8 +107,9 @@ impl ParameterFile {
             ParamsFile::read(path).map_err(|e| wrong(e.to_string(), "ucom help params shows the form"))?;
         if file.boards.iter().all(|b| b.par.is_empty() && b.ci.is_empty()) {
             return Err(wrong(
-                format!("{}: there is no value in it", path.display()),
-                "a name without # before it and with a value behind it is one, as `kp: 120`; by number \"#0\": 120",
+                format!("{}: the file contains no value", path.display()),
+                "write a name and a value without # at the beginning of the line, as `kp: 120`, or an index \
+                 and a value, as \"#0\": 120",
             ));
         }
         let inventory = inventory(inventory_file).map_err(|e| wrong(e.to_string(), ""))?;

@@ -28,7 +28,7 @@ impl FromStr for Boards {
         let number = |word: &str| {
             let number = word.trim().parse().ok().filter(|n| *n <= 31);
             number.ok_or_else(|| {
-                format!("\"{word}\" is no board: a number 0..31, a list 1,3, a range 1-4, or all")
+                format!("\"{word}\" is not a board, expected a number 0..31, a list 1,3, a range 1-4, or all")
             })
         };
         let mut boards: Vec<u8> = Vec::new();
@@ -37,7 +37,7 @@ impl FromStr for Boards {
                 Some((first, last)) => {
                     let (first, last) = (number(first)?, number(last)?);
                     if first > last {
-                        return Err(format!("{word} is backwards: {last}-{first}"));
+                        return Err(format!("the range {word} is in reverse order, expected {last}-{first}"));
                     }
                     boards.extend(first..=last);
                 }
@@ -46,7 +46,11 @@ impl FromStr for Boards {
         }
         boards.sort_unstable();
         boards.dedup();
-        if boards.is_empty() { Err(format!("\"{text}\" names no board")) } else { Ok(Self::Some(boards)) }
+        if boards.is_empty() {
+            Err(format!("\"{text}\" does not contain a board"))
+        } else {
+            Ok(Self::Some(boards))
+        }
     }
 }
 
@@ -73,7 +77,7 @@ impl FromStr for Assignment {
             _ => (None, left),
         };
         if name.trim().is_empty() {
-            return Err(format!("\"{text}\" names nothing; {form}"));
+            return Err(format!("\"{text}\" has no name; {form}"));
         }
         Ok(Self { board, name: name.trim().to_owned(), value })
     }
@@ -107,7 +111,7 @@ mod tests {
         for wrong in ["32", "", "1,,2", "3-1", "-1", "x", "0x1"] {
             assert!(wrong.parse::<Boards>().is_err(), "{wrong}");
         }
-        assert_eq!("1,4-2".parse::<Boards>(), Err("4-2 is backwards: 2-4".into()));
+        assert_eq!("1,4-2".parse::<Boards>(), Err("the range 4-2 is in reverse order, expected 2-4".into()));
     }
 
     #[test]

@@ -108,7 +108,7 @@ impl Prepared {
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {
-                driver.note(format!("board {board} may still be started: {e}"));
+                driver.note(format!("the application of board {board} may still run: {e}"));
             }
         }
     }

@@ -71,7 +71,10 @@ impl Watch {
             match &event {
                 Event::CompetingMaster { function, to } => {
                     if self.competing_master.is_none() {
-                        self.note(time_s, "another PC is master of the bus: this view only listens".into());
+                        self.note(
+                            time_s,
+                            "another PC is master of the bus: this view sends no requests".into(),
+                        );
                     }
                     self.competing_master = Some((*function, *to));
                 }
@@ -97,18 +100,23 @@ impl Watch {
     /// Stops the control loops of all boards. This PC need not be the master.
     pub fn stop(&mut self, driver: &mut Driver) {
         if self.listen_only {
-            self.message = "--listen-only: nothing was sent; `ucom stop all` stops the boards".into();
+            self.message =
+                "nothing was sent because of --listen-only; `ucom stop all` stops the boards".into();
             return;
         }
         driver.stop_at_once(None);
-        self.message = "stop sent to all boards; `ucom stop all` also ends their applications".into();
+        self.message = "Stop sent to all boards; `ucom stop all` also ends their applications".into();
     }
 
     /// Asks the boards for their identity again, if questions are allowed.
     pub fn ask_again(&mut self) {
         self.ask = !self.listen_only;
-        self.message =
-            if self.listen_only { "--listen-only: nothing is asked" } else { "asked again" }.into();
+        self.message = if self.listen_only {
+            "no request was sent because of --listen-only"
+        } else {
+            "the boards are asked again"
+        }
+        .into();
     }
 
     fn note(&mut self, time_s: f64, text: String) {
@@ -209,7 +217,7 @@ impl Picture<'_> {
 
 fn nobody(watch: &Watch) -> &'static str {
     match watch.listen_only {
-        true => "no board sends anything; without --listen-only the boards are asked who they are",
+        true => "no board sends frames; without --listen-only, ucom asks the boards for their identity",
         false => "no board answers",
     }
 }

@@ -211,13 +211,14 @@ fn doctor_distinguishes_silence_rate_and_termination() {
     let mut silent = observe(&mut Bench::chain(&[]));
     assert!(text(&silent).contains("Problem no frame within"));
     silent.controller = Some(Controller { no_acknowledge: 3, ..Default::default() });
-    assert!(text(&silent).contains("nobody acknowledges our frames (3 times)"));
+    assert!(text(&silent).contains("no node acknowledges the frames of this PC (3 times)"));
     silent.controller = Some(Controller { protocol_errors: 40, ..Default::default() });
     assert!(text(&silent).contains(
-        "40 bus errors and no frame / frames are there but none can be read: usually another bit rate"
+        "40 bus errors and no valid frame / frames are on the bus but cannot be read: usually the bit rate \
+         is wrong"
     ));
     silent.other_bitrate = Some(500_000);
-    assert!(text(&silent).contains("wrong bit rate: frames come at 500000 bit/s"));
+    assert!(text(&silent).contains("wrong bit rate: frames are received at 500000 bit/s"));
     let mut good = observe(&mut initialised(&[0x21, 0x42]));
     good.controller = Some(Controller { tec: Some(0), rec: Some(0), ..Default::default() });
     assert!(findings(&good).iter().all(|f| f.severity == Severity::Good), "{}", text(&good));
@@ -239,7 +240,7 @@ fn doctor_names_what_is_wrong_in_the_chain() {
     let o = observe(&mut bench);
     let t = text(&o);
     assert!(
-        t.contains("1 board has no number beside 1 that has one / a reboot, or the init wire behind board 1"),
+        t.contains("1 of 2 boards has no number / a board rebooted, or the init wire after board 1"),
         "{t}"
     );
     assert!(t.contains("board 2 rebooted"), "{t}");

@@ -238,7 +238,12 @@ fn update_of_nobody() {
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!((report.exit(), bench.count("041#")), (3, 0));
     assert!(
-        report.boards[0].failure.as_ref().unwrap().to_string().contains("nothing received from it at all")
+        report.boards[0]
+            .failure
+            .as_ref()
+            .unwrap()
+            .to_string()
+            .contains("no frame was received from this board")
     );
 }
 

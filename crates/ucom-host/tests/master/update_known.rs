@@ -136,7 +136,7 @@ fn u3_another_date_is_up_to_date() {
     let words = report.shown_already(&report.boards[0], &Profile::default());
     assert_eq!(
         words.as_deref(),
-        Some("same Program ID, flashed 2009-06-01; content and address are not known")
+        Some("same Program ID, flashed 2009-06-01; content and address not verified")
     );
     // The program with the required date is written.
     let asked = UpdateOptions { any_date: false, ..today(options) };

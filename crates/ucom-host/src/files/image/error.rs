@@ -30,20 +30,20 @@ pub enum ImageError {
         starts: String,
     },
     /// An editor has written a byte order mark before the first record.
-    #[error("byte 1: a {mark} byte order mark stands before the text; save it as plain ASCII")]
+    #[error("byte 1: the text begins with a {mark} byte order mark; save the file as plain ASCII")]
     ByteOrderMark {
         /// Encoding of the mark.
         mark: &'static str,
     },
     /// The format of the bytes is not known.
-    #[error("{name}: no record of Intel HEX or S-record, and no `.bin`")]
+    #[error("{name}: the file has no record of Intel HEX or S-record, and its name does not end in `.bin`")]
     NotBin {
         /// The file.
         name: String,
     },
     /// The file would be read as raw bytes, but it contains records, complete or damaged.
     #[error(
-        "{place}: a record of Intel HEX or S-record, or what is left of one; its characters are no program"
+        "{place}: a complete or damaged record of Intel HEX or S-record; these characters are not a program"
     )]
     WasRecords {
         /// Place of the first record.
@@ -56,7 +56,7 @@ pub enum ImageError {
         starts: String,
     },
     /// Raw bytes were requested, but the name is the name of an Intel HEX or S-record file.
-    #[error("{name}: raw bytes were requested, but by its name this is an Intel HEX or S-record file")]
+    #[error("{name}: raw bytes were requested, but its name is that of an Intel HEX or S-record file")]
     RawName {
         /// The file.
         name: String,
@@ -70,7 +70,7 @@ pub enum ImageError {
         unit: AddressUnit,
     },
     /// The format does not exist.
-    #[error("unknown image format `{name}`: one of bin, hex, srec")]
+    #[error("unknown image format `{name}`, expected bin, hex or srec")]
     UnknownFormat {
         /// Requested name.
         name: String,
@@ -102,7 +102,7 @@ pub enum ImageError {
         lines: usize,
     },
     /// The records leave a gap in the addresses.
-    #[error("{bytes} bytes at word address 0x{address_words:X} are in no record")]
+    #[error("no record contains the {bytes} bytes at word address 0x{address_words:X}")]
     Gap {
         /// First address without data, in words.
         address_words: u32,
@@ -110,7 +110,7 @@ pub enum ImageError {
         bytes: usize,
     },
     /// The image does not fit into 32-bit word addresses.
-    #[error("{words} words from word address 0x{address_words:X} end beyond 32 bits")]
+    #[error("{words} words from word address 0x{address_words:X} end above the 32-bit address range")]
     AddressRange {
         /// Load address in words.
         address_words: u32,
@@ -123,7 +123,7 @@ pub enum ImageError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LineProblem {
     /// The line does not start with the mark of a record.
-    #[error("a record starts with `{expected}`")]
+    #[error("the record does not start with `{expected}`")]
     Start {
         /// The mark.
         expected: char,
@@ -132,7 +132,7 @@ pub enum LineProblem {
     #[error("not a hexadecimal digit")]
     Digit,
     /// The length of the record differs from the length that it declares.
-    #[error("the record declares {declared} bytes and has {has}")]
+    #[error("the record has {has} bytes, expected {declared}")]
     Length {
         /// Number of bytes that the length byte declares.
         declared: usize,
@@ -140,7 +140,7 @@ pub enum LineProblem {
         has: usize,
     },
     /// Wrong checksum.
-    #[error("checksum is {has:02X}, should be {should:02X}")]
+    #[error("the checksum is {has:02X}, expected {should:02X}")]
     Checksum {
         /// Checksum in the line.
         has: u8,
@@ -154,7 +154,7 @@ pub enum LineProblem {
         kind: u8,
     },
     /// The data begin or end in the middle of a word.
-    #[error("address 0x{address:X} and length {bytes} do not make whole words")]
+    #[error("address 0x{address:X} or length {bytes} does not match whole words")]
     HalfWord {
         /// Address in the unit of the record.
         address: u64,
@@ -162,13 +162,13 @@ pub enum LineProblem {
         bytes: usize,
     },
     /// An address already has another value.
-    #[error("byte address 0x{address:X} is given twice with different values")]
+    #[error("byte address 0x{address:X} has two different values")]
     Overlap {
         /// First such byte address.
         address: u64,
     },
     /// The data would make the image larger than the limit.
-    #[error("the image gets larger than {limit} bytes: 0x{from:X} to 0x{to:X} (byte addresses)")]
+    #[error("the image from 0x{from:X} to 0x{to:X} (byte addresses) is larger than {limit} bytes")]
     TooLarge {
         /// The limit in bytes.
         limit: usize,
@@ -181,7 +181,7 @@ pub enum LineProblem {
     #[error("data after the end record")]
     AfterEnd,
     /// The count record has a wrong number.
-    #[error("the count record declares {declared} data records, there are {has}")]
+    #[error("the file has {has} data records, but its count record says {declared}")]
     Count {
         /// Number of data records in the count record.
         declared: u32,

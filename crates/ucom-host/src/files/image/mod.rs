@@ -151,11 +151,11 @@ impl fmt::Display for ImageNote {
                 write!(f, "gap of {bytes} bytes at word address 0x{address_words:X} filled with FF")
             }
             Self::EndedByCount { records } => {
-                write!(f, "no end record; the count record shows that all {records} data records are there")
+                write!(f, "no end record; the count record confirms all {records} data records")
             }
             Self::LastWordPadded => f.write_str("odd number of bytes: FF added to fill the last word"),
             Self::AddressesCount(unit) => {
-                write!(f, "addresses taken as those of {unit}s: only so the records follow each other")
+                write!(f, "addresses are read in {unit}s, because only then the records are contiguous")
             }
         }
     }

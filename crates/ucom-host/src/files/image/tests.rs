@@ -98,9 +98,9 @@ fn the_unit_of_addresses_is_taken_from_the_records() {
         Err(ImageError::OtherUnit { error, unit: AddressUnit::Byte }) => error.to_string(),
         other => panic!("{other:?}"),
     };
-    assert_eq!(other(&file(2, 16, 16)), "16 bytes at word address 0x108 are in no record");
+    assert_eq!(other(&file(2, 16, 16)), "no record contains the 16 bytes at word address 0x108");
     // A table of vectors: two words, then a gap of two words.
-    assert_eq!(other(&file(16, 4, 4)), "4 bytes at word address 0x102 are in no record");
+    assert_eq!(other(&file(16, 4, 4)), "no record contains the 4 bytes at word address 0x102");
     // Intel HEX with addresses that count words. Read as byte addresses, the data would overlap.
     let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
     let hex = lines.collect::<String>() + ":00000001FF\n";

@@ -12,7 +12,7 @@ fn what_cannot_be_is_refused() {
     let refused = |text: &str| Inventory::parse(text).unwrap_err().to_string();
     assert!(refused("[[board]]\nnumber = 32\nflash_number = 1").contains("above 31"));
     let twice = "[[board]]\nnumber = 1\nflash_number = 1\n[[board]]\nnumber = 1\nflash_number = 2";
-    assert!(refused(twice).contains("board 1 is given twice"));
+    assert!(refused(twice).contains("board 1 has two entries"));
     let same = "[[board]]\nnumber = 1\nflash_number = 7\n[[board]]\nnumber = 2\nflash_number = 7";
     assert!(refused(same).contains("0x0007") && refused(same).contains("boards 1 and 2"));
     assert!(refused("[[board]]\nnumber = 1\nflash_number = 1\nposition = 2").contains("position"));

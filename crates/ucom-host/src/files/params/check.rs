@@ -60,10 +60,10 @@ impl core::fmt::Display for ParamsProblem {
 #[non_exhaustive]
 pub enum ParamsProblemKind {
     /// No board answers under this number.
-    #[error("it does not answer")]
+    #[error("the board does not answer")]
     Absent,
     /// Another board has this number.
-    #[error("its flash number is 0x{found:04X}, the file is for 0x{wanted:04X}")]
+    #[error("its flash number is 0x{found:04X}, but the file is for 0x{wanted:04X}")]
     WrongFlash {
         /// Flash number in the file.
         wanted: u16,
@@ -71,7 +71,7 @@ pub enum ParamsProblemKind {
         found: u16,
     },
     /// The inventory has another name for the board.
-    #[error("the file is for `{wanted}`, the inventory calls it {}", found.as_ref().map_or("nothing".into(), |f| format!("`{f}`")))]
+    #[error("the file is for `{wanted}`, but the name in the inventory is {}", found.as_ref().map_or("missing".into(), |f| format!("`{f}`")))]
     WrongName {
         /// Name in the file.
         wanted: String,
@@ -79,7 +79,7 @@ pub enum ParamsProblemKind {
         found: Option<String>,
     },
     /// The board has another program than the file expects.
-    #[error("its program is {}, the names in the file belong to 0x{wanted:04X}", found.map_or("missing".into(), |f| format!("0x{f:04X}")))]
+    #[error("its program is {}, but the names in the file belong to 0x{wanted:04X}", found.map_or("missing".into(), |f| format!("0x{f:04X}")))]
     WrongProgram {
         /// Program ID in the file.
         wanted: u16,
@@ -90,7 +90,7 @@ pub enum ParamsProblemKind {
     #[error("{0}")]
     NoSignal(SignalError),
     /// A signal has two entries.
-    #[error("{kind} `{name}` is given twice, first in line {first}")]
+    #[error("{kind} `{name}` has two entries, the first one in line {first}")]
     Twice {
         /// `CI` or `PAR`.
         kind: &'static str,

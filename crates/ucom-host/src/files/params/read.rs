@@ -75,7 +75,8 @@ fn number(text: &Spanned<String>, what: &str) -> Result<u16, ParamsError> {
         }
         _ => None,
     };
-    let no = || wrong(place(text), format!("\"{}\" is no {what}; it is 0x0000 to 0xFFFF", text.value));
+    let no =
+        || wrong(place(text), format!("\"{}\" is not a valid {what}, expected 0x0000 to 0xFFFF", text.value));
     number.ok_or_else(no)
 }
 
@@ -91,24 +92,26 @@ fn entries(values: Option<Values>, board: u8) -> Result<Vec<ParamsEntry>, Params
 fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
     let at = place(&spanned);
     let Board { board, flash_number, name, program_id, par, ci } = spanned.value;
-    let no_board = || wrong(place(&board), format!("\"{}\" is no board; boards are 0 to 31", board.value));
+    let no_board =
+        || wrong(place(&board), format!("\"{}\" is not a board number, expected 0 to 31", board.value));
     let number_of = number(&board, "board").map_err(|_| no_board())?;
     let number_of = u8::try_from(number_of).ok().filter(|n| *n <= 31).ok_or_else(no_board)?;
     let flash_number = flash_number.map(|text| number(&text, "flash number")).transpose()?;
     let name = name.map(|n| n.trim().to_owned()).filter(|n| !n.is_empty());
     if flash_number.is_none() && name.is_none() {
         let what = format!(
-            "board {number_of}: neither flash_number nor name identifies the board that must stand there; \
-             `ucom info {number_of}` shows the flash number"
+            "board {number_of}: flash_number and name are missing, so the board cannot be identified; `ucom \
+             info {number_of}` shows the flash number"
         );
         return Err(wrong(at, what));
     }
     let program_id = match program_id {
         Some(text) if text.value.trim() == "any" => None,
-        Some(text) => Some(number(&text, "Program ID, and not the word any")?),
+        Some(text) => Some(number(&text, "Program ID or any")?),
         None => {
             let what = format!(
-                "board {number_of}: program_id is missing: the names belong to a program (any: to whatever is there)"
+                "board {number_of}: program_id is missing; give the Program ID that has these names, or any \
+                 for every program"
             );
             return Err(wrong(at, what));
         }
@@ -124,24 +127,27 @@ fn people(words: &str) -> String {
     if let Some(rest) = words.strip_prefix("duplicate mapping key") {
         let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);
         let key = if key.is_empty() { "a name".to_owned() } else { format!("`{key}`") };
-        return format!("{key} is given twice under the same heading");
+        return format!("{key} has two entries under the same heading");
     }
     if words.starts_with("multiple YAML documents") {
-        return "a second document begins (a line of ---); a parameter file is one".into();
+        return "a second document begins (a line of ---), but a parameter file is one document".into();
     }
     if words.starts_with("unexpected end of input") {
-        return "there is nothing in it: the end of input comes before `boards:`".into();
+        return "the file is empty: it has no `boards:`".into();
     }
     let list = ["invalid type: sequence", "expected string scalar", "expected scalar"];
     if list.iter().any(|start| words.starts_with(start)) {
-        return "here stands a list or a group of names where one value is expected, as `kp: 120`".into();
+        return "this is a list or a group of names, but one value is expected, as `kp: 120`".into();
     }
     if words.starts_with("cannot deserialize null into string") {
         return "a value is missing, as in `kp: 120`".into();
     }
     let terms = [
-        ("expected sequence start", "here a list is expected, each board with a hyphen, as `- board: 1`"),
-        ("expected mapping start", "here names with values are expected, as `kp: 120`"),
+        (
+            "expected sequence start",
+            "a list is expected here, with a hyphen before each board, as `- board: 1`",
+        ),
+        ("expected mapping start", "names with values are expected here, as `kp: 120`"),
         ("expected a sequence", "expected a list, as `- board: 1`"),
         ("struct Board", "a board, as `- board: 1`"),
         ("struct File", "`boards:` with a list"),
@@ -169,8 +175,10 @@ impl ParamsFile {
         for spanned in file.boards {
             let next = board(spanned)?;
             if let Some(before) = all.board(next.number) {
-                let what =
-                    format!("board {} is given twice, first in line {}", next.number, before.place.line);
+                let what = format!(
+                    "board {} has two entries, the first one in line {}",
+                    next.number, before.place.line
+                );
                 return Err(wrong(next.place, what));
             }
             all.boards.push(next);

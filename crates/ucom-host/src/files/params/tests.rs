@@ -63,18 +63,17 @@ fn another_board_or_program_is_a_problem_with_its_line() {
     let other = BoardInfo { flash_number: 0x42, program_id: 0x4B3F, ..info() };
     let text = message(&other, 1, None);
     assert!(
-        text.contains("line 2, column 5: board 1: its flash number is 0x0042, the file is for 0x0021"),
+        text.contains("line 2, column 5: board 1: its flash number is 0x0042, but the file is for 0x0021"),
         "{text}"
     );
-    assert!(text.contains("its program is 0x4B3F, the names in the file belong to 0x1234"), "{text}");
+    assert!(text.contains("its program is 0x4B3F, but the names in the file belong to 0x1234"), "{text}");
     let bare = BoardInfo { program_id: 0xFFFF, date: 0xFFFF, ..info() };
     assert!(message(&bare, 1, None).contains("its program is missing"));
     assert_eq!(message(&other, 2, Some("jaw")), "");
-    assert!(
-        message(&other, 2, Some("lips"))
-            .contains("line 11, column 5: board 2: the file is for `jaw`, the inventory calls it `lips`")
-    );
-    assert!(message(&other, 2, None).contains("calls it nothing"));
+    assert!(message(&other, 2, Some("lips")).contains(
+        "line 11, column 5: board 2: the file is for `jaw`, but the name in the inventory is `lips`"
+    ));
+    assert!(message(&other, 2, None).contains("name in the inventory is missing"));
 }
 
 /// All errors are reported together, each with line and column.
@@ -88,10 +87,10 @@ fn names_and_ranges_are_checked_with_their_place() {
         message,
         [
             "line 12, column 19: board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg",
-            "line 6, column 9: board 1 has no PAR `kq`; there is `kp [mA/deg]`",
-            "line 8, column 9: board 1: PAR `kp` is given twice, first in line 7",
+            "line 6, column 9: board 1 has no PAR `kq`; similar: `kp [mA/deg]`",
+            "line 8, column 9: board 1: PAR `kp` has two entries, the first one in line 7",
             "line 9, column 18: board 1: PAR `current_max`: 3 A is outside 0.000..2.000 A",
-            "line 10, column 11: board 1: PAR `mode`: on: it is a number",
+            "line 10, column 11: board 1: PAR `mode`: on: the signal is a number",
         ]
     );
 }
@@ -100,29 +99,29 @@ fn names_and_ranges_are_checked_with_their_place() {
 fn what_is_no_parameter_file_is_refused_with_its_place() {
     assert!(
         refused("boards:\n  - board: 32\n    flash_number: 1\n    program_id: any\n")
-            .contains("line 2, column 12: \"32\" is no board")
+            .contains("line 2, column 12: \"32\" is not a board number")
     );
     assert!(
         refused("boards:\n  - board: 1\n    program_id: any\n")
-            .contains("line 2, column 5: board 1: neither flash_number nor name")
+            .contains("line 2, column 5: board 1: flash_number and name are missing")
     );
     assert!(refused("boards:\n  - board: 1\n    name: x\n").contains("program_id is missing"));
     assert!(
         refused("boards:\n  - board: 1\n    flash_number: 0x12345\n")
-            .contains("line 3, column 19: \"0x12345\" is no flash number")
+            .contains("line 3, column 19: \"0x12345\" is not a valid flash number")
     );
     let twice =
         "boards:\n  - {board: 1, name: a, program_id: any}\n  - {board: 1, name: b, program_id: any}\n";
-    assert!(refused(twice).contains("line 3, column 5: board 1 is given twice, first in line 2"));
+    assert!(refused(twice).contains("line 3, column 5: board 1 has two entries, the first one in line 2"));
     let of = |par: &str| {
         refused(&format!("boards:\n  - board: 1\n    name: x\n    program_id: any\n    par:\n      {par}\n"))
     };
-    assert!(of("kp: abc").contains("line 6, column 11: board 1, `kp`: \"abc\" is no value"));
-    assert!(of("kp: 0x10000").contains("no word of 16 bits"));
+    assert!(of("kp: abc").contains("line 6, column 11: board 1, `kp`: \"abc\" is not a value"));
+    assert!(of("kp: 0x10000").contains("not a 16-bit word"));
     assert!(of("kp: ~").contains("line 6") && of("kp:").contains("line 6"), "{}", of("kp:"));
     assert!(of("kp: 1\n      kp: 2").contains("line 7"), "{}", of("kp: 1\n      kp: 2"));
     let message = of("kp: 1\n      kp: 2");
-    assert!(message.contains("`kp` is given twice") && !message.contains("Policy"), "{message}");
+    assert!(message.contains("`kp` has two entries") && !message.contains("Policy"), "{message}");
     let message = of("kp: [1, 2]");
     assert!(message.contains("line 6, column 11: ") && message.contains("one value"), "{message}");
     let message = refused("boards: []\n---\nboards: []\n");
@@ -130,7 +129,7 @@ fn what_is_no_parameter_file_is_refused_with_its_place() {
     assert!(message.contains("second document") && !message.contains("from_"), "{message}");
     assert!(refused("boards:\n  - bord: 1\n").contains("line 2"));
     assert!(refused("boards: 3\n").contains("line 1"), "{}", refused("boards: 3\n"));
-    assert!(refused("# nothing").contains("end of input"), "{}", refused("# nothing"));
+    assert!(refused("# nothing").contains("the file is empty"), "{}", refused("# nothing"));
     assert!(refused("boards: [\n").contains("line"));
 }
 

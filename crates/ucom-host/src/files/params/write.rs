@@ -39,7 +39,7 @@ pub struct SavedSignal {
 pub fn params_text(boards: &[SavedBoard]) -> String {
     let mut text = String::from(
         "# Parameters of boards; `ucom help params` explains the form, `ucom par --apply FILE` writes them.\n\
-         # Values are what is wanted. What is on a board cannot be read: names without a value are comments.\n\
+         # These are requested values. The values of a board cannot be read: names without a value are comments.\n\
          boards:\n",
     );
     if boards.is_empty() {

@@ -28,7 +28,7 @@ pub enum RecordingError {
         first: String,
     },
     /// The format cannot hold this frame.
-    #[error("FZI-CAN holds classic data frames of 11-bit ids only, this one is {frame}")]
+    #[error("FZI-CAN cannot store {frame}, only classic data frames with 11-bit ids")]
     NotRepresentable {
         /// The frame.
         frame: String,
@@ -47,7 +47,7 @@ pub enum RecordingError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordProblem {
     /// The line is longer than any record.
-    #[error("longer than {} bytes; is this a recording?", super::MAX_LINE)]
+    #[error("the line is longer than {} bytes; this may not be a recording", super::MAX_LINE)]
     TooLong,
     /// The line has a wrong number of columns.
     #[error("a line of candump is `(seconds) interface ID#DATA`")]
@@ -62,7 +62,7 @@ pub enum RecordProblem {
     #[error("not a length of 0 to 8")]
     Length,
     /// The text is not data.
-    #[error("the data are not pairs of hexadecimal digits, or are more than 8 bytes")]
+    #[error("the data are not pairs of hexadecimal digits, or have more than 8 bytes")]
     Data,
     /// The file ends in the middle of the record. The readable part may be only the beginning of the record.
     #[error("the file is broken off here: the line has no end")]

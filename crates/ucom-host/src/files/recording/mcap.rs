@@ -187,7 +187,7 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     });
     // A writer that was killed leaves a chunk without its length. Therefore the damage is not always at the end of the file.
     let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
-    let broken_off = |why: String| format!("the file is broken off after {} bytes{why}", file.len());
+    let broken_off = |why: String| format!("the file ends after {} bytes{why}", file.len());
     recording.broken_off = match read {
         Ok(true) => None,
         Ok(false) => Some(broken_off(String::new())),

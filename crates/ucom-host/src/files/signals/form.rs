@@ -83,7 +83,7 @@ impl FileSignal {
                 return Err("hex and bool have no scale, offset, min and max".into());
             }
         } else if !(1.0 / LARGEST..=LARGEST).contains(&scale.abs()) {
-            return Err(format!("scale = {scale}, but its size must be 1e-9 to 1e9"));
+            return Err(format!("scale = {scale} is out of range: its magnitude must be 1e-9 to 1e9"));
         }
         if let Some(wrong) =
             [Some(offset), min, max].into_iter().flatten().find(|x| !x.is_finite() || x.abs() > LARGEST)
@@ -96,17 +96,19 @@ impl FileSignal {
             return Err(format!("min = {min} is above max = {max}"));
         }
         if unit.chars().count() > 16 || unit.chars().any(|c| c.is_control() || c == '"') {
-            return Err(format!("unit {unit:?}: at most 16 characters, no quotation mark"));
+            return Err(format!(
+                "unit {unit:?} is not valid, expected at most 16 characters without a quotation mark"
+            ));
         }
         if !may_follow(&unit) || unit.trim() != unit {
-            return Err(format!("unit {unit:?} cannot stand behind a number"));
+            return Err(format!("unit {unit:?} cannot follow a number"));
         }
         let signal = Signal { kind, scale, offset, unit, min: None, max: None, known: true, raw_only: false };
         let ((low, high), (least, most)) = (signal.range(), signal.limits());
         let beyond = |x: &f64| !(low - 0.5 * scale.abs()..=high + 0.5 * scale.abs()).contains(x);
         for (key, limit) in [("min", min), ("max", max)] {
             if let Some(limit) = limit.filter(beyond) {
-                return Err(format!("{key} = {limit} is outside {least}..{most}, what the word can hold"));
+                return Err(format!("{key} = {limit} is outside {least}..{most}, the range of the word"));
             }
         }
         let signal = Signal { min, max, ..signal };
@@ -122,13 +124,13 @@ impl FileSignal {
 /// Rewords a message of the TOML library for the author of the table.
 pub(super) fn people(words: &str) -> String {
     let terms = [
-        ("duplicate key", "the same key is given twice"),
+        ("duplicate key", "the key has two entries"),
         ("expected f64", "expected a number, as 0.1"),
         ("expected struct FileSignal", "expected a signal, as { scale = 0.1 }"),
         ("expected struct FileProgram", "expected a program, as [[program]]"),
         ("expected a map", "expected signals by their names"),
         ("expected a sequence", "expected a list: [[program]] has two brackets"),
-        ("expected a string", "expected a text in quotation marks"),
+        ("expected a string", "expected text in quotation marks"),
     ];
     terms.iter().fold(words.to_owned(), |text, (theirs, ours)| text.replace(theirs, ours))
 }

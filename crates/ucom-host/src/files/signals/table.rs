@@ -46,7 +46,7 @@ pub enum SignalTableError {
         number: usize,
     },
     /// Two tables have the same Program ID.
-    #[error("program 0x{id:04X} is given twice")]
+    #[error("program 0x{id:04X} has two entries")]
     Twice {
         /// The Program ID.
         id: u16,
@@ -273,27 +273,24 @@ mod tests {
         };
         assert_eq!(
             refused("scale = 0"),
-            "program 0x0001, PAR `kp`: scale = 0, but its size must be 1e-9 to 1e9"
+            "program 0x0001, PAR `kp`: scale = 0 is out of range: its magnitude must be 1e-9 to 1e9"
         );
         assert!(refused("scale = nan").contains("NaN"));
         assert!(refused("offset = inf").contains("inf"));
         assert!(refused("min = 2, max = 1").contains("min = 2 is above max = 1"));
         let message = refused("scale = 0.01, unit = \"deg\", min = -60, max = 400");
-        assert!(
-            message.contains("max = 400 is outside -327.68..327.67, what the word can hold"),
-            "{message}"
-        );
+        assert!(message.contains("max = 400 is outside -327.68..327.67, the range of the word"), "{message}");
         assert!(refused("type = \"uint16\", min = -1").contains("min = -1 is outside 0..65535"));
         assert!(refused("scale = 100, min = 110, max = 150").contains("no word lies between"));
         assert!(refused("type = \"bool\", scale = 2").contains("have no scale"));
-        assert!(refused("unit = \"2m\"").contains("behind a number"));
+        assert!(refused("unit = \"2m\"").contains("cannot follow a number"));
         assert!(refused("scales = 2").contains("line 4") && refused("type = \"int8\"").contains("line 4"));
         let message = refused("scale = \"x\"");
         assert!(message.contains("expected a number") && !message.contains("f64"), "{message}");
         let form = |text: &str| SignalTable::parse(text).unwrap_err().to_string();
         assert!(form("[[program]]\nname = \"x\"").contains("program 1 has no program_id"));
-        assert!(form("[[program]]\nprogram_id = [1, 1]").contains("0x0001 is given twice"));
-        assert!(form("[[program]]\nprogram_id = 1\n[[program]]\nprogram_id = 1").contains("given twice"));
+        assert!(form("[[program]]\nprogram_id = [1, 1]").contains("0x0001 has two entries"));
+        assert!(form("[[program]]\nprogram_id = 1\n[[program]]\nprogram_id = 1").contains("has two entries"));
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
     }
 

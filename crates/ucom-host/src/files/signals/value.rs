@@ -25,11 +25,12 @@ pub enum SignalValue {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SignalValueError {
     /// The text is hexadecimal, but not a 16-bit word.
-    #[error("\"{0}\" is no word of 16 bits; they are 0x0000 to 0xFFFF")]
+    #[error("\"{0}\" is not a 16-bit word, expected 0x0000 to 0xFFFF")]
     Hex(String),
     /// The text has none of the forms of a value.
     #[error(
-        "\"{0}\" is no value; values are numbers (15.5deg; without a unit where there is none), words (0x05DC), on and off"
+        "\"{0}\" is not a value, expected a number (15.5deg, or 15.5 if the signal has no unit), a word \
+         (0x05DC), on or off"
     )]
     Form(String),
 }

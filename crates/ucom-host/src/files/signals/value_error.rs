@@ -19,7 +19,7 @@ pub enum ValueError {
         limit: f64,
     },
     /// The unit differs from the signal's unit.
-    #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]
+    #[error("{given}: {}", if unit.is_empty() { "the unit of the signal is not known".into() } else { format!("the unit of the signal is {unit}") })]
     Unit {
         /// Text of the user.
         given: String,
@@ -27,7 +27,7 @@ pub enum ValueError {
         unit: String,
     },
     /// A number without a unit, which could be the raw word or a value in the signal's unit.
-    #[error("{given}: {}, or the word itself as 0x0000", no_unit(given, unit))]
+    #[error("{given}: {}, or give the word as 0x0000", no_unit(given, unit))]
     NoUnit {
         /// Text of the user.
         given: String,
@@ -35,27 +35,27 @@ pub enum ValueError {
         unit: String,
     },
     /// The value lies between two words.
-    #[error("{given}: it is a whole number")]
+    #[error("{given}: the signal has whole numbers only")]
     Fraction {
         /// Text of the user.
         given: String,
     },
     /// The value is not 0, 1, on or off.
-    #[error("{given}: it is on or off")]
+    #[error("{given}: the signal has the values on and off only")]
     Switch {
         /// Text of the user.
         given: String,
     },
     /// The value is a number or a switch, but the meaning of the signal is not known.
     #[error(
-        "{given}: the signal table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
+        "{given}: the signal table does not contain this program, so only a word (0x0000 to 0xFFFF) is valid"
     )]
     Meaning {
         /// Text of the user.
         given: String,
     },
     /// The value is on or off, but the signal is a number.
-    #[error("{given}: it is a number")]
+    #[error("{given}: the signal is a number")]
     NoSwitch {
         /// Text of the user.
         given: String,
@@ -68,8 +68,9 @@ pub(super) fn space(unit: &str) -> String {
 
 fn no_unit(given: &str, unit: &str) -> String {
     match unit.is_empty() {
-        true => "the table scales it and names no unit: add one to the table (unit = \"ratio\") and give it"
+        true => "the table has a scale but no unit for this signal: add a unit to the table (unit = \
+                 \"ratio\") and give the value with it"
             .into(),
-        false => format!("the unit is missing: `{given}{unit}`"),
+        false => format!("the unit is missing: give `{given}{unit}`"),
     }
 }

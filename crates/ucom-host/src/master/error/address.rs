@@ -7,7 +7,10 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 #[non_exhaustive]
 pub enum AddressError {
     /// DSP_INITACK has different numbers in identifier and data (D-24).
-    #[error("DSP_INITACK under number {id} contains number {data}: the board is refused")]
+    #[error(
+        "DSP_INITACK with number {id} in its identifier contains number {data} in its data: the board was \
+         rejected"
+    )]
     AckMismatch {
         /// Number in the identifier.
         id: u8,
@@ -15,7 +18,7 @@ pub enum AddressError {
         data: u8,
     },
     /// The first board of the chain does not answer and could take the number.
-    #[error("board {other} does not answer: without a number it would take number {board}")]
+    #[error("board {other} does not answer; if it has no number, it would take number {board}")]
     MayTakeNumber {
         /// Number to be assigned.
         board: u8,
@@ -24,7 +27,8 @@ pub enum AddressError {
     },
     /// The boards that report are not the boards that have a number. A new address assignment could give boards other numbers than before.
     #[error(
-        "boards that report: {reports}, with a number: {boards}, or two share a flash id: not as `ucom init` leaves a chain"
+        "boards that report: {reports}, boards with a number: {boards}; these counts must be equal, and \
+         each flash id must be unique"
     )]
     NotNumbered {
         /// Number of different reports.
@@ -41,10 +45,10 @@ impl Diagnose for AddressError {
             Self::MayTakeNumber { other, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "may-take-number",
-                format!("`ucom repair {other}` first, or number all boards anew: `ucom init`"),
+                format!("`ucom repair {other}` first, or number all boards again: `ucom init`"),
             ),
             Self::NotNumbered { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "not-numbered", "`ucom init`, then again")
+                Diagnosis::new(ErrorKind::Refused, "not-numbered", "`ucom init`, then repeat the command")
             }
         }
     }

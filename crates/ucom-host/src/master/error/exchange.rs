@@ -10,7 +10,7 @@ use ucom::{ErrorCode, Function};
 #[non_exhaustive]
 pub enum ExchangeError {
     /// No board can have this number.
-    #[error("{number} is no board number (1 to 31, and {first} is the first here)")]
+    #[error("board number {number} is out of range ({first} to 31)")]
     NoBoard {
         /// The number.
         number: u8,
@@ -45,7 +45,8 @@ pub enum ExchangeError {
     },
     /// Answers of a board contradict each other.
     #[error(
-        "board {board}: its answers to PC_INFO contradict each other in {tries} tries (two boards with one number?)"
+        "board {board}: its answers to PC_INFO contradict each other in {tries} tries; two boards may have \
+         this number"
     )]
     Contradiction {
         /// Board number.
@@ -75,14 +76,16 @@ impl Diagnose for ExchangeError {
                 ErrorKind::NoLink,
                 "no-answer",
                 format!(
-                    "no frame of board {board} was received: `ucom scan` lists who is there, `ucom doctor` why not"
+                    "no frame of board {board} was received: `ucom scan` lists the boards that answer, \
+                     `ucom doctor` shows the cause"
                 ),
             ),
             Self::NoAnswer { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "no-answer",
                 format!(
-                    "board {board} talks but does not answer this: `ucom info {board}`, then `ucom doctor`"
+                    "board {board} sends frames but does not answer this request: `ucom info {board}`, then \
+                     `ucom doctor`"
                 ),
             ),
             Self::Incomplete { problem: Incomplete::ByteOrder { .. }, .. } => {
@@ -92,16 +95,16 @@ impl Diagnose for ExchangeError {
                 Diagnosis::new(
                     ErrorKind::NoLink,
                     "incomplete-answer",
-                    "the board may read the protocol otherwise: `ucom probe` measures it",
+                    "the board may interpret the protocol differently: `ucom probe` measures this",
                 )
             }
             Self::Incomplete { .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "incomplete-answer",
-                "frames get lost: `ucom doctor` looks at bus load, error counters and termination",
+                "frames are lost: `ucom doctor` checks bus load, error counters and termination",
             ),
             Self::Contradiction { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "contradiction", "number the boards anew: `ucom init`")
+                Diagnosis::new(ErrorKind::Refused, "contradiction", "number the boards again: `ucom init`")
             }
             Self::Device { code, .. } => Diagnosis::new(ErrorKind::Device, "device-error", code.reaction()),
         }
@@ -127,7 +130,7 @@ impl fmt::Display for Received {
             Some(LastReceived { function, ago_ms }) => {
                 write!(f, "last received: {} {ago_ms} ms ago", function.name())
             }
-            None => f.write_str("nothing received from it at all"),
+            None => f.write_str("no frame was received from this board"),
         }
     }
 }
@@ -136,7 +139,7 @@ impl fmt::Display for Received {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Incomplete {
     /// The first frame is not valid.
-    #[error("it began with {len} bytes instead of {need}")]
+    #[error("its first frame has {len} bytes, expected {need}")]
     Start {
         /// Number of bytes received.
         len: u8,
@@ -144,7 +147,7 @@ pub enum Incomplete {
         need: u8,
     },
     /// The board stopped sending in the middle of its answer.
-    #[error("{complete} of {of} strings came, then silence")]
+    #[error("{complete} of {of} strings were received, then no more frames")]
     Silence {
         /// Number of complete strings.
         complete: u32,
@@ -152,23 +155,24 @@ pub enum Incomplete {
         of: u32,
     },
     /// A frame cannot belong to a string.
-    #[error("a frame of string {string} fits nowhere")]
+    #[error("a frame of string {string} does not match the frames before it")]
     Misfit {
         /// Number of the string, from 0.
         string: u32,
     },
     /// There are more frames than the announced totals.
-    #[error("more frames came than the totals allow")]
+    #[error("the board sent more frames than it had announced")]
     Surplus,
     /// The answer announces more strings than possible.
-    #[error("it announces {strings} strings; is the byte order right?")]
+    #[error("the board announces {strings} strings, which is too many; check the byte order")]
     TooMany {
         /// Number of strings.
         strings: u32,
     },
     /// The announced counts are multiples of 256. In the other byte order the counts would be small numbers.
     #[error(
-        "it announces {strings} strings, every count a multiple of 256: the byte order is probably wrong"
+        "the board announces {strings} strings, and each count is a multiple of 256: the byte order is \
+         probably wrong"
     )]
     ByteOrder {
         /// Number of strings.

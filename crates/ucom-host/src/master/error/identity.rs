@@ -10,7 +10,7 @@ use ucom::profile::Endian;
 #[non_exhaustive]
 pub enum IdentityError {
     /// DSP_INFO has different numbers in identifier and data.
-    #[error("board {board} reports that its number is {reported}: it is refused")]
+    #[error("the answer from board {board} contains number {reported} and was rejected")]
     WrongSequence {
         /// Number in the identifier.
         board: u8,
@@ -37,7 +37,7 @@ pub enum IdentityError {
     #[error(
         "two boards answer to number {board}: {}{}",
         Sharing(found),
-        if *given_back { "; it was taken back from both" } else { "" }
+        if *given_back { "; the number was withdrawn from both boards" } else { "" }
     )]
     NumberShared {
         /// The number.
@@ -58,13 +58,15 @@ impl Diagnose for IdentityError {
             Self::WrongBoard { wanted, found, .. } if *wanted == found.swap_bytes() => Diagnosis::new(
                 ErrorKind::Refused,
                 "wrong-board",
-                "only the bytes are exchanged: is the byte order right (`endian` in the profile)? `ucom probe` measures it",
+                "only the two bytes are swapped: check the byte order (`endian` in the profile); `ucom \
+                 probe` measures it",
             ),
             Self::WrongBoard { board, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "wrong-board",
                 format!(
-                    "`ucom info {board}` shows who stands there; boards may have been swapped: `ucom init`"
+                    "`ucom info {board}` shows the board with this number; if boards were swapped: `ucom \
+                     init`"
                 ),
             ),
             Self::ByteOrder { .. } => Diagnosis::new(ErrorKind::Refused, "byte-order", MEASURE_ORDER),
@@ -96,11 +98,12 @@ impl fmt::Display for Sharing<'_> {
 
 /// Cause of a number that two boards share, and the remedy.
 pub(crate) const SHARED_CAUSE: (&str, &str) = (
-    "both took it from one PC_INIT: an init pin is strapped or shorted, or a PC repeated it blindly",
-    "`ucom stop all` if anything runs, then `ucom init` numbers all anew; if it comes again, power one of them down and \
-     check the init wires",
+    "both boards took the number from one PC_INIT: an init pin is strapped or shorted, or a PC repeated \
+     PC_INIT without a check",
+    "`ucom stop all` if a board runs, then `ucom init` numbers all boards again; if the error returns, \
+     power one of the two boards down and check the init wires",
 );
 
 /// Remedy if identifier and data contain different numbers.
-pub(crate) const OTHER_PROTOCOL: &str =
-    "two boards may share a number, or the board reads the protocol otherwise: `ucom reset`, `ucom probe`";
+pub(crate) const OTHER_PROTOCOL: &str = "two boards may share a number, or the board interprets the \
+                                         protocol differently: `ucom reset`, then `ucom probe`";

@@ -42,19 +42,21 @@ impl Diagnose for MasterError {
             Self::CompetingMaster { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "foreign-master",
-                "end the other program; then the same again",
+                "end the other program, then repeat the command",
             ),
-            Self::Busy { .. } => Diagnosis::new(ErrorKind::Refused, "busy", "wait for it, or cancel it"),
+            Self::Busy { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "busy",
+                "wait until the other procedure ends, or cancel it",
+            ),
             Self::Bus { .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "bus",
-                "is the bus still there, the adapter plugged in? `ucom doctor` looks at it",
+                "check the bus and the plug of the adapter: `ucom doctor`",
             ),
-            Self::Cancelled => Diagnosis::new(
-                ErrorKind::Fault,
-                "cancelled",
-                "`ucom scan` shows in what state the boards are",
-            ),
+            Self::Cancelled => {
+                Diagnosis::new(ErrorKind::Fault, "cancelled", "`ucom scan` shows the state of the boards")
+            }
         }
     }
 }

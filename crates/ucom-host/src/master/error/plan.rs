@@ -6,10 +6,10 @@ use ucom::profile::Plan;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
     /// No board is selected.
-    #[error("no board is named")]
+    #[error("no board is selected")]
     None,
     /// A board is selected twice.
-    #[error("board {board} is named twice")]
+    #[error("board {board} is selected twice")]
     Twice {
         /// Board number.
         board: u8,
@@ -18,7 +18,7 @@ pub enum TargetError {
 
 impl Diagnose for TargetError {
     fn diagnosis(&self) -> Diagnosis {
-        Diagnosis::new(ErrorKind::Usage, "plan", "`ucom update N IMAGE` with a number, a list or `all`")
+        Diagnosis::new(ErrorKind::Usage, "plan", "give a number, a list or `all`: `ucom update N IMAGE`")
     }
 }
 
@@ -29,7 +29,7 @@ pub enum PlanError {
     #[error("the image is empty")]
     Empty,
     /// The image ends with half a word.
-    #[error("the image has {bytes} bytes: not whole words")]
+    #[error("the image has {bytes} bytes, expected an even number")]
     HalfWord {
         /// Length in bytes.
         bytes: usize,
@@ -53,12 +53,15 @@ pub enum PlanError {
 impl Diagnose for PlanError {
     fn diagnosis(&self) -> Diagnosis {
         let (kind, next) = match self {
-            Self::Empty | Self::HalfWord { .. } => {
-                (ErrorKind::Usage, "is it the right file? `ucom update --dry-run` shows what it holds")
-            }
-            Self::OtherProgram { .. } => {
-                (ErrorKind::Refused, "is it the right file? without `--expect-program-id` it is not compared")
-            }
+            Self::Empty | Self::HalfWord { .. } => (
+                ErrorKind::Usage,
+                "check that this is the right file: `ucom update --dry-run` shows its content",
+            ),
+            Self::OtherProgram { .. } => (
+                ErrorKind::Refused,
+                "check that this is the right file; without `--expect-program-id` the Program ID is not \
+                 compared",
+            ),
             Self::Void => (ErrorKind::Usage, "`--date YYYY-MM-DD`"),
             Self::Second(e) => return e.diagnosis(),
         };
@@ -76,7 +79,7 @@ pub enum SecondImageError {
         plan: Plan,
     },
     /// The plan does not use a second image.
-    #[error("plan `{plan}` sends one image twice: there is no place for a second one")]
+    #[error("plan `{plan}` sends one image twice and does not use a second image")]
     Unused {
         /// `prog.plan`.
         plan: Plan,

@@ -8,7 +8,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 #[non_exhaustive]
 pub enum RunningError {
     /// The control loops of boards are running.
-    #[error("{} running: program data would outrank their process data", Boards(boards))]
+    #[error("{} running: program data would have priority over their process data", Boards(boards))]
     Running {
         /// Numbers of the boards.
         boards: Vec<u8>,
@@ -23,7 +23,7 @@ pub enum RunningError {
     #[error("{0}")]
     Load(LoadForecast),
     /// A board was lost while boards were started, and `on_lost` required a stop of all boards (D-51).
-    #[error("board {board} was lost while boards were started: all are stopped")]
+    #[error("board {board} was lost while boards were started: all boards were stopped")]
     Lost {
         /// Board number.
         board: u8,
@@ -39,13 +39,14 @@ impl Diagnose for RunningError {
             Self::Load(_) => Diagnosis::new(
                 ErrorKind::Refused,
                 "load",
-                "fewer boards, longer `so.period` or `ci.period`, or force it",
+                "start fewer boards, increase `so.period` or `ci.period`, or force the start",
             ),
             Self::Lost { board } => Diagnosis::new(
                 ErrorKind::Fault,
                 "lost",
                 format!(
-                    "`ucom info {board}`: has it rebooted, has it power? `ucom doctor` looks at bus and boards"
+                    "check if the board rebooted or lost power: `ucom info {board}`; `ucom doctor` checks \
+                     bus and boards"
                 ),
             ),
         }

@@ -29,7 +29,8 @@ pub enum SignalError {
     },
     /// The board's description has changed since the values were chosen (D-36).
     #[error(
-        "board {board}: its inputs, outputs and parameters are not those that were known under its program"
+        "board {board}: its inputs, outputs and parameters differ from those that were read before from its \
+         program"
     )]
     StaleNames {
         /// Board number.
@@ -52,7 +53,7 @@ impl Diagnose for SignalError {
             Self::StaleNames { board } => Diagnosis::new(
                 ErrorKind::Refused,
                 "stale-names",
-                format!("`ucom io {board} --fresh` reads them anew"),
+                format!("`ucom io {board} --fresh` reads them again"),
             ),
         }
     }
@@ -62,6 +63,6 @@ struct Near<'a>(&'a [String]);
 
 impl fmt::Display for Near<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() { Ok(()) } else { write!(f, "; there is `{}`", self.0.join("`, `")) }
+        if self.0.is_empty() { Ok(()) } else { write!(f, "; similar: `{}`", self.0.join("`, `")) }
     }
 }

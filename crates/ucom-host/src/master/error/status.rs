@@ -8,7 +8,7 @@ use ucom::Status;
 pub enum StatusError {
     /// The status that was read back differs from the requested status.
     #[error(
-        "board {board}: status is {} after {tries} tries, wanted {} of the bits {}",
+        "board {board}: status is {} after {tries} tries, expected {} in the bits {}",
         status,
         wanted,
         mask
@@ -26,7 +26,7 @@ pub enum StatusError {
         tries: u32,
     },
     /// The board did not reach a state in time.
-    #[error("board {board}: {what} not within {waited_ms} ms; status {status}")]
+    #[error("board {board}: {what} within {waited_ms} ms; status {status}")]
     NotReached {
         /// Board number.
         board: u8,
@@ -55,7 +55,8 @@ impl Diagnose for StatusError {
             Self::StatusNotTaken { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "status-not-taken",
-                "bits that mirror reality cannot be set, PROG only in the exloader: `ucom help status`",
+                "bits that mirror the real state cannot be set; PROG can be set only in the exloader: `ucom \
+                 help status`",
             ),
             Self::NotReached { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,

@@ -14,8 +14,8 @@ pub(crate) fn other_order(endian: Endian) -> String {
         Endian::Big => ("big", "little"),
     };
     format!(
-        "wrong byte order: the flash numbers fit the reports only with their bytes exchanged, so the boards send words as \
-         {there}-endian, and the profile has `endian = \"{here}\"`"
+        "wrong byte order: the flash numbers match the reports only if their bytes are swapped; the boards \
+         send {there}-endian words, but the profile has `endian = \"{here}\"`"
     )
 }
 

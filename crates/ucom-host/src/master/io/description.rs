@@ -120,6 +120,6 @@ mod tests {
         assert_eq!((units.find(1, Kind::Par, "KP"), units.find(1, Kind::Par, "kd")), (Ok(0), Ok(2)));
         assert!(io.find(1, Kind::Ci, "x").is_err(), "two signals have this name");
         let text = io.find(1, Kind::Ci, "traget").unwrap_err().to_string();
-        assert!(text.contains("board 1 has no CI `traget`; there is `Target`"), "{text}");
+        assert!(text.contains("board 1 has no CI `traget`; similar: `Target`"), "{text}");
     }
 }

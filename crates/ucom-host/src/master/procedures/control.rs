@@ -161,7 +161,7 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
             let waited_ms = link.now().saturating_sub(since) / MS;
             Err(StatusError::NotReached {
                 board,
-                what: "it did not give its number up",
+                what: "the board did not give up its number",
                 waited_ms,
                 status: info.status,
             }
@@ -189,7 +189,7 @@ pub(crate) async fn enter_exloader(
 ) -> Result<BoardInfo, Error> {
     let info = match (xreset_taken(link, board).await, flash_number) {
         (Err(Error::Exchange(ExchangeError::NoAnswer { .. })), Some(flash_number)) => {
-            link.note(format!("board {board} lost its number: giving it back"));
+            link.note(format!("board {board} lost its number: it gets the number again"));
             repair(link, board, flash_number).await?;
             exloader_runs(link, board, EXLOADER_WAIT).await?
         }
@@ -212,7 +212,7 @@ pub(crate) async fn enter_exloader(
 const EXLOADER_WAIT: u64 = 3_000 * MS;
 
 async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, Error> {
-    let what = "its exloader did not come up";
+    let what = "the exloader did not start";
     wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await
 }
 

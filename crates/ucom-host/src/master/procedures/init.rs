@@ -78,7 +78,7 @@ async fn reset_all(link: &Link, reports: &mut Reports) {
         if asked.ids.is_empty() {
             return;
         }
-        link.note("boards are there but did not report after PC_RESET: once more".into());
+        link.note("boards answer but did not report after PC_RESET: PC_RESET is repeated".into());
     }
 }
 

@@ -27,7 +27,7 @@ pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result
     let given = give(link, number, flash_number, &mut lowered).await;
     for board in lowered {
         if set_status(link, board, Status::OPINIT, Status::OPINIT).await.is_err() {
-            link.note(format!("board {board} did not confirm that its outgoing pin is on again"));
+            link.note(format!("board {board} did not confirm that its outgoing init pin is on again"));
         }
     }
     link.bear_shared_numbers(false);
@@ -53,7 +53,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
         // A wrong board must not keep the number. Otherwise the next command would reach that board.
         [other] => {
             if !take_back(link, number).await? {
-                link.note(format!("board 0x{other:04X} does not give number {number} back"));
+                link.note(format!("board 0x{other:04X} does not give up number {number}"));
             }
             Err(IdentityError::WrongBoard { board: number, wanted: flash_number, found: *other }.into())
         }

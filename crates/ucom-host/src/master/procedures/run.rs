@@ -29,7 +29,7 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
             Ok(())
         });
         if undone.await.is_err() {
-            link.note("not every board that was started is stopped".into());
+            link.note("not all boards that were started have stopped".into());
         }
     }
     result.map(Outcome::Running)
@@ -49,7 +49,7 @@ async fn undo(link: &Link, begun: &[Begun]) {
         if let Some(level) = back
             && let Err(error) = stop_board(link, *board, *level).await
         {
-            link.note(format!("board {board} may still be started: {error}"));
+            link.note(format!("the application of board {board} may still run: {error}"));
         }
     }
 }

@@ -48,12 +48,14 @@ impl InitReport {
 pub enum InitFinding {
     /// No board reported or took number 1.
     #[error(
-        "no board reported and none took a number: is the bus connected, powered, and at this bit rate? `ucom doctor`"
+        "no board reported and none took a number: check connection, power and bit rate of the bus, `ucom \
+         doctor`"
     )]
     NoBoards,
     /// Boards have reported but got no number.
     #[error(
-        "board reported but not reached: UCoM id {} after position {after}; the init wire behind that board may be broken",
+        "board reported but got no number: UCoM id {} after position {after}; the init wire after this \
+         position may be broken",
         hex(ids)
     )]
     NotReached {
@@ -87,7 +89,7 @@ pub enum InitFinding {
         board: u8,
     },
     /// A board did not receive the reset and continued to run.
-    #[error("board {board} did not receive PC_RESET and ran on: {}", if *stopped { "it was stopped" } else { "it may still run" })]
+    #[error("board {board} did not receive PC_RESET and continued to run: {}", if *stopped { "it was stopped" } else { "it may still run" })]
     NotReset {
         /// Board number.
         board: u8,

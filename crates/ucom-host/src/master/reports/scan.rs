@@ -81,7 +81,10 @@ pub enum ScanFinding {
         high: u8,
     },
     /// A report has different UCoM ids in identifier and data.
-    #[error("the report of UCoM id 0x{ucom_id:02X} came with another identifier: `ucom probe` may show why")]
+    #[error(
+        "the report of UCoM id 0x{ucom_id:02X} has another id in its identifier: `ucom probe` may show the \
+         cause"
+    )]
     Disagrees {
         /// UCoM id in the data.
         ucom_id: u8,

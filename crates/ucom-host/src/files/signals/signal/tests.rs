@@ -48,13 +48,13 @@ fn d11_scale_offset_and_unit() {
     assert_eq!(angle.json(1550), json!(15.5));
     // The number could be the raw word or a value in the unit.
     let message = word(&angle, "15").unwrap_err().to_string();
-    assert_eq!(message, "15: the unit is missing: `15deg`, or the word itself as 0x0000");
+    assert_eq!(message, "15: the unit is missing: give `15deg`, or give the word as 0x0000");
     assert!(word(&angle, "0").is_err());
     // A raw word is never scaled.
     assert_eq!(word(&angle, "0x0010"), Ok(16));
     let message = word(&angle, "400 deg").unwrap_err().to_string();
     assert_eq!(message, "400 deg is outside -327.68..327.67 deg");
-    assert!(word(&angle, "15 rad").unwrap_err().to_string().contains("its unit is deg"));
+    assert!(word(&angle, "15 rad").unwrap_err().to_string().contains("the unit of the signal is deg"));
     let warm = signal(SignalType::Uint16, 0.1, -40.0, "°C");
     assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
     let down = signal(SignalType::Int16, -0.5, 0.0, "");
@@ -115,7 +115,7 @@ fn d11_switches_and_bits() {
     let switch = signal(SignalType::Bool, 1.0, 0.0, "");
     assert_eq!((word(&switch, "on"), word(&switch, "0"), word(&switch, "1")), (Ok(1), Ok(0), Ok(1)));
     for wrong in ["2", "0x0007"] {
-        assert!(word(&switch, wrong).unwrap_err().to_string().contains("on or off"), "{wrong}");
+        assert!(word(&switch, wrong).unwrap_err().to_string().contains("on and off only"), "{wrong}");
     }
     assert_eq!((switch.text(1), switch.json(0)), ("on".into(), json!(false)));
     let bits = signal(SignalType::Hex, 1.0, 0.0, "");

@@ -29,10 +29,10 @@ async fn halt(bench: &mut Bench<'_>, board: u8) {
 
 pub(super) async fn walk(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(before) = bench.info(board).await else {
-        return Ok(Verdict::Fail("PC_INFO is not answered".into()));
+        return Ok(Verdict::Fail("the board does not answer PC_INFO".into()));
     };
     if !before.has_application() {
-        return Ok(Verdict::Skipped("it has no application".into()));
+        return Ok(Verdict::Skipped("the board has no application".into()));
     }
     let times = bench.link.times();
     bench.send(Function::XReset, board, &[]).await;
@@ -57,7 +57,7 @@ pub(super) async fn start(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
     bench.send(Function::SetStatus, board, &[0x84, 0]).await;
     bench.receive(100 * MS).await;
     let Some(info) = bench.info(board).await else {
-        return Ok(Verdict::Fail("PC_INFO is not answered".into()));
+        return Ok(Verdict::Fail("the board does not answer PC_INFO".into()));
     };
     bench.send(Function::Start, board, &[]).await;
     let came = bench.receive(bench.link.times().start).await;
@@ -74,7 +74,9 @@ pub(super) async fn start(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
 
 pub(super) async fn inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     need!(bench.started(board).await?);
-    let Some(d) = dimensions(bench, board).await else { return Ok(Verdict::Fail("no dimensions".into())) };
+    let Some(d) = dimensions(bench, board).await else {
+        return Ok(Verdict::Fail("the board sent no dimensions".into()));
+    };
     let endian = bench.profile().endian;
     let package = |offset: u16| {
         let [a, b] = endian.bytes(offset);
@@ -90,7 +92,10 @@ pub(super) async fn inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
         bench.send(Function::Ci, board, &package(last)).await;
         let came = bench.receive(100 * MS).await;
         if !came.is_empty() {
-            return Ok(Verdict::Fail(format!("last word with surplus words: {}", list(&came))));
+            return Ok(Verdict::Fail(format!(
+                "frames after the last word with surplus words: {}",
+                list(&came)
+            )));
         }
     }
     need!(bench.status_is(board, 0x8B, "both").await);
@@ -122,24 +127,24 @@ async fn judge_alone(
     ended: Option<&(u64, Frame)>,
 ) -> Verdict {
     let Some((at, flags)) = ended else {
-        return Verdict::Fail("no flags came: it runs on without a PC".into());
+        return Verdict::Fail("the board sent no flags: it continues to run without a PC".into());
     };
     let after = (at - start) / MS;
     // The tolerance is 20 %, as for all times in the acceptance tests.
     if flags.data().get(..2) != Some(&[0, 0]) || after * MS < lost * 4 / 5 || after * MS > lost * 6 / 5 {
-        return Verdict::Fail(format!("{flags} came after {after} ms"));
+        return Verdict::Fail(format!("the board sent {flags} after {after} ms"));
     }
     let so = |f: &Frame| is(f, Function::So, board);
     if outputs > 0 && !came.iter().any(|(_, f)| so(f)) {
-        return Verdict::Fail("no outputs came while it ran".into());
+        return Verdict::Fail("the board sent no outputs while it ran".into());
     }
     if came.iter().any(|(t, f)| so(f) && *t > at + 50 * MS) {
-        return Verdict::Fail("outputs came after it ended".into());
+        return Verdict::Fail("the board sent outputs after its control loop had ended".into());
     }
     bench.heartbeats(true);
     let again = bench.hear_all(1_000 * MS).await;
     if again.iter().any(|(_, f)| so(f)) {
-        return Verdict::Fail("a heartbeat started it again".into());
+        return Verdict::Fail("a heartbeat started the control loop again".into());
     }
     if let Err(v) = bench.status_is(board, 0x8B, "a heartbeat").await {
         return v;

@@ -45,7 +45,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Err
     if let Some(missing) = expected_reports(bench)
         .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
     {
-        return Ok(Verdict::Fail(format!("{missing} is not there exactly once: {}", list(first))));
+        return Ok(Verdict::Fail(format!("{missing} was not received exactly once: {}", list(first))));
     }
     for board in boards {
         match bench.info(board.number).await {
@@ -58,7 +58,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Err
 
 pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     if bench.found.strangers {
-        let why = "a board that is not tested, or has no number, could take this one";
+        let why = "a board that is not tested, or has no number, could take this number";
         return Ok(Verdict::Skipped(why.into()));
     }
     match bench.link.look_for_master(bench.options.force).await {
@@ -69,7 +69,9 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
     }
     // If a board has rebooted since, it would take any number.
     if bench.info(board).await.is_none() {
-        return Ok(Verdict::Fail("PC_INFO is not answered: has it rebooted? `ucom scan`".into()));
+        return Ok(Verdict::Fail(
+            "the board does not answer PC_INFO; it may have rebooted: `ucom scan`".into(),
+        ));
     }
     bench.send(Function::Init, board, &[]).await;
     let came = bench.receive(bench.link.times().init_ack).await;
@@ -81,8 +83,8 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
 async fn up(bench: &mut Bench<'_>, board: u8) -> Option<Verdict> {
     match bench.info(board).await {
         Some(info) if info.status.has(Status::MSTART) => None,
-        Some(_) => Some(Verdict::Skipped("its application is not started: ucom start".into())),
-        None => Some(Verdict::Fail("PC_INFO is not answered".into())),
+        Some(_) => Some(Verdict::Skipped("the application is not started: ucom start".into())),
+        None => Some(Verdict::Fail("the board does not answer PC_INFO".into())),
     }
 }
 
@@ -129,7 +131,7 @@ fn strings(bench: &Bench<'_>, came: &[Frame]) -> Result<(), String> {
         match left {
             0 => {
                 let &[a, b] = frame.data() else {
-                    return Err(format!("{frame} is no header of string {found}: 2 bytes"));
+                    return Err(format!("{frame} is not a valid header of string {found}, expected 2 bytes"));
                 };
                 let count = profile.endian.word([a, b]);
                 left = count.saturating_sub(u16::from(profile.string_count_includes_header));
@@ -141,7 +143,8 @@ fn strings(bench: &Bench<'_>, came: &[Frame]) -> Result<(), String> {
             }
             _ if frame.dlc() != 8 => {
                 return Err(format!(
-                    "{frame}: {left} packages of string {found} are missing, only the last may be short"
+                    "{frame}: {left} packages of string {found} are missing, but only the last package may \
+                     be short"
                 ));
             }
             _ => left -= 1,
@@ -149,9 +152,10 @@ fn strings(bench: &Bench<'_>, came: &[Frame]) -> Result<(), String> {
     }
     match found == dimensions.strings() && left == 0 {
         true => Ok(()),
-        false => {
-            Err(format!("{found} whole strings, the dimensions {head} announce {}", dimensions.strings()))
-        }
+        false => Err(format!(
+            "{found} complete strings, but the dimensions {head} announce {}",
+            dimensions.strings()
+        )),
     }
 }
 
@@ -161,7 +165,7 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
     }
     let (profile, times) = (bench.profile(), bench.link.times());
     let Some(dimensions) = dimensions(bench, board).await else {
-        return Ok(Verdict::Fail("no dimensions in the IO description".into()));
+        return Ok(Verdict::Fail("the IO description has no dimensions".into()));
     };
     bench.send(Function::DumpCi, board, &[]).await;
     let came = bench.receive(times.info.max(times.gap) + 2 * MS * u64::from(dimensions.ci)).await;

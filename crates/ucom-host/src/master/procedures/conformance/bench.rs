@@ -118,7 +118,7 @@ impl<'a> Bench<'a> {
                 "after {step} the status is 0x{:02X} {}",
                 info.status.0, info.status
             ))),
-            None => Err(Verdict::Fail(format!("after {step} PC_INFO is not answered"))),
+            None => Err(Verdict::Fail(format!("after {step} the board does not answer PC_INFO"))),
         }
     }
 
@@ -146,7 +146,7 @@ impl<'a> Bench<'a> {
 fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
     match e {
         Error::Exchange(ExchangeError::Device { .. }) | Error::Signal(SignalError::NoApplication { .. }) => {
-            Ok(Err(Verdict::Skipped(format!("its application does not start: {e}"))))
+            Ok(Err(Verdict::Skipped(format!("the application does not start: {e}"))))
         }
         e => Err(e),
     }

@@ -19,7 +19,7 @@ async fn reset_all(bench: &mut Bench<'_>) -> Vec<ucom::Frame> {
 pub(super) async fn reset(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error> {
     let came = reset_all(bench).await;
     let Some(expected) = expected_reports(bench) else {
-        return Ok(Verdict::Skipped("the profile's report.mode is another than flash7".into()));
+        return Ok(Verdict::Skipped("report.mode of the profile is not flash7".into()));
     };
     let reports = only_reports(&came);
     let pass = expected.iter().all(|f| reports.iter().filter(|r| *r == f).count() == 1)
@@ -47,7 +47,7 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, 
         bench.send(function, first, data).await;
         let came = bench.receive(60 * MS).await;
         if !came.is_empty() {
-            return Ok(Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came))));
+            return Ok(Verdict::Fail(format!("the board answers {}: {}", function.name(), list(&came))));
         }
     }
     // The request is also sent by broadcast, which a board without a number ignores (D-04, D-06).
@@ -58,7 +58,7 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, 
 
 pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error> {
     if bench.profile().chain_auto_opinit {
-        return Ok(Verdict::Skipped("by the profile boards raise their pin by themselves".into()));
+        return Ok(Verdict::Skipped("with this profile, boards raise their pin by themselves".into()));
     }
     reset_all(bench).await;
     let ack = bench.link.times().init_ack;
@@ -78,7 +78,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
                 if !came.is_empty() {
                     let name = function.name();
                     return Ok(Verdict::Fail(format!(
-                        "{name}({next}) before the pin of board {n} is up: {}",
+                        "{name}({next}) before the pin of board {n} is on: {}",
                         list(&came)
                     )));
                 }
@@ -103,7 +103,7 @@ async fn set(bench: &mut Bench<'_>, board: u8, mask: u8, value: u8) -> Option<St
 
 pub(super) async fn formula(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(before) = bench.info(board).await else {
-        return Ok(Verdict::Fail("PC_INFO is not answered".into()));
+        return Ok(Verdict::Fail("the board does not answer PC_INFO".into()));
     };
     let on = set(bench, board, 0x00, 0x40).await;
     let off = set(bench, board, 0x40, 0x00).await;
@@ -120,7 +120,7 @@ pub(super) async fn formula(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
 
 pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(before) = bench.info(board).await else {
-        return Ok(Verdict::Fail("PC_INFO is not answered".into()));
+        return Ok(Verdict::Fail("the board does not answer PC_INFO".into()));
     };
     for (mask, value) in [(0x01, 0x00), (0x10, 0x00), (0x20, 0x20)] {
         let after = set(bench, board, mask, value).await;
@@ -137,17 +137,17 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
 /// renumbered just before: `board` must be the first board.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
-        return Ok(Verdict::Skipped("there is no such board".into()));
+        return Ok(Verdict::Skipped("this board does not exist".into()));
     };
     if !first.info.has_application() {
-        return Ok(Verdict::Skipped("there is no application that could start".into()));
+        return Ok(Verdict::Skipped("the board has no application that could start".into()));
     }
     let flash = first.info.flash_number;
     let kept = first.info.status.has(Status::ASTART);
     match bench.info(board).await {
         Some(info) if info.flash_number == flash => {}
         other => {
-            let text = format!("it is not 0x{flash:04X} that has its number: {other:?}");
+            let text = format!("0x{flash:04X} does not have its number: {other:?}");
             return Ok(Verdict::Fail(text));
         }
     }

@@ -35,10 +35,12 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
         let at = at.filter(|_| report.error.is_some());
         let back = put_all_back(&link, &found, &options, unnumbered, at, &mut report.left);
         if let Err(error) = link.or_cancel(back).await {
-            report.left.push(format!("not every board is as it was found ({error}): `ucom scan`"));
+            report.left.push(format!("not all boards have their earlier state again ({error}): `ucom scan`"));
         }
     } else if options.changes() {
-        report.left.push("the boards are as the last test left them: `ucom scan`, `ucom init`".into());
+        report
+            .left
+            .push("the boards still have the state after the last test: `ucom scan`, `ucom init`".into());
     }
     Ok(Outcome::Conformance(report))
 }

@@ -83,7 +83,7 @@ pub(super) async fn update(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
     Ok(match bench.info(board).await {
         Some(info) if (info.program_id, info.date) == (wanted.program_id, wanted.date) => Verdict::Pass,
         other => Verdict::Fail(format!(
-            "PC_INFO does not show Program ID 0x{:04X} and date 0x{:04X}: {other:?}",
+            "PC_INFO does not contain Program ID 0x{:04X} and date 0x{:04X}: {other:?}",
             wanted.program_id, wanted.date
         )),
     })
@@ -109,9 +109,9 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     let cases: [(&str, u8, Case); 6] = [
         ("seven bytes", 7, Case::Short),
         ("a pause of 300 ms in a block", 10, Case::Pause),
-        ("a header whose sum is wrong", 5, Case::Block(sum)),
+        ("a header with a wrong sum", 5, Case::Block(sum)),
         ("another board's header", 2, Case::Block(target)),
-        ("a header beyond the memory", 2, Case::Block(beyond)),
+        ("a header with an address outside the memory", 2, Case::Block(beyond)),
         ("a second cycle with another length", 10, Case::Cycle),
     ];
     for (what, code, case) in cases {
@@ -124,7 +124,10 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
         let came = bench.receive(300 * MS).await;
         let errors: Vec<&Frame> = came.iter().filter(|f| f.id() >> 6 == 2).collect();
         if !matches!(errors.as_slice(), [f] if f.id() == 0x080 + u16::from(board) && f.data() == [code]) {
-            return Ok(Verdict::Fail(format!("{what}: {} instead of error {code}, once", list(&came))));
+            return Ok(Verdict::Fail(format!(
+                "{what}: received {}, expected error {code} once",
+                list(&came)
+            )));
         }
     }
     bench.send(Function::SetStatus, board, &[4, 0]).await;
@@ -132,7 +135,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     let after = bench.info(board).await.map(|info| (info.program_id, info.date));
     Ok(match after == Some((before.program_id, before.date)) {
         true => Verdict::Pass,
-        false => Verdict::Fail(format!("afterwards program and date are {after:?}")),
+        false => Verdict::Fail(format!("afterwards, program and date are {after:?}")),
     })
 }
 

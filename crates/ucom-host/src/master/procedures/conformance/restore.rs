@@ -76,7 +76,7 @@ pub(super) async fn put_back(
         now = coming_up(link, n, now, was).await?;
     }
     if before.info.has_application() && !now.has_application() {
-        let text = format!("board {n} has no program now: `ucom update {n} IMAGE`");
+        let text = format!("board {n} has no program any more: `ucom update {n} IMAGE`");
         if !left.contains(&text) {
             left.push(text);
         }
@@ -85,7 +85,7 @@ pub(super) async fn put_back(
         if !now.status.has(Status::MSTART) {
             start_application(link, n).await?;
             link.note(format!(
-                "board {n}: its application is started again, its parameters are those of a start"
+                "board {n}: its application was started again, so its parameters have their initial values"
             ));
         }
         return Ok(());
@@ -108,7 +108,7 @@ async fn answering(
     let n = before.number;
     let programmed = options.program.as_ref().is_some_and(|p| p.board == n);
     let limit = if programmed { link.times().erase } else { 500 * MS };
-    let what = "it does not answer";
+    let what = "the board did not answer";
     let now = match wait_status(link, n, Status(0), Status(0), limit, what).await {
         Ok(info) => info,
         Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
@@ -148,7 +148,7 @@ async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Resul
     if now.status.has(Status::MSTART) || was.has(Status::MSTART) || !now.has_application() {
         return Ok(now);
     }
-    let what = "its application comes up";
+    let what = "the application did not start";
     let limit = u64::from(link.profile().autostart_holdoff) * MS + link.times().start;
     match wait_status(link, board, Status::MSTART, Status::MSTART, limit, what).await {
         Ok(up) => Ok(up),

@@ -86,9 +86,9 @@ macro_rules! talk {
 #[rustfmt::skip]
 pub(super) static TESTS: [Test; 21] = [
     Test { id: "D-T2", level: Level::Ask, scope: Scope::Chain, run: talk!(ask::reports),
-        expects: "PC_REPORT twice: the same reports, and nothing is forgotten" },
+        expects: "PC_REPORT twice: the same reports, and the boards keep their numbers" },
     Test { id: "D-T5", level: Level::Ask, scope: Scope::Board, run: talk!(ask::init_again),
-        expects: "PC_INIT with its own number: acknowledged again, by this board alone" },
+        expects: "PC_INIT with its own number: only this board acknowledges again" },
     Test { id: "D-T10", level: Level::Ask, scope: Scope::Board, run: talk!(ask::description),
         expects: "IO description: dimensions, then exactly 1 + CI + SO + PAR strings; with one byte of data no answer" },
     Test { id: "D-T11", level: Level::Ask, scope: Scope::Board, run: talk!(ask::initial_inputs),
@@ -98,11 +98,12 @@ pub(super) static TESTS: [Test; 21] = [
     Test { id: "D-T3", level: Level::Init, scope: Scope::Numbers, run: talk!(chain::unnumbered),
         expects: "boards without a number answer nothing but reset, report and PC_INIT" },
     Test { id: "D-T4", level: Level::Init, scope: Scope::Numbers, run: talk!(chain::wire),
-        expects: "numbers follow the init wire: the next board is silent until the pin before it is raised" },
+        expects: "numbers follow the init wire: the next board is silent until the pin of the previous \
+                  board is on" },
     Test { id: "D-T6", level: Level::Init, scope: Scope::Board, run: talk!(chain::formula),
         expects: "PC_SETSTATUS 0040 sets ASTART (the formula, literally), 4000 clears it" },
     Test { id: "D-T7", level: Level::Init, scope: Scope::Board, run: talk!(chain::mirrors),
-        expects: "PC_SETSTATUS of IPINIT, EXLRUN, MCARUN changes nothing: they mirror reality" },
+        expects: "PC_SETSTATUS of IPINIT, EXLRUN, MCARUN changes nothing: they mirror the real state" },
     Test { id: "D-T16", level: Level::Init, scope: Scope::First, run: talk!(chain::autostart),
         expects: "PC_XRESET within 300 ms of PC_INIT prevents the autostart" },
     Test { id: "D-T8", level: Level::Run, scope: Scope::Board, run: talk!(application::walk),
@@ -110,7 +111,7 @@ pub(super) static TESTS: [Test; 21] = [
     Test { id: "D-T9", level: Level::Run, scope: Scope::Board, run: talk!(application::start),
         expects: "PC_START: MCA_DSP_READY within 2 s and EXLRUN = 0; without an application error 11" },
     Test { id: "D-T12", level: Level::Run, scope: Scope::Board, run: talk!(application::inputs),
-        expects: "CI at the dimension: error 5; surplus words behind the last one are ignored" },
+        expects: "CI at the dimension: error 5; surplus words after the last one are ignored" },
     Test { id: "D-T13", level: Level::Run, scope: Scope::Board, run: talk!(application::alone),
         expects: "no heartbeat of the PC: loop ends after 1.5 s, flags 0, no outputs; a heartbeat does not restart it, MCA_PC_START does" },
     Test { id: "D-T14", level: Level::Run, scope: Scope::Board, run: talk!(application::alive),
@@ -123,13 +124,14 @@ pub(super) static TESTS: [Test; 21] = [
         expects: "update by frames: DSP_READY after each block, then DSP_PROGFINISHED; PC_INFO shows Program ID and date" },
     Test { id: "D-T19", level: Level::Ask, scope: Scope::Chain,
         expects: "broadcast program data: boards with PROG = 1 take them, the others are silent",
-        run: Run::Elsewhere("would program several boards at once: `ucom update --group` does, and shows what each took") },
+        run: Run::Elsewhere("would program several boards at once: use `ucom update --group`, which shows \
+                             the result of each board") },
     Test { id: "D-T20", level: Level::Ask, scope: Scope::Chain,
         expects: "PC_INIT before the last DSP_INITACK has left: error 9",
-        run: Run::Elsewhere("needs a bus that holds the acknowledge back: the simulator's fault ack-held does") },
+        run: Run::Elsewhere("needs a bus that delays the acknowledgement: use the simulator's fault ack-held") },
     Test { id: "D-T21", level: Level::Ask, scope: Scope::Chain,
         expects: "two boards with one flash id: one report is seen, and the PC reports that there are more boards than reports",
-        run: Run::Elsewhere("needs two boards with one flash id: `ucom sim --flash-ids 0x21,0x21` has them") },
+        run: Run::Elsewhere("needs two boards with one flash id: use `ucom sim --flash-ids 0x21,0x21`") },
 ];
 
 /// Returns the names of all tests, for a command line.

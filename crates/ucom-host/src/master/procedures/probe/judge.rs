@@ -180,8 +180,8 @@ fn strings(rows: &mut Rows, seen: &Seen) {
         _ => None,
     });
     let offsets =
-        by_offset.map_or("no dump with two packages".into(), |e| format!("second offset of a dump: {e}"));
-    let words = best.map_or("no string that decides".into(), |(e, _)| format!("count of strings: {e}"));
+        by_offset.map_or("no dump has two packages".into(), |e| format!("second offset of a dump: {e}"));
+    let words = best.map_or("no string was conclusive".into(), |(e, _)| format!("count of strings: {e}"));
     let endian = by_offset.or(best.map(|(e, _)| e)).map(|e| e.to_string());
     let texts = ("byte order of 16-bit fields", "first byte, second byte");
     rows.add("endian", texts, format!("{words}; {offsets}"), endian.as_deref());
@@ -203,7 +203,7 @@ fn lengths(rows: &mut Rows, seen: &Seen) {
         Some(false) => "PC_INFO with 8 bytes is not answered".into(),
     };
     let value = seen.padded.map(|answered| if answered { "no" } else { "yes" });
-    rows.add("dlc.strict", ("are surplus bytes refused", "no data"), observed, value);
+    rows.add("dlc.strict", ("does a board reject surplus bytes", "no data"), observed, value);
 }
 
 fn pins(rows: &mut Rows, seen: &Seen) {
@@ -213,7 +213,12 @@ fn pins(rows: &mut Rows, seen: &Seen) {
         Some(false) => "OPINIT is off after DSP_INITACK".into(),
     };
     let value = seen.raised.map(|raised| if raised { "yes" } else { "no" });
-    rows.add("chain.auto_opinit", ("does a board raise its pin by itself", "nothing"), observed, value);
+    rows.add(
+        "chain.auto_opinit",
+        ("does a board raise its outgoing pin by itself", "nothing"),
+        observed,
+        value,
+    );
 }
 
 fn programs(rows: &mut Rows, seen: &Seen) {
@@ -222,7 +227,7 @@ fn programs(rows: &mut Rows, seen: &Seen) {
         return rows.add(
             "prog.checksum",
             texts,
-            "not measured: needs an image that a board has".into(),
+            "not measured: needs the image of a board's program".into(),
             None,
         );
     };
@@ -243,7 +248,7 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     let shown: Vec<String> = ids.iter().map(|id| format!("0x{id:04X}")).collect();
     let fits: Vec<String> = found.iter().map(|(form, order)| format!("{form} ({order})")).collect();
     let observed = format!(
-        "boards show {}; {} fits",
+        "boards show {}; {} matches",
         shown.join(", "),
         if fits.is_empty() { "none".into() } else { fits.join(", ") }
     );
@@ -251,7 +256,8 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     let value = form.map(|(form, _)| form.to_string());
     rows.add("prog.checksum", texts, observed, value.as_deref());
     if let [(Checksum::Sum16 | Checksum::Xor16, order)] = found.as_slice() {
-        let (order, observed) = (order.to_string(), "the checksum of words fits in one order only".into());
+        let (order, observed) =
+            (order.to_string(), "the checksum of the words matches in one byte order only".into());
         rows.add("prog.endian", ("byte order of program words", "nothing"), observed, Some(&order));
     }
 }
@@ -266,14 +272,14 @@ pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
     };
     let word = |held| if held { "runs on" } else { "stops" };
     let observed = format!(
-        "with heartbeats to all it {}, with those to its number it {}",
+        "with heartbeats to all boards it {}, with heartbeats to its own number it {}",
         word(broadcast),
         word(unicast)
     );
     let value = mode.map(|m| m.to_string());
     rows.add(
         "alive.mode",
-        ("to whom heartbeats go", "to all boards, every 500 ms"),
+        ("receivers of heartbeats", "to all boards, every 500 ms"),
         observed,
         value.as_deref(),
     );

@@ -28,7 +28,7 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
         link.bear_shared_numbers(true);
         let stopped = async { stop_board(&link, board, back).await.map(drop) };
         if let Err(error) = link.or_cancel(stopped).await {
-            link.note(format!("board {board} may still be started: {error}"));
+            link.note(format!("the application of board {board} may still run: {error}"));
         }
     }
     use_profile(&link, before);

@@ -47,7 +47,7 @@ pub(super) async fn one(
             Some(_) => {}
         }
         if number < profile.prog_attempts {
-            link.note(format!("board {board}: attempt {number} failed, once more"));
+            link.note(format!("board {board}: attempt {number} failed, next attempt"));
         }
     }
     session.active.retain(|b| *b != board);
@@ -203,7 +203,7 @@ pub(super) async fn start(link: &Link, session: &mut UpdateSession, board: u8, k
             session.end(board, UpdateOutcome::Running, None);
         }
         Ok(seen) => {
-            let what = "the application does not run";
+            let what = "the application did not run";
             let error = Error::Status(StatusError::NotReached {
                 board,
                 what,

@@ -17,7 +17,7 @@ use ucom::{Sequence, Status, ToBoard};
 /// program data, there is no broadcast, and the others are updated one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
-        link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
+        link.note("the boards are updated one by one, because `addr.broadcast` is none".into());
         return Ok(());
     };
     let selected = session.open();
@@ -29,7 +29,10 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     let since = link.now();
     let (boards, stray) = gather(link, session, &selected).await;
     if stray {
-        link.note("a board that does not answer may listen: no broadcast, the others one by one".into());
+        link.note(
+            "a board that does not answer may receive a broadcast: the other boards are updated one by one"
+                .into(),
+        );
         // The boards that are in their exloaders stay listed as in progress, so a cancel ends their programming mode.
         return Ok(());
     }

@@ -81,7 +81,7 @@ async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Re
         }
         // If the board does not execute this command, its own timeout and the next XRESET end the programming mode.
         if set_status(link, board, Status::PROG, Status(0)).await.is_err() {
-            link.note(format!("board {board} did not confirm that it left programming"));
+            link.note(format!("board {board} did not confirm the end of programming mode"));
         }
         match why {
             Error::Master(MasterError::Cancelled) => session.cancel(board),
@@ -110,7 +110,7 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
             Err(error) => Err(error),
         };
         match ended {
-            Ok(()) => link.note(format!("board {board} was in programming mode: ended")),
+            Ok(()) => link.note(format!("board {board} was in programming mode, which was ended")),
             Err(error) => {
                 leave_programming_to_user(session, board, &error);
             }
@@ -126,7 +126,7 @@ async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error
     while let Some(board) = session.programming.first().copied() {
         let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
         match ended {
-            true => link.note(format!("board {board} was in programming mode: ended")),
+            true => link.note(format!("board {board} was in programming mode, which was ended")),
             false => leave_programming_to_user(session, board, why),
         }
         session.programming.retain(|b| *b != board);

@@ -63,7 +63,8 @@ pub enum UpdateFailure {
     },
     /// The board reported that it is done, but in its exloader it shows no application.
     #[error(
-        "the board reports that it is done, but shows no valid application in its exloader: Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
+        "the board reports that programming is complete, but shows no valid application in its exloader: \
+         Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
     )]
     NotValid {
         /// Program ID that the board shows.
@@ -74,16 +75,16 @@ pub enum UpdateFailure {
         status: Status,
     },
     /// The board shows the program, but the application did not start.
-    #[error("the board shows the program, but: {0}")]
+    #[error("the board shows the program, but the start failed: {0}")]
     NotRunning(Box<Error>),
     /// The board already showed the program but was in programming mode, and this mode could not be ended.
-    #[error("the board shows the program already, but it may still be in programming mode: {0}")]
+    #[error("the board already shows the program, but may still be in programming mode: {0}")]
     StillProgramming(Box<Error>),
     /// A step failed after something was erased.
     #[error("{0}")]
     After(Box<Error>),
     /// The board had dropped out of the group and does not answer. Frames to the group may have erased it.
-    #[error("it may be erased, because frames of the group could reach it: {0}")]
+    #[error("the board may be erased, because it could receive frames of the group: {0}")]
     MayBeErased(Box<Error>),
     /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]
@@ -92,7 +93,7 @@ pub enum UpdateFailure {
         left: UpdateOutcome,
     },
     /// An earlier board of the list failed, so this board was skipped.
-    #[error("not begun: board {after} failed before")]
+    #[error("not started, because the update of board {after} failed")]
     Skipped {
         /// The board that failed.
         after: u8,
@@ -154,17 +155,23 @@ impl UpdateFailure {
             },
             Self::After(e) => format!("{}; then run the update again to get an application back", e.hint()),
             Self::MayBeErased(_) => {
-                "when the board answers again (`ucom repair`, `ucom init`): run the update again".into()
+                "run the update again when the board answers (`ucom repair`, `ucom init`)".into()
             }
             Self::NotValid { .. } => {
-                "is it an image for this board, and does the profile's `prog.plan` fit? run the update again".into()
+                "check that the image is for this board, check `prog.plan` in the profile, then run the \
+                 update again"
+                    .into()
             }
             Self::Device { code, .. } => code.reaction().into(),
             Self::Timeout { .. } => {
-                "frames get lost or the board is slower than the profile has it (`prog.ready_timeout`): `ucom doctor`".into()
+                "frames are lost, or the board is slower than `prog.ready_timeout` of the profile: `ucom \
+                 doctor`"
+                    .into()
             }
             Self::NotVerified { .. } => {
-                "the board may compute its Program ID otherwise (`prog.checksum`): `ucom probe --image FILE`".into()
+                "the board may compute its Program ID differently (`prog.checksum`): `ucom probe --image \
+                 FILE`"
+                    .into()
             }
             Self::Cancelled { left: UpdateOutcome::Running } => "`ucom stop` stops it".into(),
             Self::Cancelled { left: UpdateOutcome::Incomplete } => {
@@ -182,13 +189,15 @@ fn left_behind(outcome: UpdateOutcome) -> &'static str {
     match outcome {
         UpdateOutcome::Incomplete => "the old application is erased, the board waits in its exloader",
         UpdateOutcome::Unknown => "the old application may be erased",
-        UpdateOutcome::Written => "the board reported that it is done, nobody has read it back",
-        UpdateOutcome::UpToDate => "the image was there already, its application was not started",
+        UpdateOutcome::Written => {
+            "the board reported that programming is complete, but the result was not read back"
+        }
+        UpdateOutcome::UpToDate => "the board already had the image, its application was not started",
         UpdateOutcome::ProgramUpToDate => {
-            "nothing was sent to a board that shows this program already, and it was not started"
+            "nothing was sent because the board already shows this program, and the program was not started"
         }
         UpdateOutcome::Running => "the new application is on the board, and it may be started",
         UpdateOutcome::Verified => "the new application is on the board, but not started",
-        _ => "nothing was erased, the board has what it had",
+        _ => "nothing was erased, the board is unchanged",
     }
 }

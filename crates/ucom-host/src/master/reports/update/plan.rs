@@ -60,8 +60,8 @@ pub enum Unverifiable {
 impl fmt::Display for Unverifiable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::RawPlan => "with `prog.plan` raw the file hides its Program ID",
-            Self::NoHeader => "with `prog.header` none the board makes its Program ID by itself",
+            Self::RawPlan => "with `prog.plan` raw the Program ID of the file is not known",
+            Self::NoHeader => "with `prog.header` none the board itself sets its Program ID",
             Self::NoChecksum => "with `prog.checksum` none the Program ID cannot be computed",
         })
     }
@@ -70,7 +70,7 @@ impl fmt::Display for Unverifiable {
 impl Unverifiable {
     /// Returns how to make a verification possible.
     pub fn hint(&self) -> &'static str {
-        "to have it verified name the Program ID that the board must show: `--expect-program-id 0x…`"
+        "for a verification, give the Program ID that the board must show: `--expect-program-id 0x…`"
     }
 }
 

@@ -86,10 +86,10 @@ impl UpdateReport {
         let boards: Vec<String> = self.boards.iter().filter(is_shown).map(|b| b.board.to_string()).collect();
         if boards.is_empty() {
             let next = self.unverifiable.map_or("", |why| why.hint());
-            return ("what was written could not be verified".into(), next);
+            return ("the written program could not be verified".into(), next);
         }
         let message = format!(
-            "nothing was sent: board {} shows this program, but nothing shows its content and load address",
+            "nothing was sent: board {} shows this program, but content and load address are not verified",
             boards.join(", ")
         );
         (message, "`rewrite` writes it")
@@ -117,7 +117,7 @@ impl UpdateReport {
         };
         match result.outcome {
             UpdateOutcome::UpToDate => Some(same),
-            UpdateOutcome::ProgramUpToDate => Some(format!("{same}; content and address are not known")),
+            UpdateOutcome::ProgramUpToDate => Some(format!("{same}; content and address not verified")),
             _ => None,
         }
     }

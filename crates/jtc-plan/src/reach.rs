@@ -41,7 +41,7 @@ pub(crate) fn fastest(
     let steps: Vec<Step> = cells.iter().enumerate().map(step).collect();
     let squares = along_the_steps(&steps);
     if squares[1..count - 1].iter().any(|square| !(*square > 0.0 && square.is_finite())) {
-        return Err("the speed along the path is 0 where it does not stop".into());
+        return Err("the speed along the path is 0 at a place without a stop".into());
     }
     Ok(places.into_iter().zip(squares).collect())
 }

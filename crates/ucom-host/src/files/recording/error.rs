@@ -66,7 +66,7 @@ pub enum RecordProblem {
     Data,
     /// The file ends in the middle of the record. The readable part may be only the beginning of the record.
     #[error("the file is broken off here: the line has no end")]
-    ResumePoint,
+    Truncated,
     /// The line has a wrong number of columns.
     #[error("a line of FZI-CAN is `sec.usec id dlc` and eight bytes")]
     FziColumns,

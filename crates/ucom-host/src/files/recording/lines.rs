@@ -57,7 +57,7 @@ impl<R: BufRead> Lines<R> {
             if line.starts_with('#') {
                 comment(&line);
             } else if self.endless && !line.is_empty() {
-                return Err(self.error(RecordProblem::ResumePoint));
+                return Err(self.error(RecordProblem::Truncated));
             } else if !line.is_empty() {
                 return parse(&line).map(Some).map_err(|problem| self.error(problem));
             }

@@ -120,7 +120,7 @@ fn whole(
     for record in lines {
         match record {
             Ok(record) => records.push(record),
-            Err(e @ RecordingError::Line { problem: RecordProblem::ResumePoint, .. }) => {
+            Err(e @ RecordingError::Line { problem: RecordProblem::Truncated, .. }) => {
                 return Ok((records, Some(e.to_string())));
             }
             Err(e) => return Err(e),

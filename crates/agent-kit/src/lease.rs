@@ -1,4 +1,6 @@
 //! Lease for clients without a connection of their own: a request with the client's key shows that the client is alive.
+mod held;
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -7,6 +9,7 @@ use host_kit::ErrorKind;
 use utoipa::{IntoParams, ToSchema};
 
 use crate::api::Problem;
+pub use held::{Lease, Presence};
 
 /// Header with the key of a lease.
 pub const KEY: &str = "lease-key";
@@ -80,19 +83,6 @@ pub struct Client<P> {
     seen: Duration,
 }
 
-/// Lease, and its holder.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Lease {
-    /// Name of the holder.
-    pub holder: String,
-    /// Time when the holder took the lease.
-    pub since: Duration,
-    /// Time when the lease lapses if it is not renewed.
-    pub until: Duration,
-    /// Name of the client that waits for the lease.
-    pub wanted_by: Option<String>,
-}
-
 /// Reason why a client may not command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
@@ -154,17 +144,11 @@ impl From<Denied> for Problem {
     }
 }
 
-struct Held {
-    key: String,
-    since: Duration,
-    until: Duration,
-    wanted_by: Option<String>,
-}
-
 /// Clients of an agent. At most one of them holds the lease. Times are times of the agent.
 pub struct Leases<P> {
     clients: BTreeMap<String, Client<P>>,
-    held: Option<Held>,
+    /// Lease, with the keys of the clients.
+    held: Option<Lease<String>>,
     last: u64,
 }
 
@@ -198,9 +182,8 @@ impl<P: Clone> Leases<P> {
         let held = match self.held_by_another(key, now) {
             Some(denied) if !ask => return Err(denied),
             Some(_) if self.first(now).is_some() => {
-                let lease = self.lease().zip(self.first(now));
-                let (holder, by) =
-                    lease.map_or_else(Default::default, |(lease, first)| (lease.holder, first.name.clone()));
+                let lease = self.lease().map(|lease| (lease.holder, lease.wanted_by.unwrap_or_default()));
+                let (holder, by) = lease.unwrap_or_default();
                 return Err(Denied::Awaited { holder, by });
             }
             other => other.is_none(),
@@ -208,7 +191,7 @@ impl<P: Clone> Leases<P> {
         if self.clients.len() >= CLIENTS_MAX {
             // The client that has been silent longest is removed, so that a program that restarts again and again
             // blocks no other client.
-            let holder = self.held.as_ref().map(|held| held.key.clone());
+            let holder = self.held.as_ref().map(|held| held.holder.clone());
             let others = self.clients.iter().filter(|(key, _)| Some(*key) != holder.as_ref());
             let oldest = others.min_by_key(|(_, client)| client.seen).map(|(key, _)| key.clone());
             self.clients.remove(&oldest.ok_or(Denied::Full)?);
@@ -220,7 +203,8 @@ impl<P: Clone> Leases<P> {
         if held {
             self.hold(key, now);
         } else if let Some(lease) = &mut self.held {
-            lease.wanted_by = Some(key.to_owned());
+            // No other client waits: this was checked above.
+            let _ = lease.want(key.to_owned(), |_| false);
         }
         Ok((id, held))
     }
@@ -254,8 +238,8 @@ impl<P: Clone> Leases<P> {
     /// Releases the lease, which passes to the waiting client if there is one; the client is forgotten.
     pub fn release(&mut self, key: &str, now: Duration) {
         self.clients.remove(key);
-        if let Some(held) = self.held.take_if(|held| held.key == key) {
-            self.pass_on(held.wanted_by, now);
+        if let Some(held) = self.held.take_if(|held| held.holder == key) {
+            self.pass_on(&held, now);
         }
     }
 
@@ -263,61 +247,59 @@ impl<P: Clone> Leases<P> {
     /// one. Also forgets clients that no longer send requests.
     pub fn lapse(&mut self, now: Duration) -> Option<Client<P>> {
         // The holder is never forgotten before its lease has lapsed: its policy must be applied.
-        let holder = self.held.as_ref().map(|held| held.key.clone());
+        let holder = self.held.as_ref().map(|held| held.holder.clone());
         self.clients.retain(|key, client| {
             Some(key) == holder.as_ref() || now.saturating_sub(client.seen) < client.lasts + FORGOTTEN
         });
-        let held = self.held.take_if(|held| now >= held.until)?;
-        self.pass_on(held.wanted_by, now);
-        self.clients.get(&held.key).cloned()
+        let held = self.held.take_if(|held| held.has_lapsed(now))?;
+        self.pass_on(&held, now);
+        self.clients.get(&held.holder).cloned()
     }
 
     /// Returns `true` if this client holds the lease.
     pub fn holds(&self, client: ClientId, now: Duration) -> bool {
-        let held = self.held.as_ref().filter(|held| now < held.until);
-        held.and_then(|held| self.clients.get(&held.key)).is_some_and(|holder| holder.id == client)
+        let held = self.held.as_ref().filter(|held| !held.has_lapsed(now));
+        held.and_then(|held| self.clients.get(&held.holder)).is_some_and(|holder| holder.id == client)
     }
 
-    /// Returns the client that waits for the lease, if it is alive.
-    fn first(&self, now: Duration) -> Option<&Client<P>> {
-        let first = self.clients.get(self.held.as_ref()?.wanted_by.as_ref()?)?;
-        Some(first).filter(|first| now.saturating_sub(first.seen) < first.lasts)
+    /// Returns the key of the client that waits for the lease, if it is present.
+    fn first(&self, now: Duration) -> Option<&String> {
+        self.held.as_ref()?.first(|key| self.clients.get(key).is_some_and(|client| client.presence().is_present(now)))
     }
 
-    fn pass_on(&mut self, wanted_by: Option<String>, now: Duration) {
-        if let Some(next) = wanted_by.filter(|next| self.clients.contains_key(next)) {
-            self.hold(&next, now);
-            // The new holder is treated as if it had just sent a request, so it is not forgotten too early.
-            if let Some(client) = self.clients.get_mut(&next) {
-                client.seen = now;
-            }
-        }
+    fn pass_on(&mut self, held: &Lease<String>, now: Duration) {
+        self.held = held.next(|next| self.clients.get(next).map(|client| client.presence().lasts), now);
+        // The new holder is treated as if it had just sent a request, so it is not forgotten too early.
+        let next = self.held.as_ref().and_then(|held| self.clients.get_mut(&held.holder));
+        next.into_iter().for_each(|client| client.seen = now);
     }
 
-    /// Returns the lease and its holder.
-    pub fn lease(&self) -> Option<Lease> {
-        let held = self.held.as_ref()?;
+    /// Returns the lease, with the names of the clients.
+    pub fn lease(&self) -> Option<Lease<String>> {
+        let Lease { holder, since, until, wanted_by } = self.held.as_ref()?;
         let name = |key: &String| self.clients.get(key).map(|client| client.name.clone());
-        Some(Lease {
-            holder: name(&held.key)?,
-            since: held.since,
-            until: held.until,
-            wanted_by: held.wanted_by.as_ref().and_then(name),
-        })
+        let wanted_by = wanted_by.as_ref().and_then(name);
+        Some(Lease { holder: name(holder)?, since: *since, until: *until, wanted_by })
     }
 
     fn held_by_another(&self, key: &str, now: Duration) -> Option<Denied> {
-        let held = self.held.as_ref().filter(|held| held.key != key && now < held.until)?;
-        let holder = self.clients.get(&held.key)?.name.clone();
+        let held = self.held.as_ref().filter(|held| held.holder != key && !held.has_lapsed(now))?;
+        let holder = self.clients.get(&held.holder)?.name.clone();
         Some(Denied::Held { holder, age_s: now.saturating_sub(held.since).as_secs() })
     }
 
     fn hold(&mut self, key: &str, now: Duration) {
-        let Some(lasts) = self.clients.get(key).map(|client| client.lasts) else { return };
+        let Some(lasts) = self.clients.get(key).map(|client| client.presence().lasts) else { return };
         match &mut self.held {
-            Some(held) if held.key == key => held.until = now + lasts,
-            held => *held = Some(Held { key: key.into(), since: now, until: now + lasts, wanted_by: None }),
+            Some(held) if held.holder == key => held.renew(lasts, now),
+            held => *held = Some(Lease::begin(key.into(), lasts, now)),
         }
+    }
+}
+
+impl<P> Client<P> {
+    fn presence(&self) -> Presence {
+        Presence { lasts: Some(self.lasts), seen: self.seen }
     }
 }
 
@@ -345,7 +327,7 @@ mod tests {
         assert_eq!(leases.command(Some("bob"), s(3)).err(), Some(held));
         assert_eq!(leases.lease().and_then(|lease| lease.wanted_by), Some("bob".into()));
         leases.release("anna", s(4));
-        assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), s(14))));
+        assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), Some(s(14)))));
         assert!(!leases.holds(ClientId(1), s(5)) && !leases.holds(ClientId(2), s(14)));
         assert!(leases.holds(ClientId(2), s(13)));
         // A command renews the lease; then it lapses, once.
@@ -365,7 +347,7 @@ mod tests {
         leases.admit("a", ("anna", s(2), ()), false, s(0)).expect("nobody has it");
         assert_eq!(leases.admit("b", ("bob", s(5), ()), true, s(1)).map(|(_, held)| held), Ok(false));
         assert_eq!(leases.lapse(s(2)).map(|client| client.name), Some("anna".into()));
-        assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), s(7))));
+        assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), Some(s(7)))));
         assert!(leases.admit("c", ("carl", s(5), ()), false, s(3)).is_err());
         assert!(leases.command(Some("b"), s(3)).is_ok() && leases.command(Some("a"), s(3)).is_err());
         // No client waits any more; a waiting client that is forgotten gets nothing.

@@ -3,6 +3,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use agent_kit::access::Role;
+use agent_kit::lease::Presence;
 use jtc_host::port::Halts;
 use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 
@@ -136,10 +137,8 @@ pub(super) struct Client {
     pub asked_after: u64,
     /// Stops and Pauses of other clients since this client connected.
     pub halts: Halts,
-    /// Time without a sign of life after which its lease lapses. `None`: the lease lasts while the client is connected.
-    pub lasts: Option<Duration>,
-    /// Time of its last sign of life.
-    pub shown_at: Duration,
+    /// Last sign of life, and the duration of its lease.
+    pub presence: Presence,
     /// Arrival time of its last frame.
     pub heard_at: Duration,
     /// `true` if its lease has lapsed and the client has not requested a new one since.
@@ -163,9 +162,8 @@ impl Client {
             calm_until: Duration::ZERO,
             asked_after: 0,
             halts: Halts::default(),
-            lasts: None,
+            presence: Presence { lasts: None, seen: Duration::ZERO },
             lapsed: false,
-            shown_at: Duration::ZERO,
             heard_at: Duration::ZERO,
             allowance: FRAMES_AT_ONCE,
             allowed_at: Duration::ZERO,

@@ -1,6 +1,8 @@
 //! The lease: at most one client at a time may send commands. All clients can see the holder's name.
 use std::time::Duration;
 
+use agent_kit::lease::Presence;
+
 use super::{ClientId, Delivery, Introduction, LineEvent, Policy, PutOut, Role, SharedLine};
 
 /// Name that is reported as the source of a Stop that a disconnected client's policy requested.
@@ -8,19 +10,8 @@ pub(super) const POLICY: &str = "the policy of a disconnected client";
 /// Special value instead of the number of a Stop: the policy of the client has cancelled the client's requests.
 pub(super) const NOT_ASKED: u64 = u64::MAX;
 
-/// Lease, and its holder.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Lease {
-    /// Client that holds the lease.
-    pub holder: ClientId,
-    /// Time when the holder took the lease.
-    pub since: Duration,
-    /// Time when the lease lapses without renewal. `None`: the client has its own connection, and the lease does not
-    /// lapse.
-    pub until: Option<Duration>,
-    /// Client that waits for the lease.
-    pub wanted_by: Option<ClientId>,
-}
+/// Lease of a client on the line.
+pub type Lease = agent_kit::lease::Lease<ClientId>;
 
 /// Reason why a client may not command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error, serde::Serialize)]
@@ -92,11 +83,11 @@ impl SharedLine {
         now: Duration,
     ) -> Result<(), Denied> {
         if let Some(client) = self.clients.get_mut(&client) {
-            (client.lasts, client.lapsed, client.shown_at) = (lasts, false, now);
+            (client.presence, client.lapsed) = (Presence { lasts, seen: now }, false);
         }
         self.may_command(client, now)?;
         if let Some(lease) = &mut self.lease {
-            lease.until = lasts.map(|lasts| now + lasts);
+            lease.renew(lasts, now);
         }
         Ok(())
     }
@@ -110,8 +101,7 @@ impl SharedLine {
         let lease = self.lease.take_if(|lease| lease.holder == client).ok_or(Denied::NotHolder)?;
         // If a client releases the lease during a motion, the motion continues.
         self.bequeath(self.name(client), Policy::Continue);
-        let next = lease.wanted_by.filter(|next| self.clients.contains_key(next));
-        self.set_lease(next.map(|holder| self.lease_of(holder, now)));
+        self.set_lease(lease.next(|next| self.lasts(*next), now));
         Ok(())
     }
 
@@ -125,30 +115,25 @@ impl SharedLine {
         let Some(Introduction { name, role: Role::Operator, .. }) = self.introduction(client).cloned() else {
             return Err(Denied::Viewer);
         };
-        let lease = self.lease.as_ref().ok_or(Denied::NotHolder)?;
-        let first = lease.wanted_by.filter(|first| *first != client && self.waits(*first, now));
-        if let Some(first) = first {
-            return Err(Denied::Awaited { holder: self.name(lease.holder), by: self.name(first) });
-        }
-        self.show(client, now);
+        let clients = &self.clients;
+        let is_present = |id: &ClientId| clients.get(id).is_some_and(|client| client.presence.is_present(now));
         let lease = self.lease.as_mut().ok_or(Denied::NotHolder)?;
-        lease.wanted_by = Some(client);
-        let holder = lease.holder;
+        let (holder, wanted) = (lease.holder, lease.want(client, is_present));
+        wanted.map_err(|first| Denied::Awaited { holder: self.name(holder), by: self.name(first) })?;
+        self.show(client, now);
         self.deliver(holder, Delivery::LeaseWanted(name));
         Ok(())
     }
 
-    /// Returns true if a client that has requested the lease still waits for it.
-    fn waits(&self, id: ClientId, now: Duration) -> bool {
-        self.clients.get(&id).is_some_and(|client| {
-            client.lasts.is_none_or(|lasts| now.saturating_sub(client.shown_at) < lasts)
-        })
+    /// Returns the duration of a client's lease. The outer `None`: the client has gone.
+    fn lasts(&self, id: ClientId) -> Option<Option<Duration>> {
+        self.clients.get(&id).map(|client| client.presence.lasts)
     }
 
     /// Notes that the client is present.
     fn show(&mut self, id: ClientId, now: Duration) {
         if let Some(client) = self.clients.get_mut(&id) {
-            client.shown_at = now;
+            client.presence.seen = now;
         }
     }
 
@@ -164,7 +149,7 @@ impl SharedLine {
     pub(super) fn may_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         if self.lease.is_none() {
-            self.set_lease(Some(self.lease_of(id, now)));
+            self.set_lease(Some(Lease::begin(id, self.lasts(id).flatten(), now)));
         }
         Ok(())
     }
@@ -191,9 +176,9 @@ impl SharedLine {
     pub fn renew(&mut self, id: ClientId, now: Duration) {
         self.end_lapsed(now);
         self.show(id, now);
-        let lasts = self.clients.get(&id).and_then(|client| client.lasts);
+        let lasts = self.lasts(id).flatten();
         if let Some(lease) = self.lease.as_mut().filter(|lease| lease.holder == id) {
-            lease.until = lasts.map(|lasts| now + lasts);
+            lease.renew(lasts, now);
         }
     }
 
@@ -203,15 +188,9 @@ impl SharedLine {
         client.is_some_and(|client| client.lapsed && client.introduction.policy != Policy::Continue)
     }
 
-    /// Returns a new lease of this client that begins now.
-    fn lease_of(&self, holder: ClientId, now: Duration) -> Lease {
-        let lasts = self.clients.get(&holder).and_then(|client| client.lasts);
-        Lease { holder, since: now, until: lasts.map(|lasts| now + lasts), wanted_by: None }
-    }
-
     pub(super) fn end_lapsed(&mut self, now: Duration) {
         if let Some(Lease { holder, .. }) =
-            self.lease.clone().filter(|lease| lease.until.is_some_and(|until| now >= until))
+            self.lease.clone().filter(|lease| lease.has_lapsed(now))
         {
             if let Some(client) = self.clients.get_mut(&holder) {
                 client.lapsed = true;
@@ -223,9 +202,8 @@ impl SharedLine {
 
     /// Ends the lease of `holder`, and applies its policy.
     pub(super) fn end_lease(&mut self, holder: ClientId, policy: Policy, now: Duration) {
-        let next = self.lease.as_ref().and_then(|lease| lease.wanted_by);
-        let next = next.filter(|next| self.clients.contains_key(next));
-        self.set_lease(next.map(|holder| self.lease_of(holder, now)));
+        let next = self.lease.as_ref().and_then(|lease| lease.next(|next| self.lasts(*next), now));
+        self.set_lease(next);
         self.bequeath(self.name(holder), policy);
         let Some(command) = policy.command() else { return };
         if self.hold(POLICY, command, now) {

@@ -264,7 +264,9 @@ impl<P: Clone> Leases<P> {
 
     /// Returns the key of the client that waits for the lease, if it is present.
     fn first(&self, now: Duration) -> Option<&String> {
-        self.held.as_ref()?.first(|key| self.clients.get(key).is_some_and(|client| client.presence().is_present(now)))
+        self.held
+            .as_ref()?
+            .first(|key| self.clients.get(key).is_some_and(|client| client.presence().is_present(now)))
     }
 
     fn pass_on(&mut self, held: &Lease<String>, now: Duration) {
@@ -327,7 +329,10 @@ mod tests {
         assert_eq!(leases.command(Some("bob"), s(3)).err(), Some(held));
         assert_eq!(leases.lease().and_then(|lease| lease.wanted_by), Some("bob".into()));
         leases.release("anna", s(4));
-        assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), Some(s(14)))));
+        assert_eq!(
+            leases.lease().map(|lease| (lease.holder, lease.until)),
+            Some(("bob".into(), Some(s(14))))
+        );
         assert!(!leases.holds(ClientId(1), s(5)) && !leases.holds(ClientId(2), s(14)));
         assert!(leases.holds(ClientId(2), s(13)));
         // A command renews the lease; then it lapses, once.

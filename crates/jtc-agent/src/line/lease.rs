@@ -116,7 +116,8 @@ impl SharedLine {
             return Err(Denied::Viewer);
         };
         let clients = &self.clients;
-        let is_present = |id: &ClientId| clients.get(id).is_some_and(|client| client.presence.is_present(now));
+        let is_present =
+            |id: &ClientId| clients.get(id).is_some_and(|client| client.presence.is_present(now));
         let lease = self.lease.as_mut().ok_or(Denied::NotHolder)?;
         let (holder, wanted) = (lease.holder, lease.want(client, is_present));
         wanted.map_err(|first| Denied::Awaited { holder: self.name(holder), by: self.name(first) })?;
@@ -189,9 +190,7 @@ impl SharedLine {
     }
 
     pub(super) fn end_lapsed(&mut self, now: Duration) {
-        if let Some(Lease { holder, .. }) =
-            self.lease.clone().filter(|lease| lease.has_lapsed(now))
-        {
+        if let Some(Lease { holder, .. }) = self.lease.clone().filter(|lease| lease.has_lapsed(now)) {
             if let Some(client) = self.clients.get_mut(&holder) {
                 client.lapsed = true;
             }

@@ -179,7 +179,7 @@ mod tests {
     /// The protocol page mentions every key.
     #[test]
     fn d00_the_protocol_page_names_every_key() {
-        let page = include_str!("../../../../docs/protocol-ucom.md");
+        let page = include_str!("../../../docs/protocol-ucom.md");
         let missing: Vec<_> =
             KEYS.iter().filter(|key| !page.contains(&std::format!("`{}`", key.name))).collect();
         assert!(missing.is_empty(), "{missing:?}");

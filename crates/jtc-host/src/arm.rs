@@ -53,7 +53,7 @@ mod urdf {
 }
 
 /// File of the default arm, as delivered.
-pub const AVENA_TOML: &str = include_str!("../../../../arms/avena.toml");
+pub const AVENA_TOML: &str = include_str!("../../../arms/avena.toml");
 
 /// Selection of the arm in a robot description with more than six joints.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

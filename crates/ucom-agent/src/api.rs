@@ -117,7 +117,7 @@ impl Agent {
         let lease = lease.map(|lease| LeaseObject {
             holder: lease.holder,
             age_ms: now.saturating_sub(lease.since).as_millis() as u64,
-            left_ms: lease.until.saturating_sub(now).as_millis() as u64,
+            left_ms: lease.until.unwrap_or(now).saturating_sub(now).as_millis() as u64,
             wanted_by: lease.wanted_by,
         });
         StatusObject {

@@ -15,7 +15,7 @@ use super::text::{TextError, read_text};
 use std::path::{Path, PathBuf};
 
 /// Help page about these files.
-pub const PARAMS_HELP: &str = include_str!("help.txt");
+pub const PARAMS_HELP: &str = include_str!("params/help.txt");
 
 /// A parameter file.
 #[derive(Clone, Debug, Default, PartialEq)]

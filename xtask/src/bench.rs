@@ -24,7 +24,7 @@ const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 type Figures = BTreeMap<String, f64>;
 
 /// `arguments`: `tracking`, or `--json FILE`, `--quick`.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     if let Some(("tracking", rest)) = arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
         return tracking::main(rest);
     }
@@ -120,7 +120,7 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
 
 /// Failed measurements. Each has the beginnings of the names of its figures, and the cause.
 #[derive(Default)]
-pub struct Failed(Vec<(&'static [&'static str], String)>);
+pub(crate) struct Failed(Vec<(&'static [&'static str], String)>);
 
 impl Failed {
     /// Runs a measurement. If it fails, notes the cause and returns no figure.
@@ -141,7 +141,7 @@ impl Failed {
     }
 
     /// Returns the reason why this figure is missing, in one line.
-    pub fn why(&self, figure: &str) -> Option<&str> {
+    pub(crate) fn why(&self, figure: &str) -> Option<&str> {
         let (_, why) = self.0.iter().find(|(names, _)| names.iter().any(|name| figure.starts_with(name)))?;
         why.lines().map(str::trim).rfind(|line| !line.is_empty())
     }

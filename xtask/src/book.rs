@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use crate::shell::{self, Scratch, cargo, files, root, run};
 
 /// `arguments`: `--out DIR`.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let out = shell::option(&mut arguments, "--out")?;
     shell::nothing_left(&arguments)?;
@@ -27,18 +27,18 @@ fn tool(words: &[&str]) -> Command {
 }
 
 /// Builds that program and its tests.
-pub fn build() -> Result<()> {
+pub(crate) fn build() -> Result<()> {
     run(&mut tool(&["build"]))?;
     run(&mut tool(&["test", "--no-run"]))
 }
 
 /// Makes the book in a folder.
-pub fn make(out: &Path) -> Result<()> {
+pub(crate) fn make(out: &Path) -> Result<()> {
     run(tool(&["run"]).arg("--").arg(root()).arg(out))
 }
 
 /// Tests the program, makes the book, and checks all its links.
-pub fn made() -> Result<()> {
+pub(crate) fn made() -> Result<()> {
     run(&mut tool(&["test"]))?;
     let scratch = Scratch::new("book")?;
     make(&scratch.path().join("book"))
@@ -46,7 +46,7 @@ pub fn made() -> Result<()> {
 
 /// Checks that every page of docs/ is in the book, and that every link to a section leads to a heading of the page. Also checks that
 /// tests run every block of commands, or that the block gives the reason why they do not.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let docs = root().join("docs");
     let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).context("docs/SUMMARY.md")?;
     let listed: BTreeSet<&str> = targets(&summary).filter(|target| target.ends_with(".md")).collect();

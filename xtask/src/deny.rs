@@ -22,7 +22,7 @@ const LOCKS: [&str; 5] =
     ["Cargo.lock", "firmware/Cargo.lock", "emulator/Cargo.lock", "fuzz/Cargo.lock", "book/Cargo.lock"];
 
 /// Returns an error that lists the violations of deny.toml.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let rules: Table =
         toml::from_str(&std::fs::read_to_string(root().join("deny.toml"))?).context("deny.toml")?;
     let mut wrong = BTreeSet::new();
@@ -65,7 +65,7 @@ pub fn check() -> Result<()> {
 }
 
 /// Runs cargo-deny itself. If it is missing, installs it below the build folder.
-pub fn with_cargo_deny() -> Result<()> {
+pub(crate) fn with_cargo_deny() -> Result<()> {
     let folder = shell::target().join("tools");
     let program = folder.join("bin/cargo-deny");
     let version = |program: &Path| shell::read(shell::command(program).arg("--version")).unwrap_or_default();

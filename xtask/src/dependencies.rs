@@ -39,7 +39,7 @@ fn documented(page: &str) -> BTreeSet<String> {
 }
 
 /// Returns an error that lists missing and surplus entries of the page.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let page =
         std::fs::read_to_string(root().join("docs/dependencies.md")).context("docs/dependencies.md")?;
     let documented = documented(&page);

@@ -3,9 +3,9 @@ mod check;
 mod chroot;
 mod dashboard;
 mod deb;
-pub mod graph;
+pub(crate) mod graph;
 mod images;
-pub mod licences;
+pub(crate) mod licences;
 mod packages;
 mod pages;
 mod programs;
@@ -20,14 +20,14 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 
-pub use check::steps;
+pub(crate) use check::steps;
 
 use crate::shell::{self, Scratch};
 use packages::{Made, Release};
 use programs::PLATFORMS;
 
 /// `arguments`: `--out DIR`, `--quick`, `--made`, `--twice`, `--check`.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let out = shell::option(&mut arguments, "--out")?;
     let out = out.map_or_else(|| shell::target().join("dist-files"), |out| shell::root().join(out));

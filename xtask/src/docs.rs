@@ -7,7 +7,7 @@ use crate::book;
 use crate::shell::{self, Scratch, cargo, root, run};
 
 /// No arguments.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     shell::nothing_left(arguments)?;
     let scratch = Scratch::new("docs")?;
     run(cargo(&["run", "--release", "--", "demo", "--speed", "max", "--out"]).arg(scratch.path()))?;

@@ -13,7 +13,7 @@ use crate::{firmware, python, size};
 const FIGURES: &str = "docs/board-figures.txt";
 
 /// `arguments`: `--update`, or `--serial PATH` and arguments of the emulator itself.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     if arguments.iter().any(|a| a.starts_with("--serial")) {
         return live(arguments);
     }
@@ -26,7 +26,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
 }
 
 /// Runs the steps, as a part of `cargo xtask test`, too.
-pub fn steps(tally: &mut Tally, update: bool) {
+pub(crate) fn steps(tally: &mut Tally, update: bool) {
     tally.step("board: lints, every unsafe block explained", || firmware::lints().map(|()| Outcome::Passed));
     tally.step("board: tests of what needs no hardware", firmware::tests);
     tally.step("board: programs, sizes, no panic within reach of the tick", || {
@@ -76,7 +76,7 @@ fn cargo(arguments: &[&str]) -> Command {
 }
 
 /// Builds all that the emulated sessions run, except the host program.
-pub fn programs() -> Result<()> {
+pub(crate) fn programs() -> Result<()> {
     install_tools()?;
     firmware::build_fast()?;
     lints()?;

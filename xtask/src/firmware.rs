@@ -12,10 +12,10 @@ use crate::suite::count_results;
 use crate::tally::{Counts, Outcome};
 
 /// Target for which the board's code is compiled.
-pub const TARGET: &str = "thumbv7em-none-eabihf";
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The boards, by the names of the features that select them.
-pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
+pub(crate) const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
 /// Functions that run at the priority of the tick. The second function wakes the links, and is the only function that the tick
 /// calls through a register.
@@ -34,7 +34,7 @@ const REGIONS: [(&str, u64, u64); 8] = [
 ];
 
 /// Adds the compiler's target for the board if rustup manages the toolchain.
-pub fn add_target() -> Result<()> {
+pub(crate) fn add_target() -> Result<()> {
     // If rustup does not manage the toolchain, it has its own targets.
     if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
         && !installed.lines().any(|target| target == TARGET)
@@ -56,17 +56,17 @@ fn cargo_for(board: &str, subcommand: &str) -> Result<Command> {
 }
 
 /// Returns the build folder of the boards' programs.
-pub fn directory() -> PathBuf {
+pub(crate) fn directory() -> PathBuf {
     shell::target().join("firmware")
 }
 
 /// Returns the path of a board's program after its build.
-pub fn elf(board: &str) -> PathBuf {
+pub(crate) fn elf(board: &str) -> PathBuf {
     directory().join(format!("{board}.elf"))
 }
 
 /// Builds the ELF of a board and returns its path.
-pub fn build(board: &str) -> Result<PathBuf> {
+pub(crate) fn build(board: &str) -> Result<PathBuf> {
     add_target()?;
     run(&mut cargo_for(board, "build")?)?;
     let built = directory().join(TARGET).join("release/openjtc-firmware");
@@ -80,7 +80,7 @@ const FAST: &str = "15000000";
 
 /// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. This build has
 /// its own directory, so that the two builds do not invalidate each other.
-pub fn build_fast() -> Result<PathBuf> {
+pub(crate) fn build_fast() -> Result<PathBuf> {
     add_target()?;
     let target = directory().join("fast");
     run(cargo_for(BOARDS[0], "build")?.env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;
@@ -91,7 +91,7 @@ pub fn build_fast() -> Result<PathBuf> {
 }
 
 /// Returns the bytes of static data in each region, in the order of [`REGIONS`]: name, used bytes, size.
-pub fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
+pub(crate) fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
     let bytes = std::fs::read(elf)?;
     let file = object::File::parse(&*bytes)?;
     let mut used = REGIONS.map(|(name, _, size)| (name, 0_u64, size));
@@ -118,7 +118,7 @@ pub fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
 }
 
 /// Runs all checks of a board's ELF and prints the results.
-pub fn check(board: &str, elf: &Path) -> Result<()> {
+pub(crate) fn check(board: &str, elf: &Path) -> Result<()> {
     for (name, bytes, size) in used(elf)? {
         println!("{board}: {name}: {bytes} of {size} B");
         ensure!(bytes <= size, "{name} holds {size} B, the program takes {bytes} B");
@@ -131,7 +131,7 @@ pub fn check(board: &str, elf: &Path) -> Result<()> {
 }
 
 /// Lints the board's code. Every `unsafe` block must be explained. Prints the number of these blocks.
-pub fn lints() -> Result<()> {
+pub(crate) fn lints() -> Result<()> {
     add_target()?;
     for board in BOARDS {
         let mut clippy = cargo_for(board, "clippy")?;
@@ -149,7 +149,7 @@ pub fn lints() -> Result<()> {
 }
 
 /// Tests, on this machine, the part of the firmware that needs no hardware.
-pub fn tests() -> Result<Outcome> {
+pub(crate) fn tests() -> Result<Outcome> {
     let host = shell::read(shell::command("rustc").args(["--print", "host-tuple"]))?;
     let mut cargo = shell::cargo(&["test", "--lib", "--target", host.trim()]);
     cargo.current_dir(shell::root().join("firmware")).env("CARGO_TARGET_DIR", directory());
@@ -162,7 +162,7 @@ pub fn tests() -> Result<Outcome> {
 }
 
 /// `arguments`: names of boards. Without a name, all boards are built.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let boards: Vec<&str> = match arguments {
         [] => BOARDS.to_vec(),
         some => some.iter().map(String::as_str).collect(),

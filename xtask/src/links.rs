@@ -15,7 +15,7 @@ fn targets(page: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Returns an error that lists the links to missing files.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let (mut links, mut broken) = (0, Vec::new());
     for path in files(root(), &["md"]) {
         let page = std::fs::read_to_string(&path)?;

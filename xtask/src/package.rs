@@ -33,7 +33,7 @@ fn is_own(path: &Path) -> bool {
 }
 
 /// Builds the wheel for this computer from the files that the tests have compiled; `cargo xtask dist` makes the wheels of a release.
-pub fn build() -> Result<PathBuf> {
+pub(crate) fn build() -> Result<PathBuf> {
     let python = python::environment(REQUIREMENTS)?;
     let programs = python.parent().context("an interpreter in no folder")?;
     let folder = wheels();
@@ -54,7 +54,7 @@ pub fn build() -> Result<PathBuf> {
 }
 
 /// Runs the steps of `cargo xtask test`. No other check runs at the same time: many of these tests watch simulated arms in real time.
-pub fn steps(tally: &mut Tally) {
+pub(crate) fn steps(tally: &mut Tally) {
     let mut wheel = None;
     tally.step("Python package: wheel", || {
         wheel = Some(build()?);

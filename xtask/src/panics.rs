@@ -29,7 +29,7 @@ const PANICS: [&str; 8] = [
 
 /// Result of the search from the roots.
 #[derive(Debug)]
-pub struct Report {
+pub(crate) struct Report {
     /// Number of reached functions, including the roots.
     pub functions: usize,
     /// Number of their instructions.
@@ -64,7 +64,7 @@ impl fmt::Display for Report {
 /// Returns the paths from `roots` (names of functions, as linked or as in the source) to a panic in a program for ARMv7-M.
 ///
 /// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the line of an address.
-pub fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
+pub(crate) fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     let program = Program::read(elf)?;
     // Reached functions, each with the calling function and the address of the branch.
     let mut from: BTreeMap<u32, Option<(u32, u32)>> = BTreeMap::new();

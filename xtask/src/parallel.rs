@@ -14,7 +14,7 @@ use crate::shell::Scratch;
 use crate::tally::{Outcome, Tally};
 
 /// Output and result of a program.
-pub struct Ended {
+pub(crate) struct Ended {
     /// On both of its outputs.
     pub output: String,
     /// With exit code 0.
@@ -24,7 +24,7 @@ pub struct Ended {
 }
 
 /// Result of a program that ran at the same time as others.
-pub trait Ran {
+pub(crate) trait Ran {
     /// Returns the output and the end of the program if the program ran.
     fn ended(&self) -> Option<&Ended>;
 
@@ -55,7 +55,7 @@ impl Ran for Result<Option<Ended>> {
 type Run<'a> = Box<dyn Fn(&Path) -> Result<Option<Ended>> + Send + Sync + 'a>;
 
 /// Check that runs at the same time as others, as a step of its own.
-pub struct Check<'a> {
+pub(crate) struct Check<'a> {
     /// Title of the step.
     pub title: String,
     /// Runs the check.
@@ -67,13 +67,13 @@ pub struct Check<'a> {
 }
 
 /// Returns the outcome of a check that counts as one test.
-pub fn whole(ended: &Ended) -> Result<Outcome> {
+pub(crate) fn whole(ended: &Ended) -> Result<Outcome> {
     ensure!(ended.passed, "it ended with an error");
     Ok(Outcome::Passed)
 }
 
 /// Runs the checks whose steps are wanted, each as a step. The longest should come first.
-pub fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
+pub(crate) fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
     checks.retain(|check| tally.wants(&check.title));
     let ran = run_all(
         checks,
@@ -99,7 +99,7 @@ pub fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
 ///
 /// Tests with simulated arms and browsers watch clocks, and a busy computer can make them fail. So a program that failed runs again
 /// when all others have ended. Then its second result counts. Returns how many of `items` passed only then.
-pub fn run_all<T: Send, R: Ran + Send>(
+pub(crate) fn run_all<T: Send, R: Ran + Send>(
     items: Vec<T>,
     run: impl Fn(&T, &Path) -> R + Sync,
     ended: impl FnMut(T, R) + Send,
@@ -140,7 +140,7 @@ pub fn run_all<T: Send, R: Ran + Send>(
 }
 
 /// Runs a command whose output goes to `log`.
-pub fn run(command: &mut Command, log: &Path) -> Result<Ended> {
+pub(crate) fn run(command: &mut Command, log: &Path) -> Result<Ended> {
     let start = Instant::now();
     let mut file = File::options().create(true).truncate(true).read(true).write(true).open(log)?;
     let status = command.stdin(Stdio::null()).stdout(file.try_clone()?).stderr(file.try_clone()?).status()?;

@@ -13,7 +13,7 @@ fn cargo_home() -> PathBuf {
 }
 
 /// Returns the folders, each with its replacement name. Later entries have priority.
-pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
+pub(crate) fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut folders = vec![
         (shell::root().to_owned(), "openjtc"),
         (cargo_home(), "cargo"),
@@ -39,7 +39,7 @@ pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
 }
 
 /// Returns the switches for cargo's `--config` that keep these paths out of the compiler's output for `triple`.
-pub fn remapped(triple: &str) -> Result<String> {
+pub(crate) fn remapped(triple: &str) -> Result<String> {
     let flags = folders()?.into_iter();
     let flags: Vec<String> =
         flags.map(|(path, name)| format!("\"--remap-path-prefix={}={name}\"", path.display())).collect();

@@ -34,7 +34,7 @@ struct Place {
 }
 
 /// `arguments`: `--update`, or the name of a part whose marks are printed.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let update = shell::flag(&mut arguments, "--update");
     let part = arguments.pop();
@@ -61,7 +61,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
 }
 
 /// Returns an error if a part has more marks than its stored count.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     compare(&counts(&places()?), &kept()?)
 }
 

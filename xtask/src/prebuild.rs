@@ -11,14 +11,14 @@ use anyhow::Result;
 use crate::{book, emulate, firmware, package, python, shell, web};
 
 /// Build in the background.
-pub struct Prebuild {
+pub(crate) struct Prebuild {
     workspace_is_built: Option<Sender<()>>,
     making: Option<JoinHandle<()>>,
 }
 
 impl Prebuild {
     /// Begins the builds. The slowest ones come first.
-    pub fn begin() -> Self {
+    pub(crate) fn begin() -> Self {
         let (sender, receiver) = mpsc::channel();
         let make = move || {
             if let Err(error) = shell::in_background(|| make(&receiver)) {
@@ -31,7 +31,7 @@ impl Prebuild {
 
     /// Allows the build of the Python package. Cargo allows one build at a time in a target folder. If this low-priority build began
     /// earlier, it would delay the steps.
-    pub fn workspace_is_built(&self) {
+    pub(crate) fn workspace_is_built(&self) {
         if let Some(sender) = &self.workspace_is_built {
             // An error means that an earlier build has failed and the thread has ended.
             let _ = sender.send(());

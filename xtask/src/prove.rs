@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 
 /// `arguments`: `mutants` or `fuzz`, followed by the arguments of that check.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     match arguments.split_first() {
         Some((what, rest)) if what == "mutants" => mutants::main(rest),
         Some((what, rest)) if what == "fuzz" => fuzz::main(rest),

@@ -13,7 +13,7 @@ use crate::tally::{Outcome, Tally};
 
 /// Returns the interpreter of a virtual environment with the packages of references/`requirements`; makes the environment
 /// if it does not exist.
-pub fn environment(requirements: &str) -> Result<PathBuf> {
+pub(crate) fn environment(requirements: &str) -> Result<PathBuf> {
     // A second caller waits while the environment is being made.
     static MAKING: Mutex<()> = Mutex::new(());
     let _making = MAKING.lock().unwrap_or_else(PoisonError::into_inner);
@@ -46,14 +46,14 @@ pub fn environment(requirements: &str) -> Result<PathBuf> {
 }
 
 /// Returns `pip install` of this interpreter's environment; the caller adds the packages.
-pub fn pip_install(python: &Path) -> Command {
+pub(crate) fn pip_install(python: &Path) -> Command {
     let mut install = command(python);
     install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     install
 }
 
 /// Returns the folder of third-party robot descriptions, for all environments.
-pub fn robots() -> PathBuf {
+pub(crate) fn robots() -> PathBuf {
     shell::target().join("robots")
 }
 
@@ -99,7 +99,7 @@ static CHECKS: [Check; 24] = [
 ];
 
 /// Runs the steps before the references, and returns a check for each reference; `demo` is the folder of the demo's files.
-pub fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<parallel::Check<'a>> {
+pub(crate) fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<parallel::Check<'a>> {
     let mut python = None;
     tally.step("Python environment of the references", || {
         python = Some(environment("requirements.txt")?);

@@ -47,7 +47,7 @@ fn test_part<'a>(path: &std::path::Path, source: &'a str) -> &'a str {
 }
 
 /// Returns an error that lists the rules without a test.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let mut tests = Vec::new();
     for directory in ["crates", "emulator", "firmware"] {
         for path in files(&root().join(directory), &["rs"]) {

@@ -8,12 +8,12 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 
 /// The root of the workspace.
-pub fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }
 
 /// Returns cargo's target directory.
-pub fn target() -> PathBuf {
+pub(crate) fn target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => root().join(directory),
         None => root().join("target"),
@@ -21,7 +21,7 @@ pub fn target() -> PathBuf {
 }
 
 /// `program` in the root of the workspace.
-pub fn command(program: impl AsRef<OsStr>) -> Command {
+pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
     // Cargo sets these for xtask's own package. Build scripts that read them, as ring's does, would run again each time that a person runs
@@ -36,7 +36,7 @@ pub fn command(program: impl AsRef<OsStr>) -> Command {
 }
 
 /// Cargo of the pinned toolchain.
-pub fn cargo(arguments: &[&str]) -> Command {
+pub(crate) fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.args(arguments);
     cargo
@@ -44,7 +44,7 @@ pub fn cargo(arguments: &[&str]) -> Command {
 
 /// Lets cargo compile the packages of the workspace with Clippy, which is the compiler with more warnings. A single build then makes the
 /// programs and finds what `cargo clippy` finds; that command alone would compile all dependencies once more.
-pub fn lint(cargo: &mut Command) -> Result<&mut Command> {
+pub(crate) fn lint(cargo: &mut Command) -> Result<&mut Command> {
     let sysroot = read(command("rustc").args(["--print", "sysroot"]))?;
     let clippy = Path::new(sysroot.trim()).join("bin/clippy-driver");
     if !clippy.exists() {
@@ -56,7 +56,7 @@ pub fn lint(cargo: &mut Command) -> Result<&mut Command> {
 /// Returns the processor time of all programs that have ended so far, with their child processes; `None` if the system has no `/proc`.
 ///
 /// The programs of [`in_background`] count when they end.
-pub fn processor_seconds() -> Option<f64> {
+pub(crate) fn processor_seconds() -> Option<f64> {
     // proc_pid_stat(5): the name in parentheses, then the fields from the third on; cutime and cstime are the 16th and 17th, in 1/100 s.
     let line = std::fs::read_to_string("/proc/self/stat").ok()?;
     let mut fields = line.rsplit(") ").next()?.split(' ').skip(13);
@@ -85,7 +85,7 @@ thread_local! {
 }
 
 /// Runs `body`; its programs started by [`run`] or [`read`] run at the lowest priority, and print nothing.
-pub fn in_background<T>(body: impl FnOnce() -> T) -> T {
+pub(crate) fn in_background<T>(body: impl FnOnce() -> T) -> T {
     IN_BACKGROUND.set(true);
     let done = body();
     IN_BACKGROUND.set(false);
@@ -93,7 +93,7 @@ pub fn in_background<T>(body: impl FnOnce() -> T) -> T {
 }
 
 /// Returns the command with a lower priority: 19 is the lowest.
-pub fn nice(command: &Command, by: u8) -> Command {
+pub(crate) fn nice(command: &Command, by: u8) -> Command {
     let mut nice = Command::new("nice");
     nice.args(["-n", &by.to_string()]).arg(command.get_program()).args(command.get_args());
     if let Some(directory) = command.get_current_dir() {
@@ -109,7 +109,7 @@ pub fn nice(command: &Command, by: u8) -> Command {
 }
 
 /// Run with the output going to the terminal; an exit code other than 0 is an error.
-pub fn run(command: &mut Command) -> Result<()> {
+pub(crate) fn run(command: &mut Command) -> Result<()> {
     let background = IN_BACKGROUND.get();
     if !background {
         announce(command);
@@ -126,7 +126,7 @@ pub fn run(command: &mut Command) -> Result<()> {
 }
 
 /// Runs a command, shows each line of its standard output as it comes and passes it to `line`, too.
-pub fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
+pub(crate) fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
     read_lines(command, |text| {
         println!("{text}");
         line(text);
@@ -134,7 +134,7 @@ pub fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()
 }
 
 /// Runs a command and passes each line of its standard output to `line` as it comes.
-pub fn read_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
+pub(crate) fn read_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
     announce(command);
     let mut child = command
         .stdout(Stdio::piped())
@@ -154,7 +154,7 @@ pub fn read_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<(
 }
 
 /// Run and return its standard output; progress and errors go to the terminal.
-pub fn read(command: &mut Command) -> Result<String> {
+pub(crate) fn read(command: &mut Command) -> Result<String> {
     let background = IN_BACKGROUND.get();
     let output = command
         .stderr(if background { Stdio::null() } else { Stdio::inherit() })
@@ -172,7 +172,7 @@ pub fn read(command: &mut Command) -> Result<String> {
 }
 
 /// Returns `true` if a program can be started at all; its output is dropped.
-pub fn works(command: &mut Command) -> bool {
+pub(crate) fn works(command: &mut Command) -> bool {
     command
         .stdin(Stdio::null())
         .stdout(Stdio::null())
@@ -182,7 +182,7 @@ pub fn works(command: &mut Command) -> bool {
 }
 
 /// Install Debian packages; needs root.
-pub fn apt_install(packages: &[&str]) -> Result<()> {
+pub(crate) fn apt_install(packages: &[&str]) -> Result<()> {
     let hint = format!("install it by hand: sudo apt-get install {}", packages.join(" "));
     if !works(command("id").arg("-u")) || read(command("id").arg("-u"))?.trim() != "0" {
         bail!("the package {} is missing; {hint}", packages.join(" "));
@@ -201,18 +201,18 @@ pub fn apt_install(packages: &[&str]) -> Result<()> {
 }
 
 /// A directory of its own under the temporary directory, removed when dropped.
-pub struct Scratch(PathBuf);
+pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     /// Makes a new folder; `name` is its purpose.
-    pub fn new(name: &str) -> Result<Self> {
+    pub(crate) fn new(name: &str) -> Result<Self> {
         let path = std::env::temp_dir().join(format!("openjtc-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;
         Ok(Self(path))
     }
 
     /// Returns the path.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.0
     }
 }
@@ -224,7 +224,7 @@ impl Drop for Scratch {
 }
 
 /// Files below `directory` with one of these extensions, sorted; build output, installed packages and hidden directories left out.
-pub fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
+pub(crate) fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut waiting = vec![directory.to_owned()];
     while let Some(directory) = waiting.pop() {
@@ -247,7 +247,7 @@ pub fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
 }
 
 /// The value of `--name value` or `--name=value`, removed from `arguments`.
-pub fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<String>> {
+pub(crate) fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<String>> {
     let prefix = format!("{name}=");
     if let Some(at) = arguments.iter().position(|a| a.starts_with(&prefix)) {
         return Ok(Some(arguments.remove(at)[prefix.len()..].to_owned()));
@@ -261,14 +261,14 @@ pub fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<String>>
 }
 
 /// Returns `true` if `--name` is given; removes it from `arguments`.
-pub fn flag(arguments: &mut Vec<String>, name: &str) -> bool {
+pub(crate) fn flag(arguments: &mut Vec<String>, name: &str) -> bool {
     let before = arguments.len();
     arguments.retain(|a| a != name);
     arguments.len() != before
 }
 
 /// Returns an error if unknown arguments are left.
-pub fn nothing_left(arguments: &[String]) -> Result<()> {
+pub(crate) fn nothing_left(arguments: &[String]) -> Result<()> {
     match arguments.first() {
         Some(argument) => bail!("unknown argument `{argument}`; see `cargo xtask help`"),
         None => Ok(()),

@@ -9,10 +9,10 @@ use crate::{firmware, suite};
 
 /// Largest size of the controller with its trajectory, bytes: 432 000 for the points, and 40 KiB of the board's fast memory for the
 /// remaining data, including the stored arm. The receive buffers of 60 000 bytes are not included.
-pub const LIMIT: u64 = 432_000 + 40 * 1024;
+pub(crate) const LIMIT: u64 = 432_000 + 40 * 1024;
 
 /// Returns the size that the controller with memory for 12 000 points has in the compiled program, bytes.
-pub fn controller_bytes() -> Result<u64> {
+pub(crate) fn controller_bytes() -> Result<u64> {
     let text = shell::read(&mut shell::command(suite::programs()?.join("examples/tick")))?;
     let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));
     line.context("the example `tick` of jtc-core printed no controller_bytes")?
@@ -22,7 +22,7 @@ pub fn controller_bytes() -> Result<u64> {
 }
 
 /// Returns an error if the size is above the limit.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let bytes = controller_bytes()?;
     println!(
         "controller with its trajectory: {bytes} B = {:.1} KiB of {} KiB",
@@ -34,13 +34,13 @@ pub fn check() -> Result<()> {
 }
 
 /// Returns the memory that a board's program uses by region, one line each. The program must have been built.
-pub fn regions(board: &str) -> Result<String> {
+pub(crate) fn regions(board: &str) -> Result<String> {
     let used = firmware::used(&firmware::elf(board))?;
     Ok(used.iter().map(|(name, bytes, size)| format!("  {name}: {bytes} of {size} B\n")).collect())
 }
 
 /// No arguments.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     shell::nothing_left(arguments)?;
     check()?;
     for board in firmware::BOARDS {

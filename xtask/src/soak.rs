@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use crate::shell::{self, cargo, run};
 
 /// `arguments`: `--hours H`, `--seed N`.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let hours = shell::option(&mut arguments, "--hours")?.unwrap_or_else(|| "24".into());
     let seed = shell::option(&mut arguments, "--seed")?.unwrap_or_else(|| "1".into());

@@ -27,7 +27,7 @@ struct Program {
 
 /// Every test of the workspace, and those in its documentation; their own counts are summed up. Calls `built` when cargo has built the
 /// workspace.
-pub fn run(built: impl FnOnce()) -> Result<Outcome> {
+pub(crate) fn run(built: impl FnOnce()) -> Result<Outcome> {
     let tests = build()?;
     programs()?;
     built();
@@ -51,13 +51,13 @@ pub fn run(built: impl FnOnce()) -> Result<Outcome> {
 /// Builds the commands and the examples with the dependencies that the tests have. Returns their folder.
 ///
 /// Cargo chooses features for the packages that it is given. For one package it would build half of the dependencies a second time.
-pub fn programs() -> Result<PathBuf> {
+pub(crate) fn programs() -> Result<PathBuf> {
     compile(&["build", "--bins", "--examples"], |_| {})?;
     Ok(shell::target().join("release"))
 }
 
 /// Builds everything; a warning of the compiler or of Clippy is an error.
-pub fn lints() -> Result<()> {
+pub(crate) fn lints() -> Result<()> {
     let mut warnings = 0;
     for build in [&["test", "--tests", "--no-run"], &["build", "--bins", "--examples"]] {
         compile(build, |message| {
@@ -184,7 +184,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
 }
 
 /// Adds the numbers of a line of results, if it is one.
-pub fn count_results(line: &str, counts: &mut Counts) {
+pub(crate) fn count_results(line: &str, counts: &mut Counts) {
     let Some(rest) = line.strip_prefix("test result: ") else { return };
     counts.passed += count(rest, "passed");
     counts.failed += count(rest, "failed");

@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::shell;
 
 /// Outcome of a step.
-pub enum Outcome {
+pub(crate) enum Outcome {
     /// A single check that passed.
     Passed,
     /// Counts of several tests, and the output of the failed ones.
@@ -18,7 +18,7 @@ pub enum Outcome {
 
 /// Counts of tests.
 #[derive(Clone, Copy, Default)]
-pub struct Counts {
+pub(crate) struct Counts {
     /// Passed tests.
     pub passed: u64,
     /// Failed tests.
@@ -31,7 +31,7 @@ pub struct Counts {
 
 /// Finished steps.
 #[derive(Default)]
-pub struct Tally {
+pub(crate) struct Tally {
     only: Option<String>,
     counts: Counts,
     failures: Vec<String>,
@@ -40,17 +40,17 @@ pub struct Tally {
 
 impl Tally {
     /// Creates a tally that runs only the steps with `only` in their title. `None`: runs all steps.
-    pub fn new(only: Option<String>) -> Self {
+    pub(crate) fn new(only: Option<String>) -> Self {
         Self { only, ..Self::default() }
     }
 
     /// Returns `true` if a step with this title shall run.
-    pub fn wants(&self, title: &str) -> bool {
+    pub(crate) fn wants(&self, title: &str) -> bool {
         self.only.as_ref().is_none_or(|only| title.contains(only))
     }
 
     /// Runs a step under its heading. An error is reported and counted. The next step still runs.
-    pub fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
+    pub(crate) fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
         if !self.wants(title) {
             return;
         }
@@ -97,12 +97,12 @@ impl Tally {
     }
 
     /// Counts programs that failed at first, and passed when they ran again alone.
-    pub fn passed_alone(&mut self, programs: u64) {
+    pub(crate) fn passed_alone(&mut self, programs: u64) {
         self.counts.passed_alone += programs;
     }
 
     /// Prints the failed and skipped steps once more, then the closing line.
-    pub fn finish(self) -> ExitCode {
+    pub(crate) fn finish(self) -> ExitCode {
         println!();
         for skip in &self.skips {
             println!("skipped: {skip}");
@@ -121,7 +121,7 @@ impl Tally {
 
 /// Returns the output from the first line that begins with `heading`. After this line, test runners describe the
 /// failures.
-pub fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
+pub(crate) fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
     let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
     let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();
     &output[before..]

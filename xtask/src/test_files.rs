@@ -55,7 +55,7 @@ fn forgotten(package: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Returns an error that lists the files with tests that belong to no program.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let mut missing = Vec::new();
     for manifest in shell::files(&root().join("crates"), &["toml"]) {
         if manifest.file_name().is_some_and(|name| name == "Cargo.toml") {

@@ -12,7 +12,7 @@ use crate::shell::{self, Scratch, run};
 use crate::tally::{self, Counts, Outcome, Tally};
 
 /// Path of Debian's browser.
-pub const BROWSER: &str = "/usr/bin/chromium";
+pub(crate) const BROWSER: &str = "/usr/bin/chromium";
 
 /// Returns a command for `program` of Node.js in `web/`, from the references' environment, so that no Node.js must be installed.
 fn command(program: &str) -> Result<Command> {
@@ -38,7 +38,7 @@ fn install() -> Result<()> {
 }
 
 /// Runs the steps of the source.
-pub fn steps(tally: &mut Tally) {
+pub(crate) fn steps(tally: &mut Tally) {
     tally.step("dashboard: types and tests of its source", || {
         install()?;
         run(command("npm")?.args(["run", "--silent", "check"]))?;
@@ -93,12 +93,12 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Installs Debian's browser if it is missing and this user may install it.
-pub fn install_browser() -> Result<()> {
+pub(crate) fn install_browser() -> Result<()> {
     if Path::new(BROWSER).exists() { Ok(()) } else { shell::apt_install(&["chromium"]) }
 }
 
 /// Returns the check that uses the dashboard in a browser.
-pub fn browser<'a>() -> parallel::Check<'a> {
+pub(crate) fn browser<'a>() -> parallel::Check<'a> {
     parallel::Check {
         title: "dashboard: used in a browser".into(),
         run: Box::new(use_in_browser),

@@ -25,7 +25,7 @@ fn crc(bytes: &[u8]) -> u16 {
 }
 
 /// Returns an error with the first wrong line.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     let page =
         std::fs::read_to_string(root().join("docs/protocol-jtc.md")).context("docs/protocol-jtc.md")?;
     let mut inside = false;

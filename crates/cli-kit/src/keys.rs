@@ -69,7 +69,8 @@ fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
 }
 
 #[cfg(unix)]
-pub use terminal::{Keys, restore};
+pub use terminal::Keys;
+pub(crate) use terminal::restore;
 
 #[cfg(unix)]
 mod terminal {
@@ -89,7 +90,7 @@ mod terminal {
     static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
 
     /// Restores the terminal. A second call has no effect.
-    pub fn restore() {
+    pub(crate) fn restore() {
         if let Some(before) = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take() {
             let _ = tcsetattr(stdin(), OptionalActions::Now, &before);
         }

@@ -24,7 +24,7 @@ struct Assembly {
 
 /// Follows uploads.
 #[derive(Default)]
-pub struct Upload {
+pub(crate) struct Upload {
     current: Option<Assembly>,
     /// New upload. If its first segment is refused, the previous upload stays valid.
     next: Option<Assembly>,
@@ -33,7 +33,7 @@ pub struct Upload {
 
 impl Upload {
     /// Returns `true` if an event belongs to an upload.
-    pub fn is_of(event: &LineEvent) -> bool {
+    pub(crate) fn is_of(event: &LineEvent) -> bool {
         match event {
             LineEvent::Sent { frame_type, .. } => *frame_type == FrameType::Trajectory,
             LineEvent::Answered { response, .. } => Self::answer(response).is_some(),
@@ -42,7 +42,7 @@ impl Upload {
     }
 
     /// Takes an event of the line.
-    pub fn see(&mut self, event: &LineEvent) {
+    pub(crate) fn see(&mut self, event: &LineEvent) {
         match event {
             LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => self.sent(bytes),
             LineEvent::Answered { response, .. } => {
@@ -56,14 +56,14 @@ impl Upload {
 
     /// Returns `true` if a Trajectory frame was accepted; `None` if this is not the answer to an undamaged Trajectory
     /// frame.
-    pub fn answer(response: &Response) -> Option<bool> {
+    pub(crate) fn answer(response: &Response) -> Option<bool> {
         let whole =
             response.frame_type == FrameType::Trajectory as u8 && response.status == FrameStatus::NoError;
         whole.then_some(response.data == DataStatus::NoError)
     }
 
     /// Takes a Trajectory frame that was sent to the controller.
-    pub fn sent(&mut self, frame: &[u8]) {
+    pub(crate) fn sent(&mut self, frame: &[u8]) {
         let Some(Ok(Command::Trajectory(segment))) = FrameRef::new_checked(frame).map(Command::parse) else {
             return;
         };
@@ -97,7 +97,7 @@ impl Upload {
 
     /// Takes the answer to a Trajectory frame. Records come in the order of the frames, so the first record after a
     /// first segment belongs to it.
-    pub fn answered(&mut self, accepted: bool) {
+    pub(crate) fn answered(&mut self, accepted: bool) {
         if let Some(next) = self.next.take() {
             self.whole = None;
             if accepted {
@@ -107,13 +107,13 @@ impl Upload {
     }
 
     /// Forgets all uploads.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 
     /// Returns the controller's trajectory, if all its segments were seen. `executes`: the controller runs the
     /// trajectory, so it must be complete.
-    pub fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
+    pub(crate) fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
         if executes {
             // The record of the first segment was lost.
             self.answered(true);

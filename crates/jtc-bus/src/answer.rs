@@ -7,24 +7,24 @@ use crate::{GRIPPER, NODES, NodeState, id};
 /// Positions in the payloads of answers to Move.
 mod field {
     /// Position, i32.
-    pub const POSITION: usize = 0;
+    pub(super) const POSITION: usize = 0;
     /// Velocity, i16.
-    pub const VELOCITY: usize = 4;
+    pub(super) const VELOCITY: usize = 4;
     /// Torque, i16.
-    pub const TORQUE: usize = 6;
-    pub const BEARING_TEMPERATURE: usize = 8;
-    pub const FSM: usize = 9;
-    pub const MC_CURRENT: usize = 10;
-    pub const MC_OCCURRED: usize = 11;
-    pub const ERRORS: usize = 12;
-    pub const WARNINGS: usize = 13;
+    pub(super) const TORQUE: usize = 6;
+    pub(super) const BEARING_TEMPERATURE: usize = 8;
+    pub(super) const FSM: usize = 9;
+    pub(super) const MC_CURRENT: usize = 10;
+    pub(super) const MC_OCCURRED: usize = 11;
+    pub(super) const ERRORS: usize = 12;
+    pub(super) const WARNINGS: usize = 13;
     /// Present only in payloads of 20 bytes.
-    pub const MOTOR_TEMPERATURE: usize = 16;
-    pub const PUMP: usize = 0;
-    pub const PRESSURE1: usize = 1;
-    pub const PRESSURE2: usize = 2;
-    pub const SHORT_LEN: usize = 16;
-    pub const LONG_LEN: usize = 20;
+    pub(super) const MOTOR_TEMPERATURE: usize = 16;
+    pub(super) const PUMP: usize = 0;
+    pub(super) const PRESSURE1: usize = 1;
+    pub(super) const PRESSURE2: usize = 2;
+    pub(super) const SHORT_LEN: usize = 16;
+    pub(super) const LONG_LEN: usize = 20;
 }
 
 /// A joint's answer to Move (0x200+n): 16 bytes, or 20 bytes from new drives.

@@ -7,16 +7,16 @@ use crate::{GRIPPER, JOINTS, NODES, NodeState, id};
 /// Positions in the payloads of requests.
 mod field {
     /// Move: two bytes per joint from here.
-    pub const TORQUE: usize = 0;
+    pub(super) const TORQUE: usize = 0;
     /// Move: pump.
-    pub const PUMP: usize = 12;
+    pub(super) const PUMP: usize = 12;
     /// ChangeMode: mode and configuration bits per joint from here.
-    pub const MODE: usize = 0;
+    pub(super) const MODE: usize = 0;
     /// ChangeMode: configuration bits of the gripper.
-    pub const GRIPPER_CONFIG: usize = 13;
-    pub const MOVE_LEN: usize = 16;
-    pub const FSM_LEN: usize = 7;
-    pub const MODE_LEN: usize = 16;
+    pub(super) const GRIPPER_CONFIG: usize = 13;
+    pub(super) const MOVE_LEN: usize = 16;
+    pub(super) const FSM_LEN: usize = 7;
+    pub(super) const MODE_LEN: usize = 16;
 }
 
 /// A state that the controller can request from a node. The controller sends no other values (J-16), because some drives take any other

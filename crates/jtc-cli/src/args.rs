@@ -20,19 +20,21 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use cli_kit::variables::on_off;
 
-pub use arm::{ArmCommand, ImportArgs};
-pub use bench::BenchCommand;
-pub use firmware::{FirmwareCommand, FlashArgs, ImageArgs};
-pub use log::LogCommand;
-pub use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
-pub use motion::{CheckArgs, ContinueArgs, ExecuteArgs, ResumeArgs, RunArgs, TeachCommand, TrajCommand};
-pub use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
-pub use params::{AcceptArgs, FrictionKind, ParamsCommand};
-pub use payload::PayloadCommand;
-pub use plan::{MoveArgs, PlanArgs, PoseCommand, Target};
-pub use serve::ServeArgs;
-pub use sim::{DemoArgs, SimArgs, SimSpeed, SimSupport};
-pub use variables::VARIABLES;
+pub(crate) use arm::{ArmCommand, ImportArgs};
+pub(crate) use bench::BenchCommand;
+pub(crate) use firmware::{FirmwareCommand, FlashArgs, ImageArgs};
+pub(crate) use log::LogCommand;
+pub(crate) use maintain::{ClearArgs, GripperArgs, JogArgs, MonitorArgs, RecoverArgs, ResetArgs, Switch};
+pub(crate) use motion::{
+    CheckArgs, ContinueArgs, ExecuteArgs, ResumeArgs, RunArgs, TeachCommand, TrajCommand,
+};
+pub(crate) use offline::{DynamicsArgs, DynamicsKind, ExampleArgs, ExplainArgs, HelpArgs, ReportArgs};
+pub(crate) use params::{AcceptArgs, FrictionKind, ParamsCommand};
+pub(crate) use payload::PayloadCommand;
+pub(crate) use plan::{MoveArgs, PlanArgs, PoseCommand, Target};
+pub(crate) use serve::ServeArgs;
+pub(crate) use sim::{DemoArgs, SimArgs, SimSpeed, SimSupport};
+pub(crate) use variables::VARIABLES;
 
 /// Command line of the joint trajectory controller.
 #[derive(Debug, Parser)]
@@ -61,7 +63,7 @@ pub use variables::VARIABLES;
     propagate_version = true,
     disable_help_subcommand = true
 )]
-pub struct Cli {
+pub(crate) struct Cli {
     /// Print JSON instead of text.
     ///
     /// A stream has one object per line
@@ -81,7 +83,7 @@ pub struct Cli {
 
 /// Options that select the controller.
 #[derive(Args, Clone, Debug)]
-pub struct LinkArgs {
+pub(crate) struct LinkArgs {
     /// Use this serial port, or the agent at http://HOST:PORT.
     ///
     /// Default: the only port found
@@ -105,7 +107,7 @@ pub struct LinkArgs {
 
 /// Option for existing output files.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct OverwriteArgs {
+pub(crate) struct OverwriteArgs {
     /// Overwrite existing output files
     #[arg(long, alias = "force")]
     pub overwrite: bool,
@@ -113,7 +115,7 @@ pub struct OverwriteArgs {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Run a complete example on the built-in simulator
     #[command(
         after_help = "The command sends the parameters, uploads and executes a trajectory, and writes a \
@@ -375,7 +377,7 @@ pub enum Command {
 }
 
 /// Words that people try, with the command to use.
-pub const MEANT: [(&str, &str); 15] = [
+pub(crate) const MEANT: [(&str, &str); 15] = [
     ("pause", "jtc traj pause"),
     ("hold", "jtc traj pause"),
     ("resume", "jtc traj resume"),
@@ -398,7 +400,7 @@ pub const MEANT: [(&str, &str); 15] = [
 
 impl Command {
     /// Returns `true` if the command moves the arm, or records a motion by hand: its result cannot be repeated.
-    pub fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         matches!(
             self,
             Command::Demo(_)

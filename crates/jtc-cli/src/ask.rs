@@ -5,7 +5,7 @@ use std::io::{BufRead, IsTerminal, Write};
 
 /// Asks `question` and continues only if the answer is `yes`. Without a terminal the command is refused. The hint then
 /// suggests `option`, which answers the question beforehand.
-pub fn confirm(question: &str, option: &str) -> Result<(), Failure> {
+pub(crate) fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {
         Failure::new(ErrorKind::Refused, "not-confirmed-by-person", message)
             .next(format!("nothing was sent; use {option} to confirm without a question"))

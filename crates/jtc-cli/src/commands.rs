@@ -42,7 +42,7 @@ use cli_kit::{Failure, Output, pages};
 use crate::args::Command;
 
 /// Runs the command.
-pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
+pub(crate) fn run(command: Command, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::demo(&args, out),
         Command::Sim(args) => sim::sim(&args, out),

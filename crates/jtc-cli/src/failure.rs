@@ -6,13 +6,13 @@ use cli_kit::{ErrorKind, Failure};
 const MAKE_ROOM: &str = "free disk space or choose another place, then run again";
 
 /// Returns the failure if measured data cannot be written: the result of the command is lost.
-pub fn output_lost(failure: impl Into<Failure>) -> Failure {
+pub(crate) fn output_lost(failure: impl Into<Failure>) -> Failure {
     let message = format!("{}; the recorded data are lost", failure.into().message);
     Failure::new(ErrorKind::Fault, "output-lost", message).next(MAKE_ROOM)
 }
 
 /// Returns the failure of an interrupted recording. The data that was written before is kept.
-pub fn recording_broken_off(failure: impl Into<Failure>) -> Failure {
+pub(crate) fn recording_broken_off(failure: impl Into<Failure>) -> Failure {
     let message = format!("{}; the recording ends at this point", failure.into().message);
     Failure::new(ErrorKind::Fault, "output-lost", message).next(MAKE_ROOM)
 }

@@ -4,7 +4,7 @@ use cli_kit::{Key, Keys};
 
 /// Request of the user for the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wish {
+pub(crate) enum Wish {
     /// `s`: stop on the path.
     Stop,
     /// Space: pause, or resume after a pause.
@@ -16,17 +16,17 @@ pub enum Wish {
 }
 
 /// Key help for the user at the terminal.
-pub const HELP: &str = "keys: space pauses, s stops, Ctrl-C ends";
+pub(crate) const HELP: &str = "keys: space pauses, s stops, Ctrl-C ends";
 
 /// Like [`HELP`], if the controller can change the speed of a motion.
-pub const HELP_WITH_SPEED: &str = "keys: space pauses, s stops, + - speed, Ctrl-C ends";
+pub(crate) const HELP_WITH_SPEED: &str = "keys: space pauses, s stops, + - speed, Ctrl-C ends";
 
 /// Message if the speed cannot be changed, with the next step.
-pub const NO_SPEED: &str = "this controller cannot change the speed of a motion: press s to stop it, then \
+pub(crate) const NO_SPEED: &str = "this controller cannot change the speed of a motion: press s to stop it, then \
     use `jtc traj run FILE --speed PCT`";
 
 /// Returns the strongest request of the keys pressed since the last call.
-pub fn wish(keys: &mut Keys) -> Option<Wish> {
+pub(crate) fn wish(keys: &mut Keys) -> Option<Wish> {
     strongest(&keys.pressed())
 }
 

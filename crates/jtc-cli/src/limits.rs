@@ -10,7 +10,12 @@ use serde_json::json;
 
 /// Returns the settings of `arm` that differ from the controller's, and prints each of them as a warning. Returns an
 /// error unless the user has accepted the differences.
-pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
+pub(crate) fn accept(
+    arm: &Arm,
+    device: &Config,
+    accepted: bool,
+    out: &Output,
+) -> Result<Vec<Difference>, Failure> {
     let differences = arm.device_differences(device);
     if !differences.is_empty() && !accepted {
         return Err(refused(&arm.name, &differences, out));
@@ -19,7 +24,7 @@ pub fn accept(arm: &Arm, device: &Config, accepted: bool, out: &Output) -> Resul
 }
 
 /// Prints the settings of an arm that differ from the controller's, and returns the failure.
-pub fn refused(arm: &str, differences: &[Difference], out: &Output) -> Failure {
+pub(crate) fn refused(arm: &str, differences: &[Difference], out: &Output) -> Failure {
     let error = CheckError::DeviceLimits { arm: arm.to_owned(), differences: differences.to_vec() };
     let message = format!(
         "{arm}: {} of this arm cannot be sent to the controller, which uses its own; nothing was sent",
@@ -29,7 +34,12 @@ pub fn refused(arm: &str, differences: &[Difference], out: &Output) -> Failure {
 }
 
 /// Like [`accept`], but compares all parameters of an arm with the arm that the controller `has` (J-55).
-pub fn same_arm(arm: &Arm, has: &Arm, accepted: bool, out: &Output) -> Result<Vec<Difference>, Failure> {
+pub(crate) fn same_arm(
+    arm: &Arm,
+    has: &Arm,
+    accepted: bool,
+    out: &Output,
+) -> Result<Vec<Difference>, Failure> {
     let differences = arm.differences(has);
     if differences.is_empty() || accepted {
         return Ok(warned(differences, out));
@@ -53,7 +63,7 @@ fn values(count: usize) -> String {
 }
 
 /// Returns a text with the number of values that differ.
-pub fn values_differ(count: usize) -> String {
+pub(crate) fn values_differ(count: usize) -> String {
     format!("{} {}", values(count), if count == 1 { "differs" } else { "differ" })
 }
 

@@ -10,11 +10,11 @@ use jtc_host::{Port, PortError, Session};
 use crate::args::LinkArgs;
 
 /// A serial port, or an agent's line.
-pub type LinkPort = Box<dyn Port>;
+pub(crate) type LinkPort = Box<dyn Port>;
 
 impl LinkArgs {
     /// The port's name.
-    pub fn name(&self) -> Result<String, Failure> {
+    pub(crate) fn name(&self) -> Result<String, Failure> {
         match &self.port {
             Some(port) => Ok(port.clone()),
             None => Ok(only_one()?),
@@ -22,18 +22,18 @@ impl LinkArgs {
     }
 
     /// Opens the port, or the line of the agent that owns it.
-    pub fn open(&self) -> Result<LinkPort, Failure> {
+    pub(crate) fn open(&self) -> Result<LinkPort, Failure> {
         self.open_with(None)
     }
 
     /// Like [`Self::open`]; `policy` tells the agent how to treat a motion when this program disconnects.
-    pub fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
+    pub(crate) fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
         Ok(self.open_as(policy, true)??)
     }
 
     /// Opens the link for a Stop or a Pause. An agent on this computer needs no token for these, and accepts them even
     /// with an unknown token. The inner error is the error of a serial port that no agent of this user owns.
-    pub fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
+    pub(crate) fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
             // The agent does not answer, so a second attempt would only take time.
             ErrorKind::NoLink => Err(error),
@@ -87,12 +87,12 @@ impl LinkArgs {
     }
 
     /// Opens a session over the link.
-    pub fn session(&self) -> Result<Session<LinkPort>, Failure> {
+    pub(crate) fn session(&self) -> Result<Session<LinkPort>, Failure> {
         Ok(Session::new(self.open()?))
     }
 
     /// Opens the serial port itself, for the program that will own it.
-    pub fn own(&self) -> Result<SerialPort, Failure> {
+    pub(crate) fn own(&self) -> Result<SerialPort, Failure> {
         let name = self.name()?;
         if is_agent(&name) {
             let what = format!("{name} is the address of an agent, but a serial port is needed");
@@ -108,7 +108,7 @@ impl LinkArgs {
 }
 
 /// Returns the name of this program for other clients: its command and its user.
-pub fn who() -> String {
+pub(crate) fn who() -> String {
     let command = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     match std::env::var("USER").or_else(|_| std::env::var("LOGNAME")) {
         Ok(user) if !user.is_empty() => format!("{user}: jtc {command}"),

@@ -17,7 +17,7 @@ use cli_kit::output_file;
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
 /// Handles the second signal: removes empty files, reports the reason of the end, and returns the exit code.
-pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> u8 {
+pub(crate) fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> u8 {
     output_file::abandon();
     let (done, written) = mpsc::channel();
     std::thread::spawn(move || {
@@ -33,7 +33,7 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
 const SPEEDS: [u8; 10] = [5, 10, 20, 30, 40, 50, 60, 70, 85, 100];
 
 /// Requests of the user, read at each status.
-pub struct Operator<'a> {
+pub(crate) struct Operator<'a> {
     /// Output of messages.
     pub out: &'a Output,
     /// Events for programs.
@@ -52,7 +52,7 @@ pub struct Operator<'a> {
 impl<'a> Operator<'a> {
     /// Starts to listen: the first SIGINT, SIGTERM or SIGHUP requests the end. The second one ends the process at once,
     /// with the terminal restored and a message about the arm.
-    pub fn listen(out: &'a Output, progress: &Progress) -> Result<Self, Failure> {
+    pub(crate) fn listen(out: &'a Output, progress: &Progress) -> Result<Self, Failure> {
         let moving = Arc::new(AtomicBool::new(false));
         let (its_moving, its_out) = (Arc::clone(&moving), *out);
         let stop = Stop::listen_with(move || {
@@ -80,12 +80,12 @@ impl<'a> Operator<'a> {
 
     /// Returns `true` if the command must end. A Stop of the user ends the command even if the motion had already
     /// ended, so that no other motion follows.
-    pub fn wants_the_end(&self) -> bool {
+    pub(crate) fn wants_the_end(&self) -> bool {
         self.stop.asked() || self.stopping
     }
 
     /// Starts to read keys.
-    pub fn motion_begins(&mut self) {
+    pub(crate) fn motion_begins(&mut self) {
         self.moving.store(true, Ordering::Relaxed);
         self.announced = None;
         self.keys = Keys::listen();
@@ -107,7 +107,7 @@ impl<'a> Operator<'a> {
     }
 
     /// Returns the key help that is shown below a bar. Empty if no keys are read.
-    pub fn keys(&self) -> &'static str {
+    pub(crate) fn keys(&self) -> &'static str {
         match (&self.keys, self.speed) {
             (None, _) => "",
             (_, None) => HELP,
@@ -116,13 +116,13 @@ impl<'a> Operator<'a> {
     }
 
     /// Stops reading keys.
-    pub fn motion_ended(&mut self) {
+    pub(crate) fn motion_ended(&mut self) {
         self.moving.store(false, Ordering::Relaxed);
         self.keys = None;
     }
 
     /// Returns the request of the user for the motion.
-    pub fn wish(&mut self, status: &Status) -> Flow {
+    pub(crate) fn wish(&mut self, status: &Status) -> Flow {
         if status.trajectory.is_in(&[TrajectoryState::Pause, TrajectoryState::Execute])
             && self.announced != Some(status.trajectory)
             // A held stop ends the run and has its own message.

@@ -12,7 +12,7 @@ use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 use serde_json::{Value, json};
 
 /// Page of `jtc help events`.
-pub const EVENTS_HELP: &str = include_str!("progress.md");
+pub(crate) const EVENTS_HELP: &str = include_str!("progress.md");
 
 /// Shortest interval between two samples, or two upload events.
 const MODEST: Duration = Duration::from_millis(200);
@@ -22,7 +22,7 @@ type Reported = (Code<ControllerState>, Code<TrajectoryState>, u16);
 
 /// The events of a command.
 #[derive(Clone)]
-pub struct Progress(Rc<Inner>);
+pub(crate) struct Progress(Rc<Inner>);
 
 struct Inner {
     out: Output,
@@ -35,7 +35,7 @@ struct Inner {
 
 impl Progress {
     /// Starts to print events, if JSON was requested.
-    pub fn begin(out: &Output) -> Result<Self, Failure> {
+    pub(crate) fn begin(out: &Output) -> Result<Self, Failure> {
         out.stream()?;
         Ok(Self(Rc::new(Inner {
             out: *out,
@@ -47,13 +47,13 @@ impl Progress {
     }
 
     /// Prints an event.
-    pub fn event(&self, name: &str, value: Value) {
+    pub(crate) fn event(&self, name: &str, value: Value) {
         self.0.out.event(name, value);
     }
 
     /// Turns all further statuses of this session into events. Callers with their own observer pass the statuses to
     /// [`Progress::see`] instead.
-    pub fn watch<P: Port>(&self, session: &mut Session<P>) {
+    pub(crate) fn watch<P: Port>(&self, session: &mut Session<P>) {
         *self.0.link.borrow_mut() = json!({ "port": session.port().name(), "baud": session.port().baud() });
         let own = self.clone();
         session.observe(move |_, status| own.see(status));
@@ -61,7 +61,7 @@ impl Progress {
 
     /// Takes a status. The first status is reported as `connected`. Changes of the state are reported at once. While
     /// the arm moves or may be moved, measured values are reported at a limited rate.
-    pub fn see(&self, s: &Status) {
+    pub(crate) fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);
         let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": labels::causes(s) });
         match self.0.reported.replace(Some(now)) {
@@ -81,7 +81,7 @@ impl Progress {
     }
 
     /// Reports the progress of an upload. `phase` is the motion that is uploaded.
-    pub fn uploading(&self, phase: &str, p: &session::Progress) {
+    pub(crate) fn uploading(&self, phase: &str, p: &session::Progress) {
         if due(&self.0.uploaded) || p.segments_done == p.segments {
             let fraction = if p.segments == 0 { 0.0 } else { p.segments_done as f64 / p.segments as f64 };
             let value = json!({

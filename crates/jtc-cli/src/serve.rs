@@ -15,8 +15,8 @@ use jtc_sim::{BusTap, World};
 
 use crate::args::SimSpeed;
 use frames::{Frames, Incoming};
-pub use pty::{Pty, PtyError};
-pub use typed::{Typed, hand};
+pub(crate) use pty::{Pty, PtyError};
+pub(crate) use typed::{Typed, hand};
 
 /// Largest number of host bytes that wait for the line, like the buffer of an adapter. When it is full, the host's
 /// writes block.
@@ -30,10 +30,10 @@ const CATCH_UP_US: u64 = 2_000_000;
 const TICK_US: u64 = 1000;
 
 /// Joint bus that is connected to a CAN bus, so that other programs can join it.
-pub type Tap = BusTap<Box<dyn CanBus + Send>>;
+pub(crate) type Tap = BusTap<Box<dyn CanBus + Send>>;
 
 /// The loop's state.
-pub struct Server {
+pub(crate) struct Server {
     world: World,
     pty: Pty,
     tap: Option<Tap>,
@@ -56,7 +56,7 @@ pub struct Server {
 impl Server {
     /// Creates a server for a world on a terminal. `tap` is its joint bus, and `typed` are the events that the user
     /// types.
-    pub fn new(world: World, pty: Pty, tap: Option<Tap>, typed: Typed) -> Self {
+    pub(crate) fn new(world: World, pty: Pty, tap: Option<Tap>, typed: Typed) -> Self {
         Self {
             world,
             pty,
@@ -74,12 +74,12 @@ impl Server {
     }
 
     /// Passes the results of each tick of the controller to `sink`.
-    pub fn recorded(self, sink: Option<SampleSink>) -> Self {
+    pub(crate) fn recorded(self, sink: Option<SampleSink>) -> Self {
         Self { sink, ..self }
     }
 
     /// Stores the controller's data in this file.
-    pub fn keeping(self, file: Option<PathBuf>) -> Self {
+    pub(crate) fn keeping(self, file: Option<PathBuf>) -> Self {
         let number = self.world.stored_arm().map_or(0, |(_, number)| number);
         Self { keeps: file.map(|file| (file, number)), ..self }
     }
@@ -100,7 +100,12 @@ impl Server {
     }
 
     /// Runs until `stop`. Calls `ready` when the controller has sent its first status. Returns the virtual time, s.
-    pub fn run(&mut self, speed: SimSpeed, stop: &Stop, ready: impl FnOnce()) -> Result<f64, PtyError> {
+    pub(crate) fn run(
+        &mut self,
+        speed: SimSpeed,
+        stop: &Stop,
+        ready: impl FnOnce(),
+    ) -> Result<f64, PtyError> {
         let mut ready = Some(ready);
         let mut start = Instant::now();
         let mut start_us = self.world.now_us();

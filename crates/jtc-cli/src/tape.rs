@@ -8,7 +8,7 @@ use cli_kit::{Failure, Output};
 use jtc_host::recording::{Ending, LiveRecorder, RecordingInfo, SampleSink};
 
 /// Recording in progress.
-pub struct Tape {
+pub(crate) struct Tape {
     name: String,
     live: LiveRecorder,
     on_disk: File,
@@ -17,7 +17,7 @@ pub struct Tape {
 impl Tape {
     /// Begins a recording in `output`, in the format of its file ending. An earlier recording in the file is discarded.
     /// A later write error is reported at once. `goes_on` is the part of the message about the consequence.
-    pub fn begin(
+    pub(crate) fn begin(
         output: &mut OutputFile,
         info: &RecordingInfo,
         goes_on: &'static str,
@@ -40,24 +40,24 @@ impl Tape {
     }
 
     /// Returns the name for users.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
     /// Returns the sink of samples.
-    pub fn sink(&self) -> SampleSink {
+    pub(crate) fn sink(&self) -> SampleSink {
         self.live.sink()
     }
 
     /// Completes the recording with the end of the run.
-    pub fn finish(self, ending: &Ending) -> Result<(), Failure> {
+    pub(crate) fn finish(self, ending: &Ending) -> Result<(), Failure> {
         let Self { name, live, on_disk } = self;
         live.finish(ending).map_err(recording_broken_off)?;
         settle(&on_disk).map_err(|e| recording_broken_off(Failure::usage(format!("{name}: {e}"))))
     }
 
     /// Ends the recording without completing the file. The file will be started again.
-    pub fn abandon(self) {
+    pub(crate) fn abandon(self) {
         self.live.abandon();
     }
 }

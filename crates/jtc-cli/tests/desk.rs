@@ -20,7 +20,7 @@ use crate::common::{Sim, command};
 const PORT: &str = "/tmp/jtc";
 
 /// Output of a command.
-pub struct Seen(pub Printed);
+pub(crate) struct Seen(pub Printed);
 
 impl std::ops::Deref for Seen {
     type Target = Printed;
@@ -31,7 +31,7 @@ impl std::ops::Deref for Seen {
 
 impl Seen {
     /// Replaces values that differ from run to run by placeholders.
-    pub fn blurred(self) -> Printed {
+    pub(crate) fn blurred(self) -> Printed {
         Printed { code: self.code, text: blurred(&self.text) }
     }
 }
@@ -47,7 +47,7 @@ fn terminal() -> (File, String, OwnedFd) {
 }
 
 /// A serial line with another device at its end.
-pub struct Line {
+pub(crate) struct Line {
     port: String,
     ended: Arc<AtomicBool>,
     _slave: OwnedFd,
@@ -55,7 +55,7 @@ pub struct Line {
 
 impl Line {
     /// Creates a device that sends this text again and again, and ignores its input.
-    pub fn new(text: &'static str) -> Self {
+    pub(crate) fn new(text: &'static str) -> Self {
         let (mut end, port, slave) = terminal();
         let mut raw = rustix::termios::tcgetattr(&slave).unwrap();
         raw.make_raw();
@@ -79,7 +79,7 @@ impl Drop for Line {
 }
 
 /// Directory and port.
-pub struct Desk {
+pub(crate) struct Desk {
     dir: tempfile::TempDir,
     sim: Option<Sim>,
     line: Option<Line>,
@@ -87,22 +87,22 @@ pub struct Desk {
 
 impl Desk {
     /// Creates a desk without a device at the port.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { dir: tempfile::tempdir().unwrap(), sim: None, line: None }
     }
 
     /// Creates a desk with this line at the port.
-    pub fn at(line: Line) -> Self {
+    pub(crate) fn at(line: Line) -> Self {
         Self { line: Some(line), ..Self::new() }
     }
 
     /// Creates a desk with a simulated controller at the port.
-    pub fn simulated(options: &[&str]) -> Self {
+    pub(crate) fn simulated(options: &[&str]) -> Self {
         Self { sim: Some(Sim::start(options)), ..Self::new() }
     }
 
     /// Returns the directory of its files.
-    pub fn dir(&self) -> &Path {
+    pub(crate) fn dir(&self) -> &Path {
         self.dir.path()
     }
 
@@ -144,13 +144,13 @@ impl Desk {
     }
 
     /// Runs a command and returns its output.
-    pub fn run(&self, shown: &str) -> Seen {
+    pub(crate) fn run(&self, shown: &str) -> Seen {
         let output = self.shell(shown).stdin(Stdio::null()).output().unwrap();
         self.seen(output.status.code(), &String::from_utf8_lossy(&output.stdout))
     }
 
     /// Like [`Self::run`], for a command that moves the arm. Calls `happens` when the arm moves.
-    pub fn moving(&self, shown: &str, happens: impl FnOnce(&Child, &Sim)) -> Seen {
+    pub(crate) fn moving(&self, shown: &str, happens: impl FnOnce(&Child, &Sim)) -> Seen {
         let (_person, _, slave) = terminal();
         let mut child = self.shell(shown).stdin(Stdio::from(slave)).spawn().unwrap();
         let mut out = BufReader::new(child.stdout.take().unwrap());
@@ -162,14 +162,14 @@ impl Desk {
     }
 
     /// Types a line into the simulator.
-    pub fn write_line(&mut self, line: &str) {
+    pub(crate) fn write_line(&mut self, line: &str) {
         if let Some(sim) = &mut self.sim {
             sim.write_line(line);
         }
     }
 
     /// Opens the port like another program.
-    pub fn hold_port(&self) -> jtc_host::port::SerialPort {
+    pub(crate) fn hold_port(&self) -> jtc_host::port::SerialPort {
         jtc_host::port::SerialPort::open(&self.port(), 115_200).unwrap()
     }
 }

@@ -15,7 +15,7 @@ use tungstenite::stream::MaybeTlsStream;
 /// # Errors
 ///
 /// Returns an error if the file contains no certificate, or the system has none.
-pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
+pub(crate) fn connector(file: Option<&Path>) -> io::Result<Connector> {
     let mut roots = RootCertStore::empty();
     let certificates: Vec<CertificateDer<'static>> = match file {
         Some(path) => {
@@ -40,7 +40,7 @@ pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
 }
 
 /// Returns the underlying socket.
-pub fn socket(stream: &mut MaybeTlsStream<TcpStream>) -> io::Result<&mut TcpStream> {
+pub(crate) fn socket(stream: &mut MaybeTlsStream<TcpStream>) -> io::Result<&mut TcpStream> {
     match stream {
         MaybeTlsStream::Rustls(stream) => Ok(&mut stream.sock),
         MaybeTlsStream::Plain(stream) => Ok(stream),

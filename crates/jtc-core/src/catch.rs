@@ -39,23 +39,23 @@ bit_codec!(Catch { left_ms, busy_ms, settled, sag, peak, peak_before, grew });
 
 impl Catch {
     /// Begins the catch of a joint that was just enabled.
-    pub fn begin(config: &Config) -> Self {
+    pub(crate) fn begin(config: &Config) -> Self {
         Self { left_ms: config.catch_ms_max, busy_ms: CALM_MS, ..Self::default() }
     }
 
     /// Returns `true` if the joint is not at rest yet.
-    pub fn busy(&self) -> bool {
+    pub(crate) fn busy(&self) -> bool {
         self.left_ms > 0 && self.busy_ms > 0
     }
 
     /// Returns `true` if the joint has come to rest, within its torque limit, at any time since it was enabled.
-    pub fn settled(&self) -> bool {
+    pub(crate) fn settled(&self) -> bool {
         self.settled
     }
 
     /// Runs one tick, with the measured velocity (rad/s). Returns `true` if a load may still be caught. A growing swing is not a load that
     /// comes to rest but an unstable loop; it ends the catch.
-    pub fn step(&mut self, velocity: f64) -> bool {
+    pub(crate) fn step(&mut self, velocity: f64) -> bool {
         if self.settled && self.left_ms == 0 {
             return false;
         }
@@ -86,13 +86,13 @@ impl Catch {
     }
 
     /// Clears the record of earlier swings.
-    pub fn watch_anew(&mut self) {
+    pub(crate) fn watch_anew(&mut self) {
         (self.peak, self.peak_before, self.grew) = (0.0, 0.0, false);
     }
 
     /// Runs one tick of a joint that has settled. Returns `true` if the joint has made three half swings, each faster than the one before
     /// it.
-    pub fn watch(&mut self, velocity: f64) -> bool {
+    pub(crate) fn watch(&mut self, velocity: f64) -> bool {
         if !self.settled || self.left_ms > 0 {
             return false;
         }
@@ -103,19 +103,19 @@ impl Catch {
     }
 
     /// Ends the catch, because the joint has been brought to rest in another way.
-    pub fn calm_down(&mut self) {
+    pub(crate) fn calm_down(&mut self) {
         *self = Self { settled: true, ..Self::default() };
     }
 
     /// Returns `true` if a joint that has not settled yet swings with a growing amplitude, because its loop is unstable.
-    pub fn swing_grows(&self) -> bool {
+    pub(crate) fn swing_grows(&self) -> bool {
         !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
     /// Returns the step of the set position, rad, if the computed torque exceeds the limit by `excess` (N·m) at a position error of `error`
     /// (rad). Ends the catch if the sag would exceed the highest position error, or if the load pulls in the other direction, as in a swing
     /// between both limits.
-    pub fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
+    pub(crate) fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         // The set position moves at most to the measured position of the joint.
         let wanted = excess / kp;
         let step = if error > 0.0 { -wanted.max(0.0).min(error) } else { -wanted.min(0.0).max(error) };

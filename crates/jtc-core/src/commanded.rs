@@ -27,38 +27,38 @@ bit_codec!(Commanded { position, velocity, now });
 
 impl Commanded {
     /// Age of the oldest stored set values, ticks.
-    pub const OLDEST: u8 = SLOTS as u8 - 1;
+    pub(crate) const OLDEST: u8 = SLOTS as u8 - 1;
 
     /// Begins the next tick.
-    pub fn next_tick(&mut self) {
+    pub(crate) fn next_tick(&mut self) {
         self.now = self.now.wrapping_add(1);
     }
 
     /// Stores the set values of the present tick. Call this each time that the tick changes them.
-    pub fn put(&mut self, point: &SetPoint) {
+    pub(crate) fn put(&mut self, point: &SetPoint) {
         let now = self.slot(0);
         (self.position[now], self.velocity[now]) = (point.position, point.velocity);
     }
 
     /// Returns the positions (rad) that were commanded `ticks` ago, at most [`Self::OLDEST`].
-    pub fn position(&self, ticks: u8) -> &[f64; JOINTS] {
+    pub(crate) fn position(&self, ticks: u8) -> &[f64; JOINTS] {
         &self.position[self.slot(ticks)]
     }
 
     /// Returns the velocities (rad/s) that were commanded `ticks` ago.
-    pub fn velocity(&self, ticks: u8) -> &[f64; JOINTS] {
+    pub(crate) fn velocity(&self, ticks: u8) -> &[f64; JOINTS] {
         &self.velocity[self.slot(ticks)]
     }
 
     /// Returns the velocities (rad/s) that are due in the measurement of this tick. The set values of this tick are not known yet, so the
     /// newest ones are those of the last tick.
-    pub fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
+    pub(crate) fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
         self.velocity(config.delay_ticks.max(1))
     }
 
     /// Restarts a joint as if it had always been commanded to move at `velocity` (rad/s), and to be at `position` (rad) `ticks` ago. For a
     /// delay of `ticks`, a measurement of that position is then due, and so are the measurements of the ticks that follow.
-    pub fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
+    pub(crate) fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
         for ago in 0..SLOTS as u8 {
             let slot = self.slot(ago);
             let (positions, velocities) = (&mut self.position[slot], &mut self.velocity[slot]);
@@ -69,13 +69,13 @@ impl Commanded {
     }
 
     /// Restarts all joints at rest.
-    pub fn rest(&mut self, position: &[f64; JOINTS]) {
+    pub(crate) fn rest(&mut self, position: &[f64; JOINTS]) {
         (self.position, self.velocity) = ([*position; SLOTS], [[0.0; JOINTS]; SLOTS]);
     }
 
     /// Shifts all stored set positions of a joint that has sagged by `way` (rad). A sag is not a motion, so the older positions change as
     /// well.
-    pub fn shift(&mut self, joint: usize, way: f64) {
+    pub(crate) fn shift(&mut self, joint: usize, way: f64) {
         for positions in &mut self.position {
             if let Some(position) = positions.get_mut(joint) {
                 *position += way;

@@ -38,30 +38,30 @@ bit_codec!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 impl Deceleration {
     /// Creates the deceleration of a joint that a hand leads, from a measured position (rad) and velocity (rad/s), within `length_ms`. The
     /// velocity is clipped to the velocity limit.
-    pub fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
+    pub(crate) fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }
     }
 
     /// Creates the deceleration of a joint that falls. A faster joint takes longer.
-    pub fn falling(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
+    pub(crate) fn falling(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
         let led = Self::led(from, velocity, f64::from(config.ramp_ms), limits);
         let length_ms = led.length_ms.max(STEEPEST * led.velocity.abs() / (CATCH_DECELERATION * DT));
         Self { length_ms, falls: true, ..led }
     }
 
     /// Returns the start position, rad, and the start velocity, rad/s.
-    pub fn start(&self) -> (f64, f64) {
+    pub(crate) fn start(&self) -> (f64, f64) {
         (self.from, self.velocity)
     }
 
     /// Shifts all positions by `way` (rad).
-    pub fn shift(&mut self, way: f64) {
+    pub(crate) fn shift(&mut self, way: f64) {
         self.from += way;
     }
 
     /// Returns position, velocity and acceleration of the next tick, and `true` if the joint is at rest after it.
-    pub fn step(&mut self, limits: &JointConfig) -> ([f64; 3], bool) {
+    pub(crate) fn step(&mut self, limits: &JointConfig) -> ([f64; 3], bool) {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
         let (seconds, left) = (self.length_ms * DT, 1.0 - u);

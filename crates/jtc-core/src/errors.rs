@@ -38,23 +38,23 @@ bit_codec!(Errors {
 });
 
 impl Errors {
-    pub fn raise_emergency_input(&mut self) {
+    pub(crate) fn raise_emergency_input(&mut self) {
         self.emergency_input = true;
         self.occurred |= self.word();
     }
 
-    pub fn raise_device(&mut self) {
+    pub(crate) fn raise_device(&mut self) {
         self.device = true;
         self.occurred |= self.word();
     }
 
-    pub fn raise_external_joints(&mut self) {
+    pub(crate) fn raise_external_joints(&mut self) {
         self.external_joints = true;
         self.occurred |= self.word();
     }
 
     /// Raises internal errors per joint; 0 for a joint without an error.
-    pub fn raise_joints(&mut self, bits: &[u16; JOINTS]) {
+    pub(crate) fn raise_joints(&mut self, bits: &[u16; JOINTS]) {
         if !any(bits) {
             return;
         }
@@ -67,7 +67,7 @@ impl Errors {
 
     /// Adds the causes of a held stop to the occurred errors (J-69). If the stop `latches`, they are also shown as current until the host
     /// clears them. The safety output stays 1.
-    pub fn hold_joints(&mut self, causes: &[u16; JOINTS], latches: bool) {
+    pub(crate) fn hold_joints(&mut self, causes: &[u16; JOINTS], latches: bool) {
         for j in 0..JOINTS {
             self.joints_occurred[j] |= causes[j];
             self.held[j] |= if latches { causes[j] } else { 0 };
@@ -76,21 +76,21 @@ impl Errors {
     }
 
     /// Adds the errors that a refused trajectory would have caused in motion (J-36) to the occurred errors. These errors are not latched.
-    pub fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
+    pub(crate) fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
         self.hold_joints(bits, false);
     }
 
     /// Returns `true` if a held stop is latched, so that nothing moves until the host clears it.
-    pub fn held_stop(&self) -> bool {
+    pub(crate) fn held_stop(&self) -> bool {
         any(&self.held)
     }
 
     /// Ends a held stop, because an arm without torque is not held.
-    pub fn end_held_stop(&mut self) {
+    pub(crate) fn end_held_stop(&mut self) {
         self.held = [0; JOINTS];
     }
 
-    pub fn raise_can(&mut self, flags: u32) {
+    pub(crate) fn raise_can(&mut self, flags: u32) {
         if flags == 0 {
             return;
         }
@@ -100,13 +100,13 @@ impl Errors {
     }
 
     /// Shows the CAN flags of this tick that are not errors: the flags of the gripper (J-14). A flag disappears with its cause.
-    pub fn show_can(&mut self, flags: u32) {
+    pub(crate) fn show_can(&mut self, flags: u32) {
         self.can_shown = flags;
         self.can_occurred |= flags;
     }
 
     /// Clears the current errors (ClearCurrentErrors): errors that still persist are raised again in the same tick.
-    pub fn clear_current(&mut self) {
+    pub(crate) fn clear_current(&mut self) {
         self.emergency_input = false;
         self.device = false;
         self.external_joints = false;
@@ -116,21 +116,21 @@ impl Errors {
     }
 
     /// Clears current and occurred errors (ClearOccurredErrors).
-    pub fn clear_occurred(&mut self) {
+    pub(crate) fn clear_occurred(&mut self) {
         *self = Self::default();
     }
 
     /// Returns `true` if an internal error is latched, which holds the safety output at 0 (J-22).
-    pub fn internal(&self) -> bool {
+    pub(crate) fn internal(&self) -> bool {
         self.device || self.can != 0 || any(&self.joints)
     }
 
-    pub fn any(&self) -> bool {
+    pub(crate) fn any(&self) -> bool {
         self.internal() || self.emergency_input || self.external_joints
     }
 
     /// Returns the current error word.
-    pub fn word(&self) -> u16 {
+    pub(crate) fn word(&self) -> u16 {
         let bit = |on: bool, bit: u16| if on { bit } else { 0 };
         bit(self.emergency_input, error::EMERGENCY_INPUT)
             | bit(self.internal(), error::EMERGENCY_OUTPUT | error::INTERNAL)
@@ -140,23 +140,23 @@ impl Errors {
             | bit(self.external_joints, error::EXTERNAL_JOINTS)
     }
 
-    pub fn occurred(&self) -> u16 {
+    pub(crate) fn occurred(&self) -> u16 {
         self.occurred
     }
 
     /// Returns the current and the occurred word of a joint.
-    pub fn joint(&self, joint: usize) -> (u16, u16) {
+    pub(crate) fn joint(&self, joint: usize) -> (u16, u16) {
         let of = |words: &[u16; JOINTS]| words.get(joint).copied().unwrap_or(0);
         (of(&self.joints) | of(&self.held), of(&self.joints_occurred))
     }
 
     /// Returns the current and the occurred CAN flags.
-    pub fn can(&self) -> (u32, u32) {
+    pub(crate) fn can(&self) -> (u32, u32) {
         (self.can | self.can_shown, self.can_occurred)
     }
 
     /// Returns `true` if a CAN flag is an error.
-    pub fn can_error(&self) -> bool {
+    pub(crate) fn can_error(&self) -> bool {
         self.can != 0
     }
 }

@@ -76,11 +76,11 @@ pub(crate) struct Extensions {
 
 impl Extensions {
     /// Refuses jogs after a jog was stopped, so that a key that is still held down causes no motion (J-58).
-    pub fn refuse_jogs(&mut self) {
+    pub(crate) fn refuse_jogs(&mut self) {
         self.jogs_refused_ms = crate::jog::LASTS_MS;
     }
 
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             answers: Answers::new(),
             stored: StoredArm::new(),

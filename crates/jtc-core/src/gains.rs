@@ -84,11 +84,11 @@ bit_codec!(FeltInertia { joints });
 
 impl FeltInertia {
     /// Start value before the first pose.
-    pub const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
+    pub(crate) const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
 
     /// Computes the inertia in the pose with this number, for an arm without a payload.
     #[inline(never)]
-    pub fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
+    pub(crate) fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
         let rotor = config.joints.each_ref().map(JointConfig::counted_rotor);
         let felt = Dynamics::new(model, [0.0; 3]).felt_inertia(&pose(number, config), &rotor);
         for (least, felt) in self.joints.iter_mut().zip(felt) {
@@ -97,12 +97,12 @@ impl FeltInertia {
     }
 
     /// Returns `true` if all poses of an arm have been computed.
-    pub fn is_known(&self) -> bool {
+    pub(crate) fn is_known(&self) -> bool {
         self.joints.iter().all(|felt| felt.is_finite())
     }
 
     /// Returns `true` if every joint is heavy enough for its gains.
-    pub fn bears(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
+    pub(crate) fn bears(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
         // The comparison also refuses NaN.
         gains.iter().zip(&self.joints).all(|(gains, felt)| *felt >= inertia_needed(gains, config.delay_ticks))
     }
@@ -160,7 +160,7 @@ bit_codec!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
     /// Begins a trial: a host sent the gains `given` under torque, in place of `before`.
-    pub fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
+    pub(crate) fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
         // If the gains in `before` are themselves still on trial, they have not held the arm yet.
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
@@ -173,25 +173,25 @@ impl Trial {
 
     /// Ends the trial, because the arm is not held any more. If gains are on trial, returns the gains before them, because the new ones
     /// have not held the arm.
-    pub fn end(&mut self) -> Option<[PidGains; JOINTS]> {
+    pub(crate) fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
         before
     }
 
     /// Discards the gains before the trial unless `may` allows them to be restored.
-    pub fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
+    pub(crate) fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
         self.before = self.before.filter(may);
     }
 
     /// Returns `true` if any of the times is running.
     #[inline(always)]
-    pub fn runs(&self) -> bool {
+    pub(crate) fn runs(&self) -> bool {
         self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
     }
 
     /// Runs one tick under torque. `held`: all joints have settled, and none yields.
-    pub fn step(&mut self, held: bool) {
+    pub(crate) fn step(&mut self, held: bool) {
         self.again_ms = self.again_ms.saturating_sub(1);
         self.blend_ms = self.blend_ms.saturating_sub(1);
         self.held_ms = self.held_ms.saturating_add(u16::from(held));
@@ -201,13 +201,13 @@ impl Trial {
     }
 
     /// Returns `true` if gains are on trial.
-    pub fn is_on(&self) -> bool {
+    pub(crate) fn is_on(&self) -> bool {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
     /// Returns the gains of this tick while the gains `given` are blended in: Kp and Kd change gradually, the integral has changed at once.
     /// Returns `None` if the blend is over.
-    pub fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
+    pub(crate) fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
             return None;
         }
@@ -228,13 +228,13 @@ impl Trial {
     }
 
     /// Returns `true` if the joint was unstable less than [`AGAIN_MS`] ago.
-    pub fn again(&self, joint: usize) -> bool {
+    pub(crate) fn again(&self, joint: usize) -> bool {
         self.again_ms > 0 && self.unstable >> joint & 1 != 0
     }
 
     /// Handles joints (a bit each) that fail with their `gains`; the loops of the `unstable` joints are unstable. If the gains must change,
     /// returns the cause and the new gains: those before the trial or, if none are stored, softer gains for the unstable joints.
-    pub fn fails(
+    pub(crate) fn fails(
         &mut self,
         failed: u8,
         unstable: u8,

@@ -55,17 +55,17 @@ pub(crate) enum Next {
 
 impl HoldBack {
     /// Returns `true` if the path is held back.
-    pub fn is_active(&self) -> bool {
+    pub(crate) fn is_active(&self) -> bool {
         self.active
     }
 
     /// Returns `true` if `step` must be called in each tick.
-    pub fn is_watched(&self) -> bool {
+    pub(crate) fn is_watched(&self) -> bool {
         self.active | self.restores
     }
 
     /// Begins to hold back because a joint is overloaded. Returns `true` if the inertia of the arm must be computed.
-    pub fn begin(&mut self) -> bool {
+    pub(crate) fn begin(&mut self) -> bool {
         if self.active && self.since_ms < INERTIA_MS {
             return false;
         }
@@ -77,22 +77,22 @@ impl HoldBack {
     }
 
     /// Ends holding back because the path stops. The time so far remains part of the run.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
 
     /// Returns the time for which the path was held back in this run, ms.
-    pub fn run_ms(&self) -> u16 {
+    pub(crate) fn run_ms(&self) -> u16 {
         self.run_ms
     }
 
     /// Returns `true` if the joint has been at its limit since holding back began.
-    pub fn has_pressed(&self, joint: usize) -> bool {
+    pub(crate) fn has_pressed(&self, joint: usize) -> bool {
         self.pressed & (1 << joint) != 0
     }
 
     /// Runs one tick on the path. `joints`: `true` for those at their torque limits; `clock`: the clock of the motion.
-    pub fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
+    pub(crate) fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
         for (j, at_limit) in joints.iter().enumerate() {
             self.pressed |= u8::from(*at_limit) << j;
         }

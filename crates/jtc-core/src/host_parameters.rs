@@ -64,14 +64,14 @@ bit_codec!(HostParametersState { received, given, friction_is_table, friction_is
 
 impl HostParameters {
     /// Returns the state of the parameters, without their values.
-    pub fn state(&self) -> HostParametersState {
+    pub(crate) fn state(&self) -> HostParametersState {
         let Self { received, given, friction_is_table, friction_is_new, felt, trial, .. } = *self;
         let payload = self.payload.state();
         HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial }
     }
 
     /// Restores the state, with the payload in these settings.
-    pub fn restore(&mut self, state: &HostParametersState, config: &Config) {
+    pub(crate) fn restore(&mut self, state: &HostParametersState, config: &Config) {
         let HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial } =
             *state;
         (self.felt, self.trial) = (felt, trial);
@@ -82,12 +82,12 @@ impl HostParameters {
     }
 
     /// Returns for gains, model and polynomial whether each is the built-in one.
-    pub fn built_in(&self) -> [bool; 3] {
+    pub(crate) fn built_in(&self) -> [bool; 3] {
         [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
     }
 
     /// Uses the built-in gains, model or polynomial if the value is `true`.
-    pub fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
+    pub(crate) fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
         if pid {
             self.pid = defaults::PID;
         }
@@ -100,7 +100,7 @@ impl HostParameters {
     }
 
     /// Creates the parameters in the state before any was received.
-    pub fn new(config: &Config) -> Self {
+    pub(crate) fn new(config: &Config) -> Self {
         let dynamics = dynamics(&defaults::MODEL, config);
         Self {
             received: 0,
@@ -120,7 +120,7 @@ impl HostParameters {
     }
 
     /// Resets the parameters in place, as if none had been received.
-    pub fn begin(&mut self, config: &Config) {
+    pub(crate) fn begin(&mut self, config: &Config) {
         self.model = defaults::MODEL;
         self.set_gravity(config);
         self.pid = defaults::PID;
@@ -130,18 +130,18 @@ impl HostParameters {
     }
 
     /// Marks the parameters as not sent by a host, because they were loaded.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         (self.received, self.given) = (0, 0);
         (self.friction_is_table, self.friction_is_new) = (false, false);
     }
 
     /// Returns the byte of the status: a bit is 1 if the parameter is missing.
-    pub fn missing(&self) -> u8 {
+    pub(crate) fn missing(&self) -> u8 {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
     }
 
     /// Returns `true` if each parameter was received since the start. Then no built-in value is in use that a host has not requested.
-    pub fn all_given(&self) -> bool {
+    pub(crate) fn all_given(&self) -> bool {
         self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
     }
 
@@ -151,34 +151,34 @@ impl HostParameters {
     }
 
     /// Returns the friction tables, unless polynomials are in use.
-    pub fn tables_in_use(&self) -> Option<&[TableOf<f32>; JOINTS]> {
+    pub(crate) fn tables_in_use(&self) -> Option<&[TableOf<f32>; JOINTS]> {
         self.friction_is_table.then_some(&self.tables)
     }
 
     /// Returns the parameters that the control law needs.
-    pub fn control(&self) -> ControlParameters<'_> {
+    pub(crate) fn control(&self) -> ControlParameters<'_> {
         let (dynamics, pid, polynomial) = (&self.dynamics, &self.pid, &self.polynomial);
         let on_trial = self.trial.is_on();
         ControlParameters { dynamics, pid, polynomial, table: self.tables_in_use(), on_trial }
     }
 
     /// Returns `true` if the torque limits suffice to hold the arm at `position` (rad) (J-06).
-    pub fn holdable(&self, position: &[f64; JOINTS], config: &Config) -> bool {
+    pub(crate) fn holdable(&self, position: &[f64; JOINTS], config: &Config) -> bool {
         holdable(&self.dynamics, position, config)
     }
 
     /// Withdraws the model, so that the host must send it again.
-    pub fn withdraw_model(&mut self) {
+    pub(crate) fn withdraw_model(&mut self) {
         self.received &= !missing_parameter::MODEL;
     }
 
     /// Withdraws all parameters, so that the host must send them again.
-    pub fn withdraw_all(&mut self) {
+    pub(crate) fn withdraw_all(&mut self) {
         self.received = 0;
     }
 
     /// Uses the gravity and the payload in these settings from now on.
-    pub fn set_gravity(&mut self, config: &Config) {
+    pub(crate) fn set_gravity(&mut self, config: &Config) {
         self.dynamics = dynamics(&self.model, config);
         self.payload.forget();
     }
@@ -186,7 +186,7 @@ impl HostParameters {
     /// Returns `true` if every joint can hold the payload in these settings at `at` (rad), or needs less torque than now (J-60). Also
     /// returns `true` while it cannot be decided: before all positions are known and the model is received. The payload is checked again
     /// when Init ends.
-    pub fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
+    pub(crate) fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
         let now = self.dynamics.gravity_torque(at);
@@ -198,33 +198,33 @@ impl HostParameters {
 
     /// Begins to blend the payload in these settings into the model, over half a second (J-60). `heavier`: its mass minus the mass of the
     /// last one, kg.
-    pub fn change_payload(&mut self, config: &Config, heavier: f64) {
+    pub(crate) fn change_payload(&mut self, config: &Config, heavier: f64) {
         self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
     }
 
     /// Runs one tick of the payload blend. The arm is held or taught.
-    pub fn blend_payload(&mut self) {
+    pub(crate) fn blend_payload(&mut self) {
         self.payload.step(&mut self.dynamics);
     }
 
     /// Ends the blend in a tick without torque: the payload is added completely.
-    pub fn end_blend(&mut self) {
+    pub(crate) fn end_blend(&mut self) {
         self.payload.end(&mut self.dynamics);
     }
 
     /// Returns the mass that the next [`blend_payload`](Self::blend_payload) adds, kg.
-    pub fn next_mass(&self) -> f64 {
+    pub(crate) fn next_mass(&self) -> f64 {
         self.payload.next_mass()
     }
 
     /// Returns the time until the payload is completely in the model, ms; 0 if it is.
-    pub fn blend_left_ms(&self) -> u16 {
+    pub(crate) fn blend_left_ms(&self) -> u16 {
         self.payload.left_ms()
     }
 
     /// Returns `true` if the parameters received since the start are also within the bounds in these settings (J-06). For friction tables
     /// see [`table_fits`](Self::table_fits).
-    pub fn fits(&self, config: &Config) -> bool {
+    pub(crate) fn fits(&self, config: &Config) -> bool {
         let bounds = &config.parameter_bounds;
         let has = |part: u8| self.given & part != 0;
         let joints = || config.joints.iter();
@@ -238,13 +238,13 @@ impl HostParameters {
 
     /// Returns `true` if the friction table of the joint with this index is within the bounds. Also returns `true` if tables are not in
     /// use.
-    pub fn table_fits(&self, j: usize, config: &Config) -> bool {
+    pub(crate) fn table_fits(&self, j: usize, config: &Config) -> bool {
         let table = self.tables_in_use().and_then(|tables| tables.get(j)).zip(config.joints.get(j));
         table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
     }
 
     /// Checks gains against their bounds and, if the model is known, against the inertia of the joints (J-71).
-    pub fn check_pid(&self, gains: &[PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
+    pub(crate) fn check_pid(&self, gains: &[PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
         for (gains, joint) in gains.iter().zip(&config.joints) {
             config.parameter_bounds.check_gains(gains, joint)?;
         }
@@ -255,24 +255,24 @@ impl HostParameters {
     /// Runs one tick under torque after gains were received. Returns the gains of this tick while they are blended in. `held`: all joints
     /// have settled, and none yields.
     #[inline(never)]
-    pub fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
+    pub(crate) fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
         self.trial.step(held);
         self.trial.blended(&self.pid)
     }
 
     /// Returns `true` if the joints of the model in use are heavy enough for the gains, with the present settings.
-    pub fn gains_are_borne(&self, config: &Config) -> bool {
+    pub(crate) fn gains_are_borne(&self, config: &Config) -> bool {
         self.felt.is_known() && self.felt.bears(&self.pid, config)
     }
 
     /// Returns `true` if the joints of the model that was checked last, accepted or not, are too light for the gains.
     #[cfg(test)]
-    pub fn gains_were_too_much(&self, config: &Config) -> bool {
+    pub(crate) fn gains_were_too_much(&self, config: &Config) -> bool {
         self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
     }
 
     /// Uses gains that have passed [`check_pid`](Self::check_pid).
-    pub fn put_pid(&mut self, gains: &[PidGains; JOINTS]) {
+    pub(crate) fn put_pid(&mut self, gains: &[PidGains; JOINTS]) {
         self.pid = *gains;
         self.receive(missing_parameter::PID);
     }
@@ -308,7 +308,12 @@ impl HostParameters {
     }
 
     /// Computes the inertia of the model in use again, if other settings affect it (J-71).
-    pub fn look_again(&mut self, progress: SliceProgress, config: &Config, before: &Config) -> SliceOutcome {
+    pub(crate) fn look_again(
+        &mut self,
+        progress: SliceProgress,
+        config: &Config,
+        before: &Config,
+    ) -> SliceOutcome {
         let same = |j: usize| {
             config.joints[j].rotor_inertia == before.joints[j].rotor_inertia
                 && config.position_range(j) == before.position_range(j)
@@ -326,7 +331,7 @@ impl HostParameters {
     }
 
     /// Takes a model in slices. `at`: measured positions (rad), if all are known.
-    pub fn set_model(
+    pub(crate) fn set_model(
         &mut self,
         model: &ArmModel,
         progress: SliceProgress,
@@ -360,7 +365,7 @@ impl HostParameters {
         Ok(())
     }
 
-    pub fn take_default_polynomial(&mut self, config: &Config) -> Result<(), DataStatus> {
+    pub(crate) fn take_default_polynomial(&mut self, config: &Config) -> Result<(), DataStatus> {
         self.set_polynomial(&defaults::POLYNOMIAL, config)
     }
 
@@ -372,7 +377,7 @@ impl HostParameters {
     }
 
     /// Takes the default tables in the same way.
-    pub fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
+    pub(crate) fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
         self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
     }
 

@@ -127,7 +127,7 @@ pub(crate) struct Step {
 
 impl Step {
     /// Creates a step of `ms` milliseconds; 0 is taken as 1.
-    pub fn new(ms: u16) -> Self {
+    pub(crate) fn new(ms: u16) -> Self {
         let ms = ms.max(1);
         let [position, velocity, acceleration] =
             [POSITION_SCALE, VELOCITY_SCALE, ACCELERATION_SCALE].map(|scale| scale / RAW_FULL_SCALE);
@@ -137,7 +137,7 @@ impl Step {
 
     /// Writes the set values at the fraction `u` (0..1) between one point and the next to `out`.
     #[inline(always)]
-    pub fn between(&self, a: &RawPoint, b: &RawPoint, u: f64, out: &mut SetPoint) {
+    pub(crate) fn between(&self, a: &RawPoint, b: &RawPoint, u: f64, out: &mut SetPoint) {
         let weights = Weights::at(u, &self.units);
         for j in 0..JOINTS {
             let samples = |p: &RawPoint| [p.position[j], p.velocity[j], p.acceleration[j]].map(f64::from);

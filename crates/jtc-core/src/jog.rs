@@ -54,13 +54,13 @@ bit_codec!(Jog { joints, silent_ms, clock });
 
 impl Jog {
     /// Creates a jog that begins at rest.
-    pub fn begin() -> Self {
+    pub(crate) fn begin() -> Self {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
     /// Commands velocities, rad/s, and the highest accelerations, rad/s². Commands that arrive while the joints come to rest take effect
     /// when the joints are at rest.
-    pub fn command(
+    pub(crate) fn command(
         &mut self,
         wanted: &[f64; JOINTS],
         acceleration: &[f64; JOINTS],
@@ -81,13 +81,13 @@ impl Jog {
     }
 
     /// Brings the joints to rest.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.silent_ms = 0;
         self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
     }
 
     /// Begins a tick. Returns `true` if this is the tick in which all joints begin to come to rest.
-    pub fn ends(&mut self) -> bool {
+    pub(crate) fn ends(&mut self) -> bool {
         self.silent_ms = self.silent_ms.saturating_add(1);
         if self.silent_ms > LASTS_MS {
             self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
@@ -100,7 +100,7 @@ impl Jog {
     }
 
     /// Returns `true` until the jog begins to come to rest.
-    pub fn goes_on(&self) -> bool {
+    pub(crate) fn goes_on(&self) -> bool {
         self.clock.is_going()
     }
 
@@ -109,13 +109,13 @@ impl Jog {
     }
 
     /// Returns `true` if every joint is at rest and no velocity is commanded.
-    pub fn rests(&self) -> bool {
+    pub(crate) fn rests(&self) -> bool {
         let rests = |joint: &JointJog| joint.velocity == 0.0 && joint.acceleration == 0.0;
         !self.is_wanted() && (self.clock.standing() || self.joints.iter().all(rests))
     }
 
     /// Runs one tick: moves `point`. `ramp` advances the clock while it ramps to another rate.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         point: &mut SetPoint,
         config: &Config,

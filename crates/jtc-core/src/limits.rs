@@ -54,7 +54,7 @@ impl Recent {
     /// Adds a tick to the window. `has`: the tick has the property. Returns `true` if it has, and more than `most` of the last 100 ticks
     /// have it.
     #[inline]
-    pub fn exceeds(&mut self, has: bool, most: u16) -> bool {
+    pub(crate) fn exceeds(&mut self, has: bool, most: u16) -> bool {
         if has | (self.count > 0) {
             let oldest = (self.history >> (WINDOW - 1)) as u16 & 1;
             self.history = self.history << 1 | u128::from(has);
@@ -64,7 +64,7 @@ impl Recent {
     }
 
     /// Clears all ticks.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 }
@@ -83,7 +83,7 @@ impl Saturation {
     /// Returns the torque to command, within its limit, and `true` if the joint is overloaded: the computed torque was above the limit,
     /// with either sign, in more than `over_ms_max` of the last 100 ticks. For NaN no torque is commanded. While the arm is `braking` with
     /// all available torque (J-33), ticks are not counted.
-    pub fn limit(
+    pub(crate) fn limit(
         &mut self,
         torque: f64,
         limits: &JointConfig,
@@ -100,7 +100,7 @@ impl Saturation {
     }
 
     /// Clears all counts.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.over.forget();
     }
 }
@@ -124,7 +124,7 @@ bit_codec!(Turns { at, count, upper });
 impl Turns {
     /// Records a tick in which the torque is at a limit. Returns `true` if the torque has been at both limits, twice each, within
     /// [`TURNS_MS`].
-    pub fn hits(&mut self, upper: bool, tick: u32) -> bool {
+    pub(crate) fn hits(&mut self, upper: bool, tick: u32) -> bool {
         if self.count > 0 && self.upper == upper {
             return false;
         }

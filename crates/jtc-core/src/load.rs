@@ -33,39 +33,39 @@ bit_codec!(Load { torque, known, steady, observations });
 
 impl Load {
     /// Clears the load, so that the joint must find it again.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 
     /// Returns the load, N·m. Before the load is known, returns the torque of the `integral` (N·m).
-    pub fn torque(&self, integral: f64) -> f64 {
+    pub(crate) fn torque(&self, integral: f64) -> f64 {
         if self.known { self.torque.into() } else { integral }
     }
 
     /// Returns the load, N·m; zero before the load is known.
-    pub fn known_torque(&self) -> f64 {
+    pub(crate) fn known_torque(&self) -> f64 {
         self.torque.into()
     }
 
     /// Returns the part of a torque (N·m) that is accepted as a load without being observed.
-    pub fn bounded(torque: f64, limits: &JointConfig) -> f64 {
+    pub(crate) fn bounded(torque: f64, limits: &JointConfig) -> f64 {
         let highest = HIGHEST * limits.torque_max;
         torque.max(-highest).min(highest)
     }
 
     /// Returns `true` if the load is known.
-    pub fn is_known(&self) -> bool {
+    pub(crate) fn is_known(&self) -> bool {
         self.known
     }
 
     /// Sets a load that was found in another way, N·m: a load that was lowered has this torque now.
-    pub fn set(&mut self, torque: f64) {
+    pub(crate) fn set(&mut self, torque: f64) {
         *self = Self { torque: torque as f32, known: true, ..Self::default() };
     }
 
     /// Observes the torque of the `integral` (N·m). `settled`: the joint has settled since it was enabled. Call this once in [`PERIOD`]
     /// ticks.
-    pub fn observe(&mut self, integral: f64, settled: bool, limits: &JointConfig) {
+    pub(crate) fn observe(&mut self, integral: f64, settled: bool, limits: &JointConfig) {
         if !settled {
             self.forget();
             return;

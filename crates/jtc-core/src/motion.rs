@@ -55,7 +55,7 @@ bit_codec!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 impl Motion {
     /// Turns the torque off: no joint is held, and no torque is stored. Each part is reset in place, so that it is not built on the stack
     /// and copied.
-    pub fn release(&mut self, nodes: &Nodes) {
+    pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
         set.release(nodes);
         law.release();
@@ -66,7 +66,7 @@ impl Motion {
     }
 
     /// Makes joints yield from the next tick on (J-68), and other joints lower their loads (J-70). The inertia is taken from the ramp.
-    pub fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
+    pub(crate) fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {
             if yields[j] || lowers[j] {
@@ -78,19 +78,19 @@ impl Motion {
     }
 
     /// Changes the gains while the arm is held (J-71).
-    pub fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
+    pub(crate) fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
         self.law.change_gains(gains);
         self.set.catch.iter_mut().for_each(Catch::watch_anew);
         self.limiter.forget_turns();
     }
 
     /// Returns `true` if all joints have settled since they were enabled, and none yields.
-    pub fn holds(&self, config: &Config) -> bool {
+    pub(crate) fn holds(&self, config: &Config) -> bool {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
     /// Returns, for each joint, whether it is at its torque limit, and whether its position error is above half of the maximum.
-    pub fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
+    pub(crate) fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let (due, q) = (self.set.due(config), nodes.positions());
         let lags = |j: usize| (due[j] - q[j]).abs() > 0.5 * config.joints[j].position_error_max;
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
@@ -98,7 +98,7 @@ impl Motion {
 
     /// Returns `true` if the arm is held at rest and its loads are known. In a held stop a `contact` may press on the arm; its pressure is
     /// not waited for. After [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the loads are not waited for either.
-    pub fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
+    pub(crate) fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
         let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
             && !self.law.is_yielding()
@@ -106,7 +106,7 @@ impl Motion {
     }
 
     /// Runs one tick of Teaching. Keeps the inertia for a ramp up to date, because Teaching may end in the middle of a motion.
-    pub fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
+    pub(crate) fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         if self.law.taught.as_ref().is_some_and(Taught::is_turn_of_ramp) {
             self.ramp.begin(nodes, config, dynamics);
         }
@@ -114,7 +114,7 @@ impl Motion {
 
     /// Ends Teaching. The arm comes to rest and is held there, and the integral takes over the load that Teaching carried. Moving joints
     /// stop within `ramp_ms`. If the torque limits require it, they take longer, up to `stop_ms` (J-33).
-    pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
+    pub(crate) fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let mut length_ms = f64::from(config.ramp_ms);
         if nodes.velocities().iter().any(|v| moves(*v)) {
             let needed = self.ramp.shortest_stop_ms(&self.law, nodes.velocities(), config);
@@ -126,13 +126,13 @@ impl Motion {
     }
 
     /// Begins to hold joints that have just been enabled.
-    pub fn latch(&mut self, nodes: &Nodes, config: &Config) {
+    pub(crate) fn latch(&mut self, nodes: &Nodes, config: &Config) {
         let latched = self.set.latch(nodes, config);
         self.law.latch(&latched);
     }
 
     /// Runs one tick of HoldPos: the position hold or the jog.
-    pub fn hold(&mut self, config: &Config) {
+    pub(crate) fn hold(&mut self, config: &Config) {
         let Self { set, law, ramp, .. } = self;
         if set.jogging() {
             set.jog_on(config, |at, clock| ramp.step(at, law, clock, config));
@@ -142,7 +142,7 @@ impl Motion {
     }
 
     /// Runs one tick on the path or of the approach. `at` holds the values for full speed at the time of the clock (J-33).
-    pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
+    pub(crate) fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law, clock, config);
         } else {
@@ -154,7 +154,7 @@ impl Motion {
     /// Runs one tick of the control law and of its limits. Returns the torques to command and the findings of the limits.
     // A single function does the work of every tick: calls inside it would copy the torques back and forth.
     #[inline(never)]
-    pub fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
+    pub(crate) fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
         let positions = inputs.nodes.positions();
         let yields = self.law.any_yields();
         if yields {

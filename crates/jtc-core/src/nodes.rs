@@ -85,7 +85,7 @@ bit_codec!(Nodes {
 
 impl Nodes {
     /// Creates the nodes. Each of them must be reset once (J-20).
-    pub fn new(config: &Config) -> Self {
+    pub(crate) fn new(config: &Config) -> Self {
         let mut node = Node::default();
         node.restart(config);
         node.reset = true;
@@ -113,7 +113,7 @@ impl Nodes {
 
     /// Every joint enabled, at these positions (rad) and velocities (rad/s).
     #[cfg(test)]
-    pub fn enabled_at(position: [f64; JOINTS], velocity: [f64; JOINTS]) -> Self {
+    pub(crate) fn enabled_at(position: [f64; JOINTS], velocity: [f64; JOINTS]) -> Self {
         let mut nodes = Self::new(&Config::avena());
         for node in &mut nodes.nodes {
             *node = Node { seen: true, configured: true, valid: true, fresh: true, ..Node::default() };
@@ -128,7 +128,7 @@ impl Nodes {
 
     /// Like [`Self::enabled_at`], but the joint with this index is ready and not enabled.
     #[cfg(test)]
-    pub fn with_torque_off(mut self, joint: usize) -> Self {
+    pub(crate) fn with_torque_off(mut self, joint: usize) -> Self {
         self.nodes[joint].report.state = NodeState::READY;
         self
     }
@@ -157,60 +157,60 @@ impl Nodes {
     }
 
     /// Returns `true` if the gripper is enabled and, by the configuration, keeps its part when the arm loses its torque.
-    pub fn gripper_keeps_part(&self, config: &Config) -> bool {
+    pub(crate) fn gripper_keeps_part(&self, config: &Config) -> bool {
         !config.pump_off_on_error
             && self.gripper_node().is_some_and(|node| node.report.state == NodeState::ENABLED)
     }
 
     /// Returns `true` if the gripper left OperationEnable or lost its configuration in this tick. A pump that was commanded before does not
     /// start again by itself (J-23).
-    pub fn gripper_lost(&self) -> bool {
+    pub(crate) fn gripper_lost(&self) -> bool {
         self.gripper_lost
     }
 
     /// Returns the CAN flags of a gripper that does not answer. These flags are shown, but are not an error (J-14, J-23).
-    pub fn gripper_flags(&self, config: &Config) -> u32 {
+    pub(crate) fn gripper_flags(&self, config: &Config) -> u32 {
         if self.gripper && !self.gripper_answers(config) { GRIPPER_FLAG } else { 0 }
     }
 
-    pub fn node(&self, n: usize) -> &Node {
+    pub(crate) fn node(&self, n: usize) -> &Node {
         // The index comes from this crate. If it were out of range, node 0 would be returned instead of a panic.
         self.nodes.get(n).unwrap_or(&self.nodes[0])
     }
 
     /// Returns the measured positions, rad, predicted while answers are missing (J-63). Positions that are not valid yet are 0.
-    pub fn positions(&self) -> &[f64; JOINTS] {
+    pub(crate) fn positions(&self) -> &[f64; JOINTS] {
         &self.position
     }
 
     /// Returns the positions if those of all joints are valid.
-    pub fn known_positions(&self) -> Option<&[f64; JOINTS]> {
+    pub(crate) fn known_positions(&self) -> Option<&[f64; JOINTS]> {
         (!self.fallen_back()).then_some(&self.position)
     }
 
     /// Returns the joints, as a mask, whose encoders were found to disagree in this tick (J-35).
-    pub fn misfits(&self) -> u8 {
+    pub(crate) fn misfits(&self) -> u8 {
         self.misfits
     }
 
     /// Returns the disagreement of the two encoders of a joint that was found since its drive was configured, with the size of a jump (rad)
     /// or the factor of a speed (J-35).
-    pub fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
+    pub(crate) fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
         self.node(joint).measured.misfit()
     }
 
     /// Returns the joints, as a mask, whose encoders disagree. Such a joint stays in the mask until its drive is configured again (J-35).
-    pub fn untrusted(&self) -> u8 {
+    pub(crate) fn untrusted(&self) -> u8 {
         (0..JOINTS).fold(0, |mask, j| mask | u8::from(self.misfit(j).is_some()) << j)
     }
 
     /// Returns the measured velocities, rad/s, like [`Self::positions`].
-    pub fn velocities(&self) -> &[f64; JOINTS] {
+    pub(crate) fn velocities(&self) -> &[f64; JOINTS] {
         &self.velocity
     }
 
     /// Processes the frames that the bus has received since the last tick. `commanded`: the set values of the last ticks.
-    pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
+    pub(crate) fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
         // Masks of nodes. If a configuration is accepted in this tick, the answer to the next Move comes in a later tick.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         if self.some_absent {
@@ -308,7 +308,7 @@ impl Nodes {
 
     /// Sets the `commanded` velocities (rad/s) of joints whose set values were restarted as the new reference. A restart of the set values
     /// is not a change of the motion (J-63).
-    pub fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
+    pub(crate) fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
         for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
             if *found {
                 node.measured.go_on_moving(*commanded);
@@ -361,7 +361,7 @@ impl Nodes {
     }
 
     /// Returns the node init word. Bit n is set while node n is not initialised, or if it is the gripper and does not answer.
-    pub fn init_word(&self, config: &Config) -> u8 {
+    pub(crate) fn init_word(&self, config: &Config) -> u8 {
         let mut word = 0;
         for (n, node) in self.all().iter().enumerate() {
             let accurate = n == GRIPPER || node.report.warnings & warning::POSITION_NOT_ACCURATE == 0;
@@ -374,12 +374,12 @@ impl Nodes {
     }
 
     /// Returns `true` if a joint has lost its configuration or fallen back to Start or Init (J-20).
-    pub fn fallen_back(&self) -> bool {
+    pub(crate) fn fallen_back(&self) -> bool {
         self.joints().iter().any(Node::fallen_back)
     }
 
     /// Returns `true` when Init is done: every node is initialised and reports ReadyToOperate. A gripper that keeps its part stays enabled.
-    pub fn all_ready(&self, config: &Config) -> bool {
+    pub(crate) fn all_ready(&self, config: &Config) -> bool {
         let ready = |node: &Node| node.report.state == NodeState::READY;
         self.init_word(config) == 0
             && self.joints().iter().all(ready)
@@ -389,7 +389,7 @@ impl Nodes {
     /// Executes ClearCurrentErrors for the nodes in `mask`. Nodes with an error to clear are commanded to Init until they follow. An error
     /// that is only in the word of occurred errors is cleared only while the torque is off, because it is not a reason to drop the arm.
     /// Returns `true` if any node has an error to clear.
-    pub fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
+    pub(crate) fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
         let mut any = false;
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
@@ -403,7 +403,7 @@ impl Nodes {
     }
 
     /// Executes ResetCanDevices for the nodes in `mask` (J-23).
-    pub fn reset(&mut self, mask: u8) {
+    pub(crate) fn reset(&mut self, mask: u8) {
         let present = self.present();
         for (n, node) in self.nodes.iter_mut().enumerate().take(present) {
             node.reset |= mask & (1 << n) != 0 && !node.absent;
@@ -414,7 +414,7 @@ impl Nodes {
 impl Nodes {
     /// Applies new settings, in a state without torque. Returns `true` if these settings are sent to the nodes, which are then configured
     /// again.
-    pub fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
+    pub(crate) fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
         self.gripper = config.gripper;
         self.some_absent = config.absent.contains(&true);
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {

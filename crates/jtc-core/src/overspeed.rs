@@ -17,7 +17,7 @@ impl OverSpeed {
     /// Returns the joint errors of this tick: joints whose measured speed has been above [`Config::overspeed_factor`] times their limit for
     /// [`Config::overspeed_ms`]. Only measurements that came in this tick are evaluated: a missing or unusable answer neither adds to the
     /// time nor ends it. Joints that are not enabled have no torque that could be taken away.
-    pub fn watch(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
+    pub(crate) fn watch(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
         // Uses the velocity in the joint's answer, not a predicted one. NaN is above the threshold.
         let within = |j: usize| {
             let threshold = config.overspeed_factor * config.joints[j].velocity_max;

@@ -13,7 +13,7 @@ use crate::bit_codec::bit_codec;
 
 /// Path time and its rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PathClock {
+pub(crate) struct PathClock {
     /// Path time since point 0, ms.
     pub time: f64,
     /// Rate, in seconds of path time per second, 0..1.
@@ -31,11 +31,11 @@ pub struct PathClock {
 bit_codec!(PathClock { time, rate, slope, target, halting_ms, hurried });
 
 /// Lowest and highest slope of path time, 1/s. If no slope is possible, the first value is above the second.
-pub type Bounds = (f64, f64);
+pub(crate) type Bounds = (f64, f64);
 
 /// Slopes that the arm can follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlopeBounds {
+pub(crate) struct SlopeBounds {
     /// Slopes within the acceleration and torque limits, with a margin for changes within a tick.
     pub easy: Bounds,
     /// Slopes within the torque limits alone.
@@ -78,18 +78,18 @@ impl Ramp {
 
 impl PathClock {
     /// Creates a clock at point 0, for an arm at rest. Its rate is `pace` from the start.
-    pub fn start(pace: f64) -> Self {
+    pub(crate) fn start(pace: f64) -> Self {
         Self { rate: pace, target: pace, ..Self::default() }
     }
 
     /// Begins to ramp from standstill to the rate `pace`.
-    pub fn go(&mut self, pace: f64) {
+    pub(crate) fn go(&mut self, pace: f64) {
         self.target = pace;
         self.slope = 0.0;
     }
 
     /// Changes the target rate. A standstill that is the target stays the target. Returns `true` if path time begins to change its rate.
-    pub fn set_pace(&mut self, pace: f64) -> bool {
+    pub(crate) fn set_pace(&mut self, pace: f64) -> bool {
         let changes = self.target != 0.0 && self.target != pace;
         if changes {
             self.target = pace;
@@ -98,56 +98,56 @@ impl PathClock {
     }
 
     /// Begins to slow down to standstill. The time for this runs from the first call.
-    pub fn halt(&mut self) {
+    pub(crate) fn halt(&mut self) {
         if self.target != 0.0 {
             (self.target, self.halting_ms, self.hurried) = (0.0, 0.0, false);
         }
     }
 
     /// Stops path time at once.
-    pub fn rest(&mut self) {
+    pub(crate) fn rest(&mut self) {
         *self = Self { time: self.time, ..Self::default() };
     }
 
     /// Returns `true` if path time is at rest and will stay at rest.
-    pub fn standing(&self) -> bool {
+    pub(crate) fn standing(&self) -> bool {
         self.rate == 0.0 && self.target == 0.0
     }
 
     /// Returns `true` if path time is faster than its target rate.
-    pub fn above_pace(&self) -> bool {
+    pub(crate) fn above_pace(&self) -> bool {
         self.rate > self.target
     }
 
     /// Returns `true` if path time is slowing down to standstill.
-    pub fn halting(&self) -> bool {
+    pub(crate) fn halting(&self) -> bool {
         self.target == 0.0 && self.rate != 0.0
     }
 
     /// Returns `true` if the target rate of path time is not zero.
-    pub fn is_going(&self) -> bool {
+    pub(crate) fn is_going(&self) -> bool {
         self.target != 0.0
     }
 
     /// Returns `true` if path time is not at its target rate.
-    pub fn ramping(&self) -> bool {
+    pub(crate) fn ramping(&self) -> bool {
         self.rate != self.target
     }
 
     /// Returns `true` if path time runs at full speed and will continue so.
-    pub fn at_full_speed(&self) -> bool {
+    pub(crate) fn at_full_speed(&self) -> bool {
         self.rate == 1.0 && self.target == 1.0
     }
 
     /// Advances path time by one tick, at most to `end` (ms).
-    pub fn advance(&mut self, end: f64) {
+    pub(crate) fn advance(&mut self, end: f64) {
         self.time = (self.time + self.rate).min(end);
     }
 
     /// Changes the rate towards the target rate along an S-shaped ramp of `ramp_ms`, or more slowly if the slope would leave `bounds`. If
     /// the target changes during a ramp, the slope changes as fast as it may, without a step. Meanwhile the rate continues to change, but
     /// never beyond the previous target.
-    pub fn change_pace(&mut self, ramp_ms: f64, bounds: Bounds) {
+    pub(crate) fn change_pace(&mut self, ramp_ms: f64, bounds: Bounds) {
         let ahead = self.target - self.rate;
         let sign = if ahead < 0.0 { -1.0 } else { 1.0 };
         // In this function slopes are positive towards the target rate.
@@ -174,7 +174,7 @@ impl PathClock {
 
     /// Keeps the present rate, or slows down if the slope would leave `bounds` otherwise. The rate is also kept if the bounds of several
     /// joints contradict each other, or if only a faster path would relieve a joint.
-    pub fn hold_back(&mut self, (low, high): Bounds) {
+    pub(crate) fn hold_back(&mut self, (low, high): Bounds) {
         let wanted = if low <= high { high.min(0.0) } else { 0.0 };
         // The bounds come from noisy torques.
         let slope = self.slope + SETTLES * (wanted - self.slope);
@@ -185,7 +185,7 @@ impl PathClock {
     /// Slows down to standstill, in at most `stop_ms` if the torque limits allow it. The clock follows an S-shaped ramp of `ramp_ms` while
     /// that is possible within `bounds.easy`. If that would take too long, it uses `bounds.full`. Then the rate may also rise again, if all
     /// available torque cannot prevent the arm from gaining speed.
-    pub fn slow_down(&mut self, ramp_ms: f64, stop_ms: f64, bounds: &SlopeBounds) {
+    pub(crate) fn slow_down(&mut self, ramp_ms: f64, stop_ms: f64, bounds: &SlopeBounds) {
         // In this function slopes are decelerations: positive towards standstill.
         let (distance, now) = (self.rate, -self.slope);
         let ramp = Ramp::of(ramp_ms.min(0.8 * stop_ms));

@@ -31,7 +31,7 @@ bit_codec!(BlendState { left_ms, mass, from });
 
 impl PayloadBlend {
     /// Returns the state of the blend.
-    pub fn state(&self) -> BlendState {
+    pub(crate) fn state(&self) -> BlendState {
         BlendState {
             left_ms: self.left_ms,
             mass: self.mass,
@@ -40,7 +40,7 @@ impl PayloadBlend {
     }
 
     /// Continues from that state, with the dynamics of the arm with its whole payload.
-    pub fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
+    pub(crate) fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
         *self = Self::none(dynamics);
         if let Some(from) = &state.from {
             (self.left_ms, self.mass) = (state.left_ms.min(BLEND_MS), state.mass);
@@ -55,35 +55,35 @@ impl PayloadBlend {
     }
 
     /// Creates a blend that has ended.
-    pub fn none(dynamics: &Dynamics) -> Self {
+    pub(crate) fn none(dynamics: &Dynamics) -> Self {
         let now = dynamics.inertias();
         Self { from: now, to: now, mass: 0.0, left_ms: 0 }
     }
 
     /// Begins a blend from the arm `now`, which may be in a blend itself, to the arm with the `next` payload. `heavier`: mass of the next
     /// payload minus mass of the last one, kg.
-    pub fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
+    pub(crate) fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
         let mass = self.mass + heavier;
         *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
     }
 
     /// Clears the blend, because the model was rebuilt with the whole payload in it.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         (self.left_ms, self.mass) = (0, 0.0);
     }
 
     /// Returns the mass that the next tick of the blend adds, kg.
-    pub fn next_mass(&self) -> f64 {
+    pub(crate) fn next_mass(&self) -> f64 {
         self.mass / f64::from(self.left_ms.max(1))
     }
 
     /// Returns the time left, ms.
-    pub fn left_ms(&self) -> u16 {
+    pub(crate) fn left_ms(&self) -> u16 {
         self.left_ms
     }
 
     /// Runs a tick of the blend.
-    pub fn step(&mut self, dynamics: &mut Dynamics) {
+    pub(crate) fn step(&mut self, dynamics: &mut Dynamics) {
         match self.left_ms {
             0 => {}
             1 => self.end(dynamics),
@@ -96,7 +96,7 @@ impl PayloadBlend {
     }
 
     /// Ends the blend at once, while the arm is not held.
-    pub fn end(&mut self, dynamics: &mut Dynamics) {
+    pub(crate) fn end(&mut self, dynamics: &mut Dynamics) {
         self.mass = 0.0;
         if core::mem::take(&mut self.left_ms) > 0 {
             dynamics.set_inertias(&self.to);

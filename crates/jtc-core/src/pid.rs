@@ -15,7 +15,7 @@ const ROUNDING: f64 = 0.01;
 
 /// The state of the controller.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pid {
+pub(crate) struct Pid {
     /// Integral of the error, rad·s.
     integral: f64,
     /// The last errors, rad, oldest first.
@@ -26,7 +26,7 @@ pub struct Pid {
 
 /// The three parts of the torque, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PidTorque {
+pub(crate) struct PidTorque {
     /// Torque of the error, Kp·e.
     pub p: f64,
     /// Torque of the integral, Ki·∫e.
@@ -40,33 +40,33 @@ bit_codec!(PidTorque { p, i, d });
 
 impl PidTorque {
     /// Returns the sum, N·m.
-    pub fn sum(&self) -> f64 {
+    pub(crate) fn sum(&self) -> f64 {
         self.p + self.i + self.d
     }
 }
 
 impl Pid {
     /// Resets the state. `error` (rad) is assumed to have been constant until now, so that the derivative starts at 0.
-    pub fn reset(&mut self, error: f64) {
+    pub(crate) fn reset(&mut self, error: f64) {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
     /// Like [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral. This is the bumpless transfer from a state that
     /// had found this torque. An integral without gain or at its bounds takes over less.
-    pub fn take_over(&mut self, gains: &PidGains, torque: f64) {
+    pub(crate) fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         self.keep(gains, torque);
     }
 
     /// Sets the integral to a `torque` (N·m), as far as these gains can hold it.
-    pub fn keep(&mut self, gains: &PidGains, torque: f64) {
+    pub(crate) fn keep(&mut self, gains: &PidGains, torque: f64) {
         let integral = torque / gains.ki;
         self.integral =
             if integral.is_finite() { integral.max(gains.int_min).min(gains.int_max) } else { 0.0 };
     }
 
     /// Shifts the commanded position by `way` (rad) without an effect on the derivative.
-    pub fn shift(&mut self, way: f64) {
+    pub(crate) fn shift(&mut self, way: f64) {
         self.errors = self.errors.map(|error| error + way);
     }
 
@@ -76,7 +76,7 @@ impl Pid {
     /// At rest, the integral stops changing when the error is within one step, until the error exceeds [`RELEASE_STEPS`]. An integral that
     /// continued below the resolution of the encoder would make a joint with stiction break away again and again (hunting). An integral
     /// that restarted at each change of the last bit would have the same effect.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         gains: &PidGains,
         error: f64,

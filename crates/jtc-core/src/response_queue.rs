@@ -77,28 +77,28 @@ pub(crate) struct ResponseQueues {
 }
 
 impl ResponseQueues {
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { lines: [const { ResponseQueue::new() }; HOST_LINES], turn: 0, lost: 0 }
     }
 
     /// Returns `true` if no record waits.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.lines.iter().all(|queue| queue.len == 0)
     }
 
     /// Returns the number of records lost since the start because too many were waiting.
-    pub fn lost(&self) -> u32 {
+    pub(crate) fn lost(&self) -> u32 {
         self.lost
     }
 
     /// Adds a record for `line`. `noise`: the received bytes are not a frame.
-    pub fn push(&mut self, line: usize, response: Response, noise: bool) {
+    pub(crate) fn push(&mut self, line: usize, response: Response, noise: bool) {
         let kept = self.lines.get_mut(line).is_some_and(|queue| queue.push(response, noise));
         self.lost = self.lost.saturating_add(u32::from(!kept));
     }
 
     /// Returns the oldest record of a line, with the line. The lines take turns.
-    pub fn pop(&mut self) -> Option<(usize, Response)> {
+    pub(crate) fn pop(&mut self) -> Option<(usize, Response)> {
         for _ in 0..HOST_LINES {
             let line = self.turn;
             self.turn = (line + 1) % HOST_LINES;

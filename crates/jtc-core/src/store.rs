@@ -55,7 +55,7 @@ pub(crate) struct StoreState {
 
 impl StoreState {
     /// Returns the time between points, ms.
-    pub fn step_ms(&self) -> u16 {
+    pub(crate) fn step_ms(&self) -> u16 {
         self.step_ms
     }
 }
@@ -94,7 +94,7 @@ fn hash_points(hash: u32, points: &[RawPoint]) -> u32 {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
-    pub fn new(points: M) -> Self {
+    pub(crate) fn new(points: M) -> Self {
         Self {
             points,
             received: 0,
@@ -117,14 +117,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.points.as_ref().len().min(POINTS_MAX)
     }
 
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.received = 0;
         self.next_segment = 0;
         self.segments = 0;
     }
 
     /// Returns `true` if all segments have been received.
-    pub fn complete(&self) -> bool {
+    pub(crate) fn complete(&self) -> bool {
         self.segments > 0 && self.next_segment == self.segments
     }
 
@@ -135,7 +135,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
 
     /// Drops an incomplete upload because of a Stop (J-30). An upload that was begun on a plain line is completed but not executed, because
     /// its host would wait for ever. Returns `true` if there was an incomplete upload.
-    pub fn drop_upload(&mut self) -> bool {
+    pub(crate) fn drop_upload(&mut self) -> bool {
         let receiving = self.receiving();
         if receiving && self.plain {
             self.stopped = true;
@@ -147,43 +147,43 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Returns `true` if a Stop came during the upload of this trajectory, so that it is not executed (J-30).
-    pub fn stopped(&self) -> bool {
+    pub(crate) fn stopped(&self) -> bool {
         self.stopped
     }
 
     /// Returns `true` if the upload was begun on a plain line, whose host cannot handle a refused segment (J-51).
-    pub fn plain(&self) -> bool {
+    pub(crate) fn plain(&self) -> bool {
         self.plain
     }
 
     /// Stores the violation that the check has found in the present upload.
-    pub fn refuse(&mut self, violation: Violation) {
+    pub(crate) fn refuse(&mut self, violation: Violation) {
         self.refused.get_or_insert(violation);
     }
 
     /// Returns the violation that the check has found in this trajectory. Such a trajectory is not executed (J-36).
-    pub fn refused(&self) -> Option<Violation> {
+    pub(crate) fn refused(&self) -> Option<Violation> {
         self.refused
     }
 
     /// Refuses the other segments of an upload whose segment 0 was refused because of a Stop.
-    pub fn refuse_rest(&mut self) {
+    pub(crate) fn refuse_rest(&mut self) {
         self.dropped = true;
     }
 
     /// Returns `true` if the upload was dropped and no other upload has been begun since.
-    pub fn dropped(&self) -> bool {
+    pub(crate) fn dropped(&self) -> bool {
         self.dropped
     }
 
     /// Returns the time of the last point, ms.
-    pub fn duration_ms(&self) -> u32 {
+    pub(crate) fn duration_ms(&self) -> u32 {
         // At most 11 999 · 65 535, which fits.
         (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step.ms))
     }
 
     /// Checks that the segment may follow the received ones. The check changes nothing.
-    pub fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
+    pub(crate) fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
         let first = segment.segment == 0;
         let before = if first { 0 } else { self.received };
         if segment.is_empty() {
@@ -212,7 +212,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
 
     /// Begins to copy an accepted segment. Segment 0 replaces the old trajectory. `plain`: its line is plain; `stopped`: a Stop came before
     /// the turn of the segment.
-    pub fn begin(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) {
+    pub(crate) fn begin(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) {
         if segment.segment == 0 {
             self.clear();
             (self.held, self.hash) = (0, HASH_BEGIN);
@@ -224,7 +224,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Copies points `from..to` of the segment after the received ones. The copied points become valid with `commit`.
-    pub fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
+    pub(crate) fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
         let slots = self.points.as_mut().get_mut(self.received + from..self.received + to).unwrap_or(&mut []);
         for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
             *slot = point;
@@ -233,7 +233,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Adds the segment after all its points have been copied. `passed` is the state of the check after all points so far.
-    pub fn commit(&mut self, segment: &Segment<'_>, passed: Passed) {
+    pub(crate) fn commit(&mut self, segment: &Segment<'_>, passed: Passed) {
         self.passed = passed;
         self.received = (self.received + segment.len()).min(self.capacity());
         self.next_segment = segment.segment + 1;
@@ -241,17 +241,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Returns the hash and the number of the points in memory, including those of a discarded trajectory.
-    pub fn points_hash(&self) -> (u32, u32) {
+    pub(crate) fn points_hash(&self) -> (u32, u32) {
         (self.hash, self.held as u32)
     }
 
     /// Returns the points in memory from number `first` on.
-    pub fn held_points(&self, first: usize) -> &[RawPoint] {
+    pub(crate) fn held_points(&self, first: usize) -> &[RawPoint] {
         self.points.as_ref().get(first..self.held).unwrap_or(&[])
     }
 
     /// Returns the state, without the points.
-    pub fn state(&self) -> StoreState {
+    pub(crate) fn state(&self) -> StoreState {
         let Self {
             points: _,
             received,
@@ -285,7 +285,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Restores the state. The points are restored separately.
-    pub fn restore(&mut self, state: &StoreState) {
+    pub(crate) fn restore(&mut self, state: &StoreState) {
         let StoreState {
             received,
             next_segment,
@@ -308,42 +308,42 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     }
 
     /// Stores points from number `first` on.
-    pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
+    pub(crate) fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         for (slot, point) in self.points.as_mut().iter_mut().skip(first).zip(points) {
             *slot = *point;
         }
     }
 
     /// Returns the number of points, the last point, and the state of the check after it. Returns `None` without points.
-    pub fn tail(&self) -> Option<(u32, RawPoint, Passed)> {
+    pub(crate) fn tail(&self) -> Option<(u32, RawPoint, Passed)> {
         let last = *self.points.as_ref().get(..self.received)?.last()?;
         Some((self.received as u32, last, self.passed))
     }
 
     /// Returns the speeds of the points.
-    pub fn speeds(&self) -> &[SpeedRange; JOINTS] {
+    pub(crate) fn speeds(&self) -> &[SpeedRange; JOINTS] {
         &self.passed.speeds
     }
 
     /// Returns the time between points, ms.
-    pub fn step_ms(&self) -> u16 {
+    pub(crate) fn step_ms(&self) -> u16 {
         self.step.ms
     }
 
     /// Returns the positions of point 0, rad.
-    pub fn first(&self) -> Option<[f64; JOINTS]> {
+    pub(crate) fn first(&self) -> Option<[f64; JOINTS]> {
         self.points.as_ref().get(..self.received)?.first().map(RawPoint::position_rad)
     }
 
     /// Returns the set values at `time_ms` after point 0, with velocities and accelerations for full speed. Returns `None` without points.
-    pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
+    pub(crate) fn at(&self, time_ms: f64) -> Option<SetPoint> {
         let mut at = SetPoint::default();
         self.put(time_ms, &mut at).then_some(at)
     }
 
     /// Like [`Self::at`], but writes the set values to `at`. Returns `false` without points.
     #[inline]
-    pub fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
+    pub(crate) fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
         let points = self.points.as_ref().get(..self.received).unwrap_or(&[]);
         let step_ms = f64::from(self.step.ms);
         // The product may be rounded to a value just below a point that the time has reached. `as` saturates: a negative or NaN time gives

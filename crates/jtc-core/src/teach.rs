@@ -110,7 +110,7 @@ bit_codec!(Taught { joints, carried, found, mass, unit, driven_ms, sinks_ms, has
 impl Taught {
     /// Begins Teaching of an arm at rest at `q` (rad) that has found these loads (N·m).
     #[inline(never)]
-    pub fn begin(q: &[f64; JOINTS], loads: &[f64; JOINTS], config: &Config) -> Self {
+    pub(crate) fn begin(q: &[f64; JOINTS], loads: &[f64; JOINTS], config: &Config) -> Self {
         let mut taught = Self::default();
         for j in 0..JOINTS {
             let limits = &config.joints[j];
@@ -139,7 +139,7 @@ impl Taught {
 
     /// Reduces the mass that was found by `mass` (kg) at the flange, which the model carries from this tick on (J-60). The mass does not
     /// change its sign: any excess of `mass` was not there when the mass was found.
-    pub fn give_way(&mut self, mass: f64) {
+    pub(crate) fn give_way(&mut self, mass: f64) {
         let left =
             |of: f32| (f64::from(of) - mass).max(f64::from(of.min(0.0))).min(f64::from(of.max(0.0))) as f32;
         (self.found, self.mass) = (left(self.found), left(self.mass));
@@ -148,30 +148,30 @@ impl Taught {
     /// Evaluates the answer of a joint in each tick. `late`: delay of this tick, ms; `fresh`: the joint has answered, with this `position`,
     /// rad. Returns the speed that follows from its positions, rad/s.
     #[inline(always)]
-    pub fn hear(&mut self, j: usize, fresh: bool, position: f64, late: u16) -> f32 {
+    pub(crate) fn hear(&mut self, j: usize, fresh: bool, position: f64, late: u16) -> f32 {
         self.joints[j].hear(fresh, position, late)
     }
 
     /// Returns `true` in the first tick of Teaching.
-    pub fn begins(&self) -> bool {
+    pub(crate) fn begins(&self) -> bool {
         Turn::of(self.turn) == Turn::Begin
     }
 
     /// Returns `true` in the tick that computes no other value, to leave time for the inertia of the whole arm.
-    pub fn is_turn_of_ramp(&self) -> bool {
+    pub(crate) fn is_turn_of_ramp(&self) -> bool {
         Turn::of(self.turn) == Turn::Ramp
     }
 
     /// Returns the torque that a joint carries in the first tick, N·m: the whole load that was found. No part of it is attributed to a mass
     /// yet.
-    pub fn first_load(&self, j: usize) -> f64 {
+    pub(crate) fn first_load(&self, j: usize) -> f64 {
         self.carried[j].rest.into()
     }
 
     /// Computes one of the slowly changing values, in turns. Returns `true` if this took too long to compute the torques of the joints in
     /// this tick. The very first tick adds only the load, because the torque would step without it.
     #[inline(never)]
-    pub fn look(
+    pub(crate) fn look(
         &mut self,
         q: &[f64; JOINTS],
         v: &[f64; JOINTS],
@@ -222,7 +222,7 @@ impl Taught {
 
     /// Runs one tick of a joint.
     #[inline(always)]
-    pub fn step(&mut self, j: usize, led: &LedJoint<'_>, config: &Config) -> TaughtTorque {
+    pub(crate) fn step(&mut self, j: usize, led: &LedJoint<'_>, config: &Config) -> TaughtTorque {
         let by_mass = self.by_mass(j);
         let whole = self.carried[j].whole(by_mass);
         let (mut torque, bears) = self.joints[j].step(led, whole, self.haste, config);
@@ -257,7 +257,7 @@ impl Taught {
     }
 
     /// Returns the torque that holds a joint at `position` (rad), N·m: the load and the dry friction.
-    pub fn held(&self, j: usize, position: f64, limits: &JointConfig, config: &Config) -> f64 {
+    pub(crate) fn held(&self, j: usize, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         self.carried[j].torque(self.by_mass(j)) + self.joints[j].dry_spring(position, limits, config)
     }
 }

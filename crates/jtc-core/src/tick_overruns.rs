@@ -25,7 +25,7 @@ impl Default for TickOverruns {
 
 impl TickOverruns {
     /// Records one tick, before which `missed` ticks were missing or late. Returns `true` if there have been too many.
-    pub fn count(&mut self, missed: u16) -> bool {
+    pub(crate) fn count(&mut self, missed: u16) -> bool {
         self.now_ms += 1 + u64::from(missed);
         let mut too_many = false;
         for _ in 0..usize::from(missed).min(COUNT) {

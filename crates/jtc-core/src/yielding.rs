@@ -147,7 +147,7 @@ pub(crate) struct Joint<'a> {
 
 impl Yield {
     /// Begins the yield of a joint. `set`: commanded position, rad; `load`: torque that the model lacks, N·m.
-    pub fn begin(lowers: bool, stays: bool, set: f64, inertia: f64, load: f64) -> Self {
+    pub(crate) fn begin(lowers: bool, stays: bool, set: f64, inertia: f64, load: f64) -> Self {
         Self {
             lowers,
             stays,
@@ -170,46 +170,46 @@ impl Yield {
     }
 
     /// Drags the end of the spring along with a joint at `position` (rad). Returns the new position of the end.
-    pub fn drag(&mut self, position: f64) -> f64 {
+    pub(crate) fn drag(&mut self, position: f64) -> f64 {
         self.set = self.set.max(position - STRETCH).min(position + STRETCH);
         self.set
     }
 
     /// Returns `true` if the joint has been calm for [`CALM_MS`]. The host may still need to end the yield.
-    pub fn is_calm(&self) -> bool {
+    pub(crate) fn is_calm(&self) -> bool {
         self.calm_ms >= CALM_MS
     }
 
     /// Returns `true` if the position controller holds the joint again.
-    pub fn is_over(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         self.is_calm() && (self.holdable || self.cleared) && !self.stays
     }
 
     /// Ends the yield at the host's request, as soon as the joint is calm.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         (self.stays, self.cleared) = (false, true);
     }
 
     /// Returns `true` if the joint lowers a load.
-    pub fn lowers(&self) -> bool {
+    pub(crate) fn lowers(&self) -> bool {
         self.lowers
     }
 
     /// Makes the joint lower its load from now on. The torque of the `spring`, N·m, becomes part of the load.
-    pub fn lower(&mut self, spring: f64) {
+    pub(crate) fn lower(&mut self, spring: f64) {
         (self.lowers, self.calm_ms) = (true, 0);
         self.load += spring;
         self.least = self.load;
     }
 
     /// Returns `true` if the load may differ from the load that was found before the yield.
-    pub fn has_learned(&self) -> bool {
+    pub(crate) fn has_learned(&self) -> bool {
         self.lowers || self.load != self.least
     }
 
     /// Returns the torque that the position controller must take over, N·m. The spring (`spring`, N·m) may have opposed a part of the load;
     /// that part no longer acts. If the spring carried a part of a doubted load, the position controller continues to carry it.
-    pub fn left(&self, spring: f64) -> f64 {
+    pub(crate) fn left(&self, spring: f64) -> f64 {
         if self.lowers {
             self.load
         } else {
@@ -219,17 +219,17 @@ impl Yield {
 
     /// Returns the torque that Teaching carries, N·m. If the load is doubted, this is only the part that the `spring` (N·m) has not
     /// opposed, because the rest may not exist.
-    pub fn taught_load(&self, spring: f64) -> f64 {
+    pub(crate) fn taught_load(&self, spring: f64) -> f64 {
         if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
     }
 
     /// Returns the torque of the load that the model lacks, N·m.
-    pub fn load(&self) -> f64 {
+    pub(crate) fn load(&self) -> f64 {
         self.load
     }
 
     /// Runs one tick. Returns spring, load and damper as the parts of a PID torque, N·m.
-    pub fn step(&mut self, joint: &Joint<'_>) -> PidTorque {
+    pub(crate) fn step(&mut self, joint: &Joint<'_>) -> PidTorque {
         let limit = joint.limits.torque_max;
         let most = joint.share * limit;
         let velocity = joint.velocity;
@@ -324,7 +324,7 @@ bit_codec!(Yielded { times, since_ms });
 
 impl Yielded {
     /// Runs one tick.
-    pub fn step(&mut self) {
+    pub(crate) fn step(&mut self) {
         self.since_ms = self.since_ms.saturating_add(1).min(AGAIN_MS);
         if self.since_ms == AGAIN_MS {
             self.times = [0; JOINTS];
@@ -332,7 +332,7 @@ impl Yielded {
     }
 
     /// Counts a yield of the joint. Returns `true` if the joint yields too often, so that its yield continues until the host clears it.
-    pub fn count(&mut self, joint: usize) -> bool {
+    pub(crate) fn count(&mut self, joint: usize) -> bool {
         self.since_ms = 0;
         let Some(times) = self.times.get_mut(joint) else { return false };
         *times = times.saturating_add(1);

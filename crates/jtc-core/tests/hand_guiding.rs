@@ -7,7 +7,7 @@ use jtc_wire::FrameType;
 
 const ERRORS: [f64; 2] = [0.9, 1.1];
 
-pub fn arms() -> [ArmFile; 6] {
+pub(crate) fn arms() -> [ArmFile; 6] {
     [
         ArmFile::avena(),
         ArmFile::ur5(),
@@ -19,7 +19,7 @@ pub fn arms() -> [ArmFile; 6] {
 }
 
 /// A pose in which gravity loads several joints, rad.
-pub fn pose(arm: &ArmFile) -> [f64; 6] {
+pub(crate) fn pose(arm: &ArmFile) -> [f64; 6] {
     match arm.name {
         "avena" => [0.0, 0.6, -1.0, 0.3, 0.4, 0.0],
         "z1" => [0.0, 1.5, -1.5, 0.0, 0.0, 0.0],
@@ -27,16 +27,16 @@ pub fn pose(arm: &ArmFile) -> [f64; 6] {
     }
 }
 
-pub fn fastest(arm: &Plant) -> f64 {
+pub(crate) fn fastest(arm: &Plant) -> f64 {
     arm.v.iter().fold(0.0, |fastest, v| v.abs().max(fastest))
 }
 
-pub fn farthest(arm: &Plant, from: &[f64; 6]) -> f64 {
+pub(crate) fn farthest(arm: &Plant, from: &[f64; 6]) -> f64 {
     (0..6).map(|j| (arm.q[j] - from[j]).abs()).fold(0.0, f64::max)
 }
 
 /// Begins Teaching as soon as it is possible.
-pub fn teach(plant: &mut Plant, rig: &mut Rig) {
+pub(crate) fn teach(plant: &mut Plant, rig: &mut Rig) {
     rig.send(FrameType::TeachingModeEnable, &[]);
     for _ in 0..9_000 {
         plant.tick(rig);
@@ -48,7 +48,14 @@ pub fn teach(plant: &mut Plant, rig: &mut Rig) {
 }
 
 /// Returns an arm that has been held for `ms`.
-pub fn held(arm: &ArmFile, mass: f64, payload: f64, friction: f64, q: [f64; 6], ms: usize) -> (Plant, Rig) {
+pub(crate) fn held(
+    arm: &ArmFile,
+    mass: f64,
+    payload: f64,
+    friction: f64,
+    q: [f64; 6],
+    ms: usize,
+) -> (Plant, Rig) {
     let model = loaded(heavier(arm.model, mass), payload);
     let mut plant = Plant::of(arm, &model, arm.friction(friction), q);
     let mut rig = plant.holding_arm(arm);
@@ -59,7 +66,7 @@ pub fn held(arm: &ArmFile, mass: f64, payload: f64, friction: f64, q: [f64; 6], 
 }
 
 /// Returns the longest motion (rad) and the highest speed (rad/s) of a joint within `ms` of Teaching without contact.
-pub fn untouched(plant: &mut Plant, rig: &mut Rig, ms: usize) -> (f64, f64) {
+pub(crate) fn untouched(plant: &mut Plant, rig: &mut Rig, ms: usize) -> (f64, f64) {
     let (from, mut way, mut speed) = (plant.q, 0.0_f64, 0.0_f64);
     for _ in 0..ms {
         plant.tick(rig);
@@ -126,7 +133,7 @@ fn j25_where_a_hand_lets_go_the_arm_stays_or_creeps() {
     }
 }
 
-pub fn highest_speed(plant: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
+pub(crate) fn highest_speed(plant: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     let mut speed = 0.0_f64;
     for _ in 0..ms {
         plant.tick(rig);

@@ -20,7 +20,7 @@ fn give(plant: &mut Plant, rig: &mut Rig, mass: f64) {
 }
 
 /// A hand leads a joint by `way` (rad) at `speed` (rad/s) while the other joints are free, and lets go.
-pub fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64) {
+pub(crate) fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64) {
     let (from, ms) = (plant.q[joint], (way.abs() / speed * 1000.0) as usize);
     for k in 0..ms + 500 {
         let to = from + way * f64::min(k as f64 / ms as f64, 1.0);

@@ -14,7 +14,7 @@ const WATCH_MS: usize = 6_000;
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
 /// A simulated arm without brakes, and its controller.
-pub struct Bench {
+pub(crate) struct Bench {
     pub arm: Plant,
     pub rig: Rig,
 }
@@ -22,7 +22,7 @@ pub struct Bench {
 impl Bench {
     /// Returns a bench that holds an arm at rest. The true masses are `mass` times those of the model, and the arm
     /// carries a `load` (kg) that the model lacks.
-    pub fn holding(config: Config, mass: f64, load: f64) -> Self {
+    pub(crate) fn holding(config: Config, mass: f64, load: f64) -> Self {
         let model = loaded(heavier(Parameters::avena().model, mass), load);
         let mut arm = Plant::new(&model, LuGre::of_avena_times(1.0), POSES[0]);
         let mut rig = arm.holding(config);
@@ -39,12 +39,12 @@ impl Bench {
         bench
     }
 
-    pub fn run(&mut self, ms: usize) {
+    pub(crate) fn run(&mut self, ms: usize) {
         self.arm.run(&mut self.rig, ms);
     }
 
     /// Runs until `is` returns `true`.
-    pub fn until(&mut self, what: &str, is: impl Fn(&Rig) -> bool) {
+    pub(crate) fn until(&mut self, what: &str, is: impl Fn(&Rig) -> bool) {
         for _ in 0..20_000 {
             if is(&self.rig) {
                 return;
@@ -54,19 +54,19 @@ impl Bench {
         panic!("never: {what}");
     }
 
-    pub fn send(&mut self, frame_type: FrameType, body: &[u8]) {
+    pub(crate) fn send(&mut self, frame_type: FrameType, body: &[u8]) {
         self.rig.send(frame_type, body);
     }
 
     /// Executes a motion of joints 2 and 3 from the present position of the arm.
-    pub fn execute(&mut self, way: f64, seconds: f64) {
+    pub(crate) fn execute(&mut self, way: f64, seconds: f64) {
         let mut to = POSES[0];
         to[1] += 0.6 * way;
         to[2] += 0.9 * way;
         pushed::begin(&mut self.rig, &pushed::motion(&POSES[0], &to, seconds));
     }
 
-    pub fn moves(rig: &Rig) -> bool {
+    pub(crate) fn moves(rig: &Rig) -> bool {
         rig.state() == ControllerState::Operate && rig.controller.telemetry().point > 20
     }
 
@@ -74,7 +74,7 @@ impl Bench {
         rig.controller.reactions().yields != 0
     }
 
-    pub fn jog(&mut self) {
+    pub(crate) fn jog(&mut self) {
         self.send(FrameType::Jog, &floats([0.2f32, 0.0, 0.0, 0.0, 0.0, 0.0]));
     }
 
@@ -98,8 +98,8 @@ impl Bench {
 }
 
 /// Activity of the controller.
-pub type Begin = fn(Config) -> Bench;
-pub const UNDER_WAY: [(&str, Begin); 11] = [
+pub(crate) type Begin = fn(Config) -> Bench;
+pub(crate) const UNDER_WAY: [(&str, Begin); 11] = [
     ("holds", |config| Bench::holding(config, 1.0, 1.0)),
     ("moves along a path", |config| {
         let mut bench = Bench::holding(config, 1.0, 0.0);

@@ -7,7 +7,7 @@ use plant::{ArmFile, LuGre, POSES, Plant, Random, heavier, loaded, standing};
 use rig::{Rig, floats, raw, segment_body};
 
 /// Returns a motion from one position to another in `seconds`, of 100 points.
-pub fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
+pub(crate) fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
     let step = (seconds * 10.0).round() as u16;
     let seconds = f64::from(step) * 0.099;
     let points = (0..100).map(|i| {
@@ -28,7 +28,7 @@ pub fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u
 }
 
 /// Uploads and executes a motion.
-pub fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
+pub(crate) fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
     rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, *step, points));
     rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
 }

@@ -218,11 +218,11 @@ pub(crate) struct Chain {
 impl Chain {
     /// Returns the transform of a joint. The direction of its axis is a constant of the shape.
     #[inline(always)]
-    pub fn transform<S: Shape>(&self, k: usize) -> JointTransform {
+    pub(crate) fn transform<S: Shape>(&self, k: usize) -> JointTransform {
         JointTransform { axes: S::AXES[k], ..self.transforms[k] }
     }
 
-    pub fn new(model: &ArmModel, gravity: [f64; 3], payload: &Payload) -> Self {
+    pub(crate) fn new(model: &ArmModel, gravity: [f64; 3], payload: &Payload) -> Self {
         let placements = model.joints.map(|o| Placement { rotation: joint_rotation(&o.rpy), xyz: o.xyz });
         let none = JointTransform { sin: 0.0, cos: 1.0, axes: Axes::Any, offset: 0.0, p: [0.0; 2] };
         let mut transforms = [none; JOINTS];

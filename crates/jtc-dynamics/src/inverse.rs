@@ -25,7 +25,7 @@ pub(crate) struct JointSinesCosines {
 
 impl JointSinesCosines {
     #[inline(always)]
-    pub fn new(chain: &Chain, q: &JointVec) -> Self {
+    pub(crate) fn new(chain: &Chain, q: &JointVec) -> Self {
         let mut angle = *q;
         for k in 0..JOINTS {
             angle[k] += chain.transforms[k].offset;

@@ -294,7 +294,7 @@ impl Plan<'_> {
     }
 
     /// Returns the time factor that each cell needs to keep its limits.
-    pub fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
+    pub(crate) fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {
             let mut stretch = verify::kinematic_stretch(piece, self.limits);

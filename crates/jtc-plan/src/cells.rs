@@ -149,7 +149,7 @@ pub(crate) fn planned_torque(arm: &ArmDynamics, limits: &Limits, j: usize, hold:
 
 impl Room {
     /// Computes the available torque for a squared parameter speed of at most `cap`.
-    pub fn new(end: &End, loads: &Loads, cap: f64, limits: &Limits, arm: &ArmDynamics) -> Self {
+    pub(crate) fn new(end: &End, loads: &Loads, cap: f64, limits: &Limits, arm: &ArmDynamics) -> Self {
         let mut room = Self { high: [0.0; JOINTS], low: [0.0; JOINTS], limit: [0.0; JOINTS] };
         for j in 0..JOINTS {
             let limit = planned_torque(arm, limits, j, loads.hold[j]);
@@ -174,12 +174,12 @@ impl Room {
 
 impl Cell {
     /// Returns `true` if the path has no curvature in this cell.
-    pub fn is_straight(&self) -> bool {
+    pub(crate) fn is_straight(&self) -> bool {
         self.ends.iter().all(|end| end.point.second == [0.0; JOINTS])
     }
 
     /// Returns the highest squared speed that the velocity limits permit.
-    pub fn speed_cap(&self, limits: &Limits) -> f64 {
+    pub(crate) fn speed_cap(&self, limits: &Limits) -> f64 {
         let mut cap = f64::INFINITY;
         for end in &self.ends {
             for j in 0..JOINTS {
@@ -195,7 +195,7 @@ impl Cell {
     /// # Errors
     ///
     /// Returns the joint without available torque at any speed, with the required torque and its limit.
-    pub fn friction_cap(
+    pub(crate) fn friction_cap(
         &self,
         mut cap: f64,
         limits: &Limits,
@@ -234,7 +234,7 @@ impl Cell {
     /// Returns limits of the parameter speed (its square is at most `cap`) and of the parameter acceleration. The two
     /// limits are independent: any combination within both keeps the joints within their limits. The curvature may use
     /// `share` of the acceleration and jerk limits. Friction is considered up to the squared speed `reached`.
-    pub fn bounds(
+    pub(crate) fn bounds(
         &self,
         cap: f64,
         reached: f64,

@@ -31,18 +31,18 @@ pub(crate) struct Section<'a> {
 
 impl Section<'_> {
     /// Returns position and derivatives at the parameter `s`, evaluated inside the interval `side` between two breaks.
-    pub fn at(&self, s: f64, side: (f64, f64)) -> PathPoint {
+    pub(crate) fn at(&self, s: f64, side: (f64, f64)) -> PathPoint {
         self.path.at(s.clamp(side.0.next_up(), side.1.next_down().max(side.0.next_up())))
     }
 
     /// Returns start and end of each part (a part lies between two breaks).
-    pub fn parts(&self) -> impl Iterator<Item = (f64, f64)> {
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (f64, f64)> {
         let ends = || self.breaks.iter().copied();
         std::iter::once(self.from).chain(ends()).zip(ends().chain([self.to]))
     }
 
     /// Returns the motion along the section. The first waypoint time is the start of the section.
-    pub fn motion(&self, law: &Law, limits: &Limits) -> Motion {
+    pub(crate) fn motion(&self, law: &Law, limits: &Limits) -> Motion {
         let mut pieces = Vec::new();
         let shortest = if limits.has_jerk() { SHORTEST } else { SHORTEST_WITHOUT_JERK };
         for (part, (begin, end)) in self.parts().zip(self.times(law)) {

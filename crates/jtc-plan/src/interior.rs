@@ -179,13 +179,13 @@ pub(crate) struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Starts near a law.
-    pub fn new(plan: &'a Plan<'a>, near: &Law) -> Option<Self> {
+    pub(crate) fn new(plan: &'a Plan<'a>, near: &Law) -> Option<Self> {
         let c = Problem::new(plan, &vec![1.0; plan.cells.len()])?.near(near);
         Some(Self { plan, c, found: false })
     }
 
     /// Returns the fastest law with a time factor for each cell.
-    pub fn fastest(&mut self, slower: &[f64]) -> Option<Law> {
+    pub(crate) fn fastest(&mut self, slower: &[f64]) -> Option<Law> {
         let problem = Problem::new(self.plan, slower)?;
         if self.found {
             // Scales the previous solution down in the cells that `slower` slows down.

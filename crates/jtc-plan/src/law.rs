@@ -16,7 +16,7 @@ pub(crate) struct Phase {
 
 impl Phase {
     /// Returns the parameter and its first two derivatives, `t` seconds after the start.
-    pub fn at(&self, t: f64) -> (f64, f64, f64) {
+    pub(crate) fn at(&self, t: f64) -> (f64, f64, f64) {
         let (v, a, j) = (self.speed, self.acceleration, self.jerk);
         (self.s + t * (v + t * (0.5 * a + t * j / 6.0)), v + t * (a + 0.5 * t * j), a + t * j)
     }
@@ -35,7 +35,7 @@ pub(crate) struct Law {
 impl Law {
     /// Creates the law along the vertices (parameter, squared speed). Between two vertices the squared speed is linear
     /// in the parameter, so the acceleration is constant.
-    pub fn of_vertices(vertices: &[(f64, f64)]) -> Self {
+    pub(crate) fn of_vertices(vertices: &[(f64, f64)]) -> Self {
         let mut phases = Vec::with_capacity(vertices.len());
         let mut start = 0.0;
         for pair in vertices.windows(2) {
@@ -52,12 +52,12 @@ impl Law {
     }
 
     /// Returns the duration, s.
-    pub fn duration(&self) -> f64 {
+    pub(crate) fn duration(&self) -> f64 {
         self.phases.last().map_or(0.0, |p| p.start + p.length)
     }
 
     /// Returns the parameter and its first two derivatives at `t`.
-    pub fn at(&self, t: f64) -> (f64, f64, f64) {
+    pub(crate) fn at(&self, t: f64) -> (f64, f64, f64) {
         let moving = |speed: f64| if self.rests { 0.0 } else { speed };
         if t <= 0.0 {
             return self.phases.first().map_or((0.0, 0.0, 0.0), |p| (0.0, moving(p.speed), p.acceleration));
@@ -72,7 +72,7 @@ impl Law {
     }
 
     /// Like [`Law::at`], just after `t` (1) or just before it (−1), because the acceleration may jump at `t`.
-    pub fn beside(&self, t: f64, after: f64) -> (f64, f64, f64) {
+    pub(crate) fn beside(&self, t: f64, after: f64) -> (f64, f64, f64) {
         const NEAR: f64 = 1e-10;
         let (s, speed, _) = self.at(t);
         let inside = (t + after * NEAR).clamp(NEAR, self.duration() - NEAR);
@@ -80,7 +80,7 @@ impl Law {
     }
 
     /// Returns the time at which the parameter is `s`.
-    pub fn time_of(&self, s: f64) -> f64 {
+    pub(crate) fn time_of(&self, s: f64) -> f64 {
         if s <= 0.0 {
             return 0.0;
         }
@@ -110,7 +110,7 @@ impl Law {
 
     /// Returns the law averaged over a window of `window` seconds. Each jump of the acceleration becomes a ramp of that
     /// length, and the law takes `window` seconds longer. Only for laws without a jerk limit.
-    pub fn averaged(&self, window: f64) -> Self {
+    pub(crate) fn averaged(&self, window: f64) -> Self {
         let ends: Vec<f64> = self.phases.iter().map(|p| p.start).chain([self.duration()]).collect();
         let mut times: Vec<f64> = ends.iter().copied().chain(ends.iter().map(|t| t + window)).collect();
         times.sort_by(f64::total_cmp);

@@ -35,7 +35,7 @@ pub(crate) struct Piece {
 
 impl Piece {
     /// Returns the piece that leads from one state to another (Hermite).
-    pub fn between(start: f64, length: f64, a: &State, b: &State) -> Self {
+    pub(crate) fn between(start: f64, length: f64, a: &State, b: &State) -> Self {
         let h = length;
         let coefficients = std::array::from_fn(|j| {
             let (p, v, c) = (a.position[j], a.velocity[j], 0.5 * a.acceleration[j]);
@@ -53,7 +53,7 @@ impl Piece {
     }
 
     /// Returns the state `t` seconds after the start.
-    pub fn at(&self, t: f64) -> State {
+    pub(crate) fn at(&self, t: f64) -> State {
         let mut state = State::default();
         for (j, c) in self.coefficients.iter().enumerate() {
             let [c0, c1, c2, c3, c4, c5] = *c;
@@ -65,12 +65,12 @@ impl Piece {
     }
 
     /// Returns the third derivative `t` seconds after the start, rad/s³.
-    pub fn jerk(&self, t: f64) -> JointVec {
+    pub(crate) fn jerk(&self, t: f64) -> JointVec {
         self.coefficients.map(|[_, _, _, c3, c4, c5]| 6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
     }
 
     /// Returns the piece with the same path, taking `factor` times as long.
-    pub fn stretched(&self, factor: f64) -> Self {
+    pub(crate) fn stretched(&self, factor: f64) -> Self {
         let mut coefficients = self.coefficients;
         for c in &mut coefficients {
             let mut power = 1.0;

@@ -132,7 +132,7 @@ fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) ->
 impl Reasons {
     /// Returns one list for a motion that takes `duration` s: the limits that are reached, and between them the other
     /// binding limits.
-    pub fn joined(&self, duration: f64) -> Vec<Binding> {
+    pub(crate) fn joined(&self, duration: f64) -> Vec<Binding> {
         let mut all: Vec<Binding> = Vec::new();
         let mut take = |next: Binding| match all.last_mut() {
             _ if next.to <= next.from => {}

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use jtc_bus::{Frame, JOINTS, NODES, Scale};
 use jtc_core::BusState;
 
-pub use nodes::Nodes;
+pub(crate) use nodes::Nodes;
 
 use crate::jitter::Jitter;
 use crate::request::NodeRequest;

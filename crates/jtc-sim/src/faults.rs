@@ -296,13 +296,13 @@ pub(crate) struct Running {
 }
 
 impl Running {
-    pub fn new(plan: &FaultPlan) -> Self {
+    pub(crate) fn new(plan: &FaultPlan) -> Self {
         let faults: Vec<_> = plan.faults.iter().map(|f| (*f, Phase::Waiting)).collect();
         Self { open: faults.len(), faults }
     }
 
     /// Adds a fault.
-    pub fn add(&mut self, fault: Fault) {
+    pub(crate) fn add(&mut self, fault: Fault) {
         // A soak run adds faults continuously, so ended faults are removed.
         self.faults.retain(|(_, phase)| *phase != Phase::Over);
         self.faults.push((fault, Phase::Waiting));
@@ -310,12 +310,18 @@ impl Running {
     }
 
     /// Returns the kinds of the active faults.
-    pub fn active(&self) -> impl Iterator<Item = FaultKind> + '_ {
+    pub(crate) fn active(&self) -> impl Iterator<Item = FaultKind> + '_ {
         self.faults.iter().filter(|(_, phase)| matches!(phase, Phase::Active(_))).map(|(fault, _)| fault.kind)
     }
 
     /// Begins and ends faults at `now` (ms), depending on the controller's state and point index.
-    pub fn step(&mut self, now: u64, state: ControllerState, point: u32, mut change: impl FnMut(Change)) {
+    pub(crate) fn step(
+        &mut self,
+        now: u64,
+        state: ControllerState,
+        point: u32,
+        mut change: impl FnMut(Change),
+    ) {
         if self.open == 0 {
             return;
         }

@@ -99,7 +99,7 @@ pub(crate) struct FrictionTorques {
 impl FrictionTorques {
     /// Creates the friction of all joints. `rotor` is the inertia of the rotors at the joints, kg·m². `reach` is the
     /// speed up to which polynomials are valid, rad/s.
-    pub fn new(
+    pub(crate) fn new(
         model: FrictionModel,
         curves: [SimFriction; JOINTS],
         rotor: &JointVec,
@@ -135,7 +135,7 @@ impl FrictionTorques {
     }
 
     /// Updates the curves to these bearing temperatures (°C), multiplied by `scale`.
-    pub fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
+    pub(crate) fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
         for j in 0..JOINTS {
             let t = temperature[j];
             match &self.curves[j] {
@@ -165,14 +165,14 @@ impl FrictionTorques {
     }
 
     /// Makes the next [`warm`](Self::warm) also update the tables, because a scale has changed.
-    pub fn forget_tables(&mut self) {
+    pub(crate) fn forget_tables(&mut self) {
         self.table_temperature = [f64::NAN; JOINTS];
     }
 
     /// Returns the friction torque, which acts against the motion, for velocities `v` (rad/s) and bristle deflections
     /// `z` (rad), N·m.
     #[inline]
-    pub fn at(&self, v: &JointVec, z: &JointVec) -> JointVec {
+    pub(crate) fn at(&self, v: &JointVec, z: &JointVec) -> JointVec {
         let [k0, k1, k2, k3] = &self.k;
         let viscous = |j: usize| {
             let u = v[j].max(-self.reach[j]).min(self.reach[j]);
@@ -206,7 +206,7 @@ impl FrictionTorques {
 
     /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, at least 0. The effects around standstill
     /// are excluded, because their slope has a separate bound.
-    pub fn steepness(&self, v: &JointVec) -> JointVec {
+    pub(crate) fn steepness(&self, v: &JointVec) -> JointVec {
         core::array::from_fn(|j| match &self.tables[j] {
             Some(table) => table.slope(v[j]).max(0.0),
             None if v[j].abs() < self.reach[j] => self.polynomial_slope(j, v[j].abs()).max(0.0),
@@ -225,7 +225,7 @@ impl FrictionTorques {
     /// constant velocity the exact solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). Replacing e by
     /// 1/(1 + x + x²/2) gives second order without an exponential, and converges to the exact end value g/σ0 for any x.
     #[inline]
-    pub fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {
+    pub(crate) fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {
         let FrictionModel::LuGre(lugre) = self.model else { return *z };
         let inverse = 1.0 / lugre.stribeck_speed;
         core::array::from_fn(|j| {

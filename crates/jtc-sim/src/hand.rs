@@ -61,13 +61,13 @@ struct Led {
 }
 
 impl Hand {
-    pub fn new(path: HandPath) -> Self {
+    pub(crate) fn new(path: HandPath) -> Self {
         Self { path, led: None }
     }
 
     /// Returns the hand's torque in this millisecond, N·m, for an arm at `q`, `qd`. The hand waits for Teaching. At the
     /// end of the path or of Teaching it releases the arm (`None`).
-    pub fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
+    pub(crate) fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
         if !teaching {
             return if self.led.is_some() { None } else { Some([0.0; JOINTS]) };
         }

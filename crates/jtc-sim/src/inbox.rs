@@ -10,7 +10,7 @@ const DEPTH: usize = 3;
 
 /// The receive buffer of a node.
 #[derive(Clone, Debug)]
-pub struct Inbox {
+pub(crate) struct Inbox {
     one_per_interrupt: bool,
     waiting: VecDeque<NodeRequest>,
     last_us: Option<u64>,
@@ -19,12 +19,12 @@ pub struct Inbox {
 impl Inbox {
     /// Creates a buffer. With `one_per_interrupt`, the second of two requests back to back stays in the buffer until
     /// another request arrives.
-    pub fn new(one_per_interrupt: bool) -> Self {
+    pub(crate) fn new(one_per_interrupt: bool) -> Self {
         Self { one_per_interrupt, waiting: VecDeque::new(), last_us: None }
     }
 
     /// Stores a request that arrives at `now_us`, and returns the request that the node reads at that time.
-    pub fn take(&mut self, now_us: u64, request: &NodeRequest) -> Option<NodeRequest> {
+    pub(crate) fn take(&mut self, now_us: u64, request: &NodeRequest) -> Option<NodeRequest> {
         if !self.one_per_interrupt {
             return Some(*request);
         }

@@ -14,13 +14,13 @@ use crate::error::{Failure, in_python};
 
 /// An arm as described by a file. The object does not change.
 #[pyclass(frozen, module = "openjtc")]
-pub struct Arm {
+pub(crate) struct Arm {
     pub inner: Arc<HostArm>,
 }
 
 impl Arm {
     /// Wraps an arm for Python.
-    pub fn of(arm: HostArm) -> Self {
+    pub(crate) fn of(arm: HostArm) -> Self {
         Self { inner: Arc::new(arm) }
     }
 }
@@ -171,6 +171,6 @@ impl Arm {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Arm>()
 }

@@ -12,7 +12,10 @@ use pyo3::prelude::*;
 use crate::error::Failure;
 
 /// Reads a numpy array, or a list or tuple, as floats.
-pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyArrayDyn<'py, f64>, Failure> {
+pub(crate) fn floats<'py>(
+    value: &Bound<'py, PyAny>,
+    what: &str,
+) -> Result<PyReadonlyArrayDyn<'py, f64>, Failure> {
     let made = || -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let numpy = value.py().import("numpy")?;
         let array = numpy.call_method1("ascontiguousarray", (value, "float64"))?;
@@ -26,7 +29,7 @@ pub fn floats<'py>(value: &Bound<'py, PyAny>, what: &str) -> Result<PyReadonlyAr
 }
 
 /// Reads six finite numbers, base to wrist. `what` describes them in the error.
-pub fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Failure> {
+pub(crate) fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Failure> {
     let array = floats(value, what)?;
     let numbers = array.as_slice().ok().and_then(|all| <[f64; JOINTS]>::try_from(all).ok());
     let numbers = numbers.filter(|_| array.ndim() == 1).ok_or_else(|| {
@@ -38,7 +41,7 @@ pub fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Fai
 }
 
 /// Reads rows of six finite numbers. The flag is `true` for one row without a second dimension.
-pub fn rows(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<[f64; JOINTS]>, bool), Failure> {
+pub(crate) fn rows(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<[f64; JOINTS]>, bool), Failure> {
     let array = floats(value, what)?;
     let shape = array.shape().to_vec();
     let one = shape == [JOINTS];
@@ -70,18 +73,18 @@ fn finite(rows: &[[f64; JOINTS]], what: &str) -> Result<(), Failure> {
 }
 
 /// Makes an (N, 6) array.
-pub fn matrix<'py>(py: Python<'py>, rows: &[[f64; JOINTS]]) -> Bound<'py, PyArray2<f64>> {
+pub(crate) fn matrix<'py>(py: Python<'py>, rows: &[[f64; JOINTS]]) -> Bound<'py, PyArray2<f64>> {
     wide(py, rows)
 }
 
 /// Makes an (N, M) array.
-pub fn wide<'py, const M: usize>(py: Python<'py>, rows: &[[f64; M]]) -> Bound<'py, PyArray2<f64>> {
+pub(crate) fn wide<'py, const M: usize>(py: Python<'py>, rows: &[[f64; M]]) -> Bound<'py, PyArray2<f64>> {
     let flat = PyArray1::from_slice(py, rows.as_flattened());
     flat.reshape([rows.len(), M]).unwrap_or_else(|_| PyArray2::zeros(py, [rows.len(), M], false))
 }
 
 /// Makes a (6,) array if the input was one row, else an (N, 6) array.
-pub fn as_given<'py>(py: Python<'py>, rows: &[[f64; JOINTS]], one: bool) -> Bound<'py, PyAny> {
+pub(crate) fn as_given<'py>(py: Python<'py>, rows: &[[f64; JOINTS]], one: bool) -> Bound<'py, PyAny> {
     match rows {
         [row] if one => PyArray1::from_slice(py, row).into_any(),
         rows => matrix(py, rows).into_any(),

@@ -13,24 +13,24 @@ use crate::error::Failure;
 use crate::telemetry::Telemetry;
 
 /// Frame of the joint bus in the form of Python.
-pub type PyFrame<'py> = (u16, Bound<'py, PyBytes>);
+pub(crate) type PyFrame<'py> = (u16, Bound<'py, PyBytes>);
 
 /// Outputs of a tick: frame for the bus, bytes for the host, safety output, and `true` if the watchdog reset the controller.
 type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool);
 
 /// Converts a frame of the joint bus from Python.
-pub fn frame(id: u32, data: &[u8]) -> Result<Frame, Failure> {
+pub(crate) fn frame(id: u32, data: &[u8]) -> Result<Frame, Failure> {
     Frame::received(id, Format::BUS, data).map_err(|error| Failure::usage(error.to_string()))
 }
 
 /// Converts a frame of the joint bus to Python.
-pub fn to_python<'py>(py: Python<'py>, frame: &Frame) -> PyFrame<'py> {
+pub(crate) fn to_python<'py>(py: Python<'py>, frame: &Frame) -> PyFrame<'py> {
     (frame.id, PyBytes::new(py, frame.data()))
 }
 
 /// Returns the settings of a controller for an arm, and the stored image of the arm. Without an arm, returns the settings of a
 /// new controller.
-pub fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failure> {
+pub(crate) fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failure> {
     let Some(arm) = arm else { return Ok((Config::avena(), None)) };
     let image = arm.image().map_err(|error| Failure::usage(error.to_string()))?;
     // With an image, the controller reads all data from the image, like on a board. Without an image, it only has the limits and waits
@@ -40,7 +40,7 @@ pub fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failur
 
 /// Controller on its board. Time advances only with its ticks.
 #[pyclass(module = "openjtc._native")]
-pub struct Controller {
+pub(crate) struct Controller {
     board: Board,
     now_us: u64,
     /// Level of the safety output pin. A missing tick does not change it.
@@ -105,6 +105,6 @@ impl Controller {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Controller>()
 }

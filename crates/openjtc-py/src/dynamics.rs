@@ -15,10 +15,10 @@ use crate::array;
 use crate::error::Failure;
 
 /// Payload from Python: mass, centre of mass, inertia.
-pub type PayloadNumbers = (f64, [f64; 3], [f64; 6]);
+pub(crate) type PayloadNumbers = (f64, [f64; 3], [f64; 6]);
 
 /// Makes a payload, or returns an error if it is not physically consistent.
-pub fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failure> {
+pub(crate) fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failure> {
     let Some((mass, com, inertia)) = numbers else { return Ok(Payload::NONE) };
     let payload = Payload { mass, com, inertia };
     payload.check().map_err(|error| Failure::usage(error.to_string()))?;
@@ -27,7 +27,7 @@ pub fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failure> {
 
 /// Dynamics of one arm. The object does not change.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct Dynamics {
+pub(crate) struct Dynamics {
     arm: Arc<HostArm>,
     dynamics: ArmDynamics,
     kinematics: Kinematics,
@@ -321,6 +321,6 @@ fn pose_failure(error: PoseError) -> Failure {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Dynamics>()
 }

@@ -75,7 +75,7 @@ impl<E: Diagnose> From<E> for Failure {
 }
 
 /// Returns a next step in terms of Python. Commands of `ucom` stay as they are typed.
-pub fn in_python(next: &Next) -> String {
+pub(crate) fn in_python(next: &Next) -> String {
     let text = next.sentence(FrontEnd::Python);
     if text.contains("`ucom ") { text.replace('`', "") } else { text }
 }

@@ -9,13 +9,13 @@ use serde_json::Value;
 use crate::error::Failure;
 
 /// Converts a serialisable value to plain Python values.
-pub fn plain<'py>(py: Python<'py>, value: &impl Serialize) -> Result<Bound<'py, PyAny>, Failure> {
+pub(crate) fn plain<'py>(py: Python<'py>, value: &impl Serialize) -> Result<Bound<'py, PyAny>, Failure> {
     let value = serde_json::to_value(value).map_err(|e| Failure::usage(e.to_string()))?;
     to_python(py, &value).map_err(|e| Failure::usage(e.to_string()))
 }
 
 /// Converts a JSON value to plain Python values.
-pub fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     match value {
         Value::Null => Ok(py.None().into_bound(py)),
         Value::Bool(value) => value.into_bound_py_any(py),

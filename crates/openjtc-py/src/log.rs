@@ -10,13 +10,13 @@ use crate::run::Samples;
 
 /// Log that was read from a controller.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct FlightLog {
+pub(crate) struct FlightLog {
     account: Account,
 }
 
 impl FlightLog {
     /// Wraps a log for Python.
-    pub fn of(account: Account) -> Self {
+    pub(crate) fn of(account: Account) -> Self {
         Self { account }
     }
 }
@@ -65,6 +65,6 @@ impl FlightLog {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<FlightLog>()
 }

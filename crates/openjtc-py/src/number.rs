@@ -9,7 +9,7 @@ use host_kit::Facts;
 use crate::error::Failure;
 
 /// Returns the number if it is in this range, else an error. `what` and `unit` describe the number in the error.
-pub fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) -> Result<f64, Failure> {
+pub(crate) fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) -> Result<f64, Failure> {
     if range.contains(&value) {
         return Ok(value);
     }
@@ -23,13 +23,13 @@ pub fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) ->
 }
 
 /// Returns a duration of up to `most` seconds.
-pub fn seconds(value: f64, most: f64, what: &str) -> Result<Duration, Failure> {
+pub(crate) fn seconds(value: f64, most: f64, what: &str) -> Result<Duration, Failure> {
     within(value, 0.0..=most, what, "s").map(Duration::from_secs_f64)
 }
 
 /// Returns a timeout from seconds. A negative number means no wait. A number that is too large for the clock means a
 /// wait without limit.
-pub fn timeout(value: f64, what: &str) -> Result<Duration, Failure> {
+pub(crate) fn timeout(value: f64, what: &str) -> Result<Duration, Failure> {
     if value.is_nan() {
         return seconds(value, f64::INFINITY, what);
     }

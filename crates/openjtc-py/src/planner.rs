@@ -21,7 +21,7 @@ use crate::trajectory::Trajectory;
 use crate::{array, json};
 
 /// Converts a verdict to plain values, with refusals and warnings in words.
-pub fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, PyAny>> {
     let all = json::plain(py, verdict)?;
     all.set_item("ok", verdict.is_ok())?;
     all.set_item("text", verdict.to_string())?;
@@ -35,7 +35,7 @@ pub fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, P
 
 /// Planned motion that passed the check.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct Plan {
+pub(crate) struct Plan {
     planned: Planned,
     samples: Vec<jtc_host::Sample>,
     info: RecordingInfo,
@@ -76,7 +76,7 @@ impl Plan {
 
 /// Planner for one arm.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct Planner {
+pub(crate) struct Planner {
     arm: Arc<jtc_host::Arm>,
     config: jtc_core::Config,
     speed: f64,
@@ -141,7 +141,7 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
 }
 
 /// Returns the torque margin of the call (%), or the default.
-pub fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
+pub(crate) fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
     let percent = given.unwrap_or(MARGIN_PCT);
     margin_in_range(percent)?;
     Ok(percent)
@@ -293,7 +293,7 @@ fn thinned<'py>(
 }
 
 /// Registers the classes and functions.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Planner>()?;
     module.add_class::<Plan>()?;
     module.add_function(wrap_pyfunction!(thinned, module)?)?;

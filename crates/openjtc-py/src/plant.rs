@@ -18,7 +18,7 @@ const BRING_UP_MS: u64 = 2_000;
 
 /// Arm with drives, or the arm alone.
 #[pyclass(module = "openjtc._native")]
-pub struct Plant {
+pub(crate) struct Plant {
     config: SimConfig,
     plant: SimPlant,
     drives: bool,
@@ -183,6 +183,6 @@ impl Plant {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Plant>()
 }

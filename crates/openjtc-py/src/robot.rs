@@ -1,7 +1,7 @@
 //! Connection to a controller: one thread runs the session, and the Python threads send jobs to it.
 
 mod commands;
-pub mod motion;
+pub(crate) mod motion;
 mod motion_handle;
 mod port;
 mod queries;
@@ -9,7 +9,7 @@ mod recording;
 mod shared;
 mod tape;
 mod worker;
-pub mod worker_state;
+pub(crate) mod worker_state;
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, mpsc};
@@ -29,7 +29,7 @@ use crate::trajectory::Trajectory;
 use crate::{array, number};
 use motion::{Course, Order};
 use motion_handle::Motion;
-pub use queries::samples as samples_of;
+pub(crate) use queries::samples as samples_of;
 use shared::{Asked, Wish};
 use worker::{Waited, Worker, lock};
 use worker_state::{Simulated, Target, Way, WorkerState};
@@ -43,7 +43,7 @@ const TEACH_MAX: f64 = 3600.0;
 
 /// Connection of `openjtc.Robot`.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct Link {
+pub(crate) struct Link {
     worker: Worker,
 }
 
@@ -331,7 +331,7 @@ impl Link {
 }
 
 /// Registers the classes.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Link>()?;
     module.add_class::<Motion>()
 }

@@ -17,7 +17,7 @@ use crate::{array, json};
 
 /// Samples of a run, a plan or a flight recorder, with their metadata.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct Samples {
+pub(crate) struct Samples {
     outcome: String,
     info: RecordingInfo,
     samples: Vec<Sample>,
@@ -29,14 +29,14 @@ pub struct Samples {
 
 impl Samples {
     /// Makes the samples of a run.
-    pub fn of_run(ran: Ran) -> Self {
+    pub(crate) fn of_run(ran: Ran) -> Self {
         let Ran { outcome, broken, info, samples, upload, link, baud, notes, .. } = ran;
         let facts = upload.map(|upload| Facts::of_link(&upload, &link, baud)).into_iter().collect();
         Self { outcome: outcome.into(), info, samples, facts, broken, binding: None, notes }
     }
 
     /// Makes the samples of a planned motion.
-    pub fn of_plan(
+    pub(crate) fn of_plan(
         info: RecordingInfo,
         samples: Vec<Sample>,
         binding: Vec<Binding>,
@@ -47,7 +47,7 @@ impl Samples {
     }
 
     /// Makes the samples of a flight recorder.
-    pub fn of_log(info: RecordingInfo, samples: Vec<Sample>, broken: Option<RunFailure>) -> Self {
+    pub(crate) fn of_log(info: RecordingInfo, samples: Vec<Sample>, broken: Option<RunFailure>) -> Self {
         let outcome = "log".into();
         Self { outcome, info, samples, facts: Vec::new(), broken, binding: None, notes: Vec::new() }
     }
@@ -155,6 +155,6 @@ impl Samples {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Samples>()
 }

@@ -17,7 +17,7 @@ type ErrorNumbers = (f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>);
 /// frictions.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct SimulatedArm<'py> {
+pub(crate) struct SimulatedArm<'py> {
     arm: Option<Bound<'py, Arm>>,
     seed: u64,
     payload: Option<PayloadNumbers>,
@@ -30,7 +30,7 @@ pub struct SimulatedArm<'py> {
 
 impl SimulatedArm<'_> {
     /// Makes the configuration of the simulation, including the settings of the controller and its stored arm.
-    pub fn config(&self) -> Result<SimConfig, Failure> {
+    pub(crate) fn config(&self) -> Result<SimConfig, Failure> {
         let arm = self.arm.as_ref().map(|arm| &*arm.get().inner);
         let mut config = match arm {
             None => SimConfig::default(),
@@ -94,7 +94,7 @@ fn in_range(what: &str, numbers: &[f64; JOINTS], (low, high): (f64, f64), unit: 
 const SLICE_MS: u64 = 1_000;
 
 /// Advances the simulation by `ms` milliseconds, without the GIL.
-pub fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send) -> PyResult<()> {
+pub(crate) fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send) -> PyResult<()> {
     let mut left = ms;
     while left > 0 {
         let slice = left.min(SLICE_MS);
@@ -106,7 +106,7 @@ pub fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send) -> Py
 }
 
 /// Parses the support of the arm while its drives are not enabled.
-pub fn support(name: &str) -> Result<Support, Failure> {
+pub(crate) fn support(name: &str) -> Result<Support, Failure> {
     Ok(match name {
         "brakes" => Support::Brakes,
         "stand" => Support::Stand,
@@ -119,7 +119,7 @@ pub fn support(name: &str) -> Result<Support, Failure> {
 }
 
 /// Parses faults from the text of a fault file. Paths of hand files are relative to the working directory of Python.
-pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
+pub(crate) fn faults(text: &str) -> Result<FaultPlan, Failure> {
     let load = |file: &str| {
         let trajectory = Loaded::load(file.as_ref(), None).map_err(|error| error.to_string())?.trajectory;
         let points = trajectory.points.iter().map(|point| point.position).collect();
@@ -130,7 +130,7 @@ pub fn faults(text: &str) -> Result<FaultPlan, Failure> {
 }
 
 /// Makes the path of a hand that leads the arm.
-pub fn hand(points: Vec<[f64; JOINTS]>, step_s: f64) -> Result<HandPath, Failure> {
+pub(crate) fn hand(points: Vec<[f64; JOINTS]>, step_s: f64) -> Result<HandPath, Failure> {
     HandPath::new(points, step_s).ok_or_else(|| {
         Failure::usage(format!(
             "hand: expected at least one point and a step above 0 s; the step is {step_s} s"

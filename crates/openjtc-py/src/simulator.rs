@@ -19,7 +19,7 @@ type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool);
 
 /// Simulated system with a controller.
 #[pyclass(module = "openjtc._native")]
-pub struct Simulator {
+pub(crate) struct Simulator {
     world: World,
 }
 
@@ -160,7 +160,11 @@ impl Simulator {
 }
 
 /// Returns one array of true values of the arm.
-pub fn truth<'py>(py: Python<'py>, truth: &Truth, what: &str) -> Result<Bound<'py, PyArray1<f64>>, Failure> {
+pub(crate) fn truth<'py>(
+    py: Python<'py>,
+    truth: &Truth,
+    what: &str,
+) -> Result<Bound<'py, PyArray1<f64>>, Failure> {
     let values: &[f64; JOINTS] = match what {
         "position" => &truth.q,
         "velocity" => &truth.qd,
@@ -173,6 +177,6 @@ pub fn truth<'py>(py: Python<'py>, truth: &Truth, what: &str) -> Result<Bound<'p
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Simulator>()
 }

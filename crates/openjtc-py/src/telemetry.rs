@@ -7,7 +7,7 @@ use pyo3::types::PyBytes;
 
 /// Values of one tick of the controller. Arrays have six numbers, base to wrist.
 #[pyclass(frozen, module = "openjtc._native", eq)]
-pub struct Telemetry(pub CoreTelemetry);
+pub(crate) struct Telemetry(pub CoreTelemetry);
 
 impl PartialEq for Telemetry {
     /// Compares bit for bit.
@@ -239,6 +239,6 @@ impl Telemetry {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Telemetry>()
 }

@@ -18,7 +18,7 @@ use crate::error::Failure;
 /// `time` (N,) is in s and `duration` in s; `position`, `velocity` and `acceleration` (N, 6) are in rad, rad/s and rad/s², one column per
 /// joint, base to wrist.
 #[pyclass(frozen, module = "openjtc")]
-pub struct Trajectory {
+pub(crate) struct Trajectory {
     pub inner: Arc<HostTrajectory>,
     /// Notes on data that was derived, resampled or left out by the reader.
     notes: Vec<String>,
@@ -26,7 +26,7 @@ pub struct Trajectory {
 
 impl Trajectory {
     /// Wraps a trajectory for Python.
-    pub fn of(trajectory: HostTrajectory) -> Self {
+    pub(crate) fn of(trajectory: HostTrajectory) -> Self {
         Self { inner: Arc::new(trajectory), notes: Vec::new() }
     }
 
@@ -161,6 +161,6 @@ impl Trajectory {
 }
 
 /// Registers the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Trajectory>()
 }

@@ -24,7 +24,7 @@ mod worker_state;
 use pyo3::prelude::*;
 
 /// Adds the classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<chain::Chain>()?;
     module.add_class::<recording::ChainRecording>()?;
     module.add_class::<samples::ChainSamples>()?;

@@ -250,7 +250,7 @@ fn configured_answer(py: Python<'_>, number: u8, accepted: bool) -> Result<PyFra
 }
 
 /// Registers the functions and the class.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<StatusReader>()?;
     module.add_function(wrap_pyfunction!(encode_command, module)?)?;
     module.add_function(wrap_pyfunction!(encode_parameters, module)?)?;

@@ -158,4 +158,4 @@ impl agent_kit::journal::JournalEvent for ChainEvent {
 }
 
 /// Numbered events of a chain.
-pub type Journal = agent_kit::journal::Journal<ChainEvent>;
+pub(crate) type Journal = agent_kit::journal::Journal<ChainEvent>;

@@ -23,7 +23,7 @@ pub(crate) enum Stage {
 
 impl Stage {
     /// Returns a word for the stage.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
             Self::Finished => "finished",
@@ -73,7 +73,7 @@ impl Jobs {
     }
 
     /// Adds a running job.
-    pub fn add(&self, what: &str, client: &str) -> Job {
+    pub(crate) fn add(&self, what: &str, client: &str) -> Job {
         let mut kept = self.lock();
         kept.last += 1;
         let (what, client) = (what.to_owned(), client.to_owned());
@@ -86,7 +86,7 @@ impl Jobs {
     }
 
     /// Ends a job. Returns `false` if it had ended before.
-    pub fn end(&self, number: u64, stage: Stage, done: Option<Done>, error: Option<Problem>) -> bool {
+    pub(crate) fn end(&self, number: u64, stage: Stage, done: Option<Done>, error: Option<Problem>) -> bool {
         let mut kept = self.lock();
         let running = |job: &&mut Job| job.number == number && job.stage == Stage::Running;
         let Some(job) = kept.jobs.iter_mut().find(running) else { return false };
@@ -95,12 +95,12 @@ impl Jobs {
     }
 
     /// Returns a job by its number.
-    pub fn get(&self, number: u64) -> Option<Job> {
+    pub(crate) fn get(&self, number: u64) -> Option<Job> {
         self.lock().jobs.iter().find(|job| job.number == number).cloned()
     }
 
     /// Returns the kept jobs, oldest first.
-    pub fn list(&self) -> Vec<Job> {
+    pub(crate) fn list(&self) -> Vec<Job> {
         self.lock().jobs.iter().cloned().collect()
     }
 }

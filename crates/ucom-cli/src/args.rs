@@ -11,11 +11,11 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_kit::variables::on_off;
 
-pub use boards::{Assignment, Boards};
-pub use firmware::{Addresses, RepairArgs, UpdateArgs};
-pub use options::*;
-pub use serve::ServeArgs;
-pub use variables::VARIABLES;
+pub(crate) use boards::{Assignment, Boards};
+pub(crate) use firmware::{Addresses, RepairArgs, UpdateArgs};
+pub(crate) use options::*;
+pub(crate) use serve::ServeArgs;
+pub(crate) use variables::VARIABLES;
 
 /// Command line for motor boards on a CAN bus.
 #[derive(Debug, Parser)]
@@ -44,7 +44,7 @@ pub use variables::VARIABLES;
     propagate_version = true,
     disable_help_subcommand = true
 )]
-pub struct Cli {
+pub(crate) struct Cli {
     /// Print JSON instead of text.
     ///
     /// A stream has one object per line
@@ -59,7 +59,7 @@ pub struct Cli {
 
 /// Options that select the bus and the profile of its boards.
 #[derive(Args, Clone, Debug)]
-pub struct LinkArgs {
+pub(crate) struct LinkArgs {
     /// Use this bus, as socketcan:can0.
     ///
     /// Another example is socketcand:127.0.0.1:29536/can0
@@ -81,7 +81,7 @@ pub struct LinkArgs {
 
 /// Option that overrides the checks of the bus.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct ForceArgs {
+pub(crate) struct ForceArgs {
     /// Continue even if a check of the bus fails.
     ///
     /// The command checks for another PC on the bus, for running boards, and for a high bus load
@@ -91,7 +91,7 @@ pub struct ForceArgs {
 
 /// Option for existing output files.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct OverwriteArgs {
+pub(crate) struct OverwriteArgs {
     /// Overwrite existing output files
     #[arg(long)]
     pub overwrite: bool,
@@ -99,7 +99,7 @@ pub struct OverwriteArgs {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Simulate a chain of boards on a bus for other programs
     #[command(after_help = "Examples:\n  \
             ucom sim\n  \
@@ -384,7 +384,7 @@ pub enum Command {
 impl Command {
     /// Returns `true` if the command changes boards: an unreadable result is then a fault of the run, not of the
     /// command line.
-    pub fn acts(&self) -> bool {
+    pub(crate) fn acts(&self) -> bool {
         match self {
             Self::Init(_)
             | Self::Reset(_)
@@ -408,7 +408,7 @@ impl Command {
 
 /// Pages of `ucom help`.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-pub enum Topic {
+pub(crate) enum Topic {
     /// Profile files.
     Profile,
     /// Simulated chains.

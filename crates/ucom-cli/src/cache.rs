@@ -14,7 +14,7 @@ const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 impl LinkArgs {
     /// Loads the signal table. Without a file, the table is empty.
-    pub fn signal_table(&self) -> Result<SignalTable, Failure> {
+    pub(crate) fn signal_table(&self) -> Result<SignalTable, Failure> {
         let here = Path::new(SIGNAL_TABLE);
         let path = match &self.edges {
             Some(path) => path,
@@ -27,7 +27,7 @@ impl LinkArgs {
 
 impl CacheArgs {
     /// Returns the cache of names.
-    pub fn cache(&self) -> Cache {
+    pub(crate) fn cache(&self) -> Cache {
         Cache::new(self.directory(), self.fresh)
     }
 

@@ -2,7 +2,7 @@
 
 mod boards;
 mod chain;
-pub mod conformance;
+pub(crate) mod conformance;
 mod decode;
 mod doctor;
 mod explain;
@@ -30,7 +30,7 @@ use cli_kit::{Failure, Output, pages};
 use crate::args::{Command, LinkArgs};
 
 /// Runs the command.
-pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(crate) fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Sim(args) => sim::sim(&args, link, out),
         Command::Scan => chain::scan(link, out),

@@ -12,7 +12,7 @@ use ucom_host::session::CleanupList;
 const PRINT_TIMEOUT: Duration = Duration::from_millis(300);
 
 /// Starts to handle Ctrl-C.
-pub fn listen(cleanup: &CleanupList) -> std::io::Result<Stop> {
+pub(crate) fn listen(cleanup: &CleanupList) -> std::io::Result<Stop> {
     let cleanup = cleanup.clone();
     Stop::listen_with(move || {
         let words = cleanup.words();

@@ -27,7 +27,7 @@ impl Operator for Console {
 
 impl LinkArgs {
     /// Returns the profile; the defaults if no file is given.
-    pub fn profile(&self) -> Result<Profile, Failure> {
+    pub(crate) fn profile(&self) -> Result<Profile, Failure> {
         let Some(path) = &self.profile else { return Ok(Profile::default()) };
         let text =
             std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
@@ -37,7 +37,7 @@ impl LinkArgs {
     }
 
     /// Returns the URL of the bus.
-    pub fn url(&self) -> Result<&str, Failure> {
+    pub(crate) fn url(&self) -> Result<&str, Failure> {
         self.bus.as_deref().ok_or_else(|| {
             Failure::usage("no bus is selected: neither --bus URL nor UCOM_BUS is given").next(
                 "give a bus, such as --bus socketcan:can0; ucom sim makes a simulated bus and prints its URL",
@@ -46,17 +46,17 @@ impl LinkArgs {
     }
 
     /// Opens the bus.
-    pub fn open(&self) -> Result<Link, Failure> {
+    pub(crate) fn open(&self) -> Result<Link, Failure> {
         Ok(Link::open(self.url()?)?)
     }
 
     /// Opens a session on the bus.
-    pub fn session(&self) -> Result<Driver, Failure> {
+    pub(crate) fn session(&self) -> Result<Driver, Failure> {
         self.session_with(self.profile()?)
     }
 
     /// Like [`Self::session`], with a profile other than the command line's.
-    pub fn session_with(&self, profile: Profile) -> Result<Driver, Failure> {
+    pub(crate) fn session_with(&self, profile: Profile) -> Result<Driver, Failure> {
         let cleanup = CleanupList::default();
         let console = Console { stop: listen(&cleanup)?, notes: Lines::stderr()? };
         Ok(Driver::new(profile, self.open()?, Box::new(console), cleanup))
@@ -64,7 +64,7 @@ impl LinkArgs {
 }
 
 /// Returns the numbers that two boards share, in the form of `--json`.
-pub fn shared_numbers(master: &Master) -> Vec<Value> {
+pub(crate) fn shared_numbers(master: &Master) -> Vec<Value> {
     let value = |e: &Error| {
         let Error::Identity(IdentityError::NumberShared { board, found, .. }) = e else { return Value::Null };
         json!({ "board": board, "flash_numbers": found, "code": e.code(), "message": e.to_string(), "hint": e.hint() })

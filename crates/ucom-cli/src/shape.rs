@@ -7,12 +7,12 @@ use ucom_host::date_text;
 use ucom_host::master::{BoardSeen, state_name};
 
 /// Returns the names of the set bits.
-pub fn bits(status: Status) -> Vec<&'static str> {
+pub(crate) fn bits(status: Status) -> Vec<&'static str> {
     Status::NAMES.iter().filter(|(_, bit)| status.has(*bit)).map(|(name, _)| *name).collect()
 }
 
 /// Returns the values of DSP_INFO.
-pub fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
+pub(crate) fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
     let application = info.has_application();
     json!({
         "number": number,
@@ -27,14 +27,14 @@ pub fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
 }
 
 /// Returns a board with its description.
-pub fn board_value(board: &BoardSeen, profile: &Profile) -> Value {
+pub(crate) fn board_value(board: &BoardSeen, profile: &Profile) -> Value {
     let mut value = info_value(board.number, &board.info, profile);
     value["description"] = json!(board.description);
     value
 }
 
 /// Returns boards as a table.
-pub fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
+pub(crate) fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
     let row = |b: &BoardSeen| {
         let (program, day) = match b.info.has_application() {
             true => (format!("0x{:04X}", b.info.program_id), date_text(profile, b.info.date)),

@@ -222,7 +222,7 @@ fn admin_value(admin: ucom::Admin) -> Value {
 }
 
 /// Returns bytes in the form `11 22`.
-pub fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     let all: Vec<String> = bytes.iter().map(|b| format!("{b:02X}")).collect();
     all.join(" ")
 }

@@ -28,7 +28,7 @@ pub(super) struct SimApplication {
 }
 
 impl SimApplication {
-    pub fn new(config: &BoardConfig) -> Self {
+    pub(crate) fn new(config: &BoardConfig) -> Self {
         let model = Model::new(&config.axes);
         let name = format!("{} control", config.description);
         Self {
@@ -47,7 +47,7 @@ impl SimApplication {
     }
 
     /// Moves the axes up to `now_us`, even if no program runs.
-    pub fn pass(&mut self, now_us: u64) {
+    pub(crate) fn pass(&mut self, now_us: u64) {
         // After that time an axis without drive is at rest.
         let seconds = (now_us.saturating_sub(self.moved_us) as f64 * 1e-6).min(MOST_S);
         self.moved_us = self.moved_us.max(now_us);
@@ -58,14 +58,14 @@ impl SimApplication {
     }
 
     /// Handles a power loss: the axes have no drive, and the program loses its state.
-    pub fn power_lost(&mut self, now_us: u64) {
+    pub(crate) fn power_lost(&mut self, now_us: u64) {
         self.pass(now_us);
         self.stop();
         self.debug.clear();
     }
 
     /// Returns `true` if the axes are driven.
-    pub fn is_driven(&self) -> bool {
+    pub(crate) fn is_driven(&self) -> bool {
         self.running && self.active
     }
 

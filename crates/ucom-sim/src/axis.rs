@@ -83,7 +83,7 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    pub fn new(config: &AxisConfig) -> Self {
+    pub(crate) fn new(config: &AxisConfig) -> Self {
         Self {
             config: config.clone(),
             position: config.start_deg,
@@ -94,12 +94,12 @@ impl Axis {
         }
     }
 
-    pub fn config(&self) -> &AxisConfig {
+    pub(crate) fn config(&self) -> &AxisConfig {
         &self.config
     }
 
     /// Advances the axis. Without a command the outputs are safe: the current is 0, and the set point follows the axis.
-    pub fn advance(&mut self, seconds: f64, command: Option<&Command>) {
+    pub(crate) fn advance(&mut self, seconds: f64, command: Option<&Command>) {
         let mut rest = seconds;
         while rest > 0.0 {
             let step = rest.min(STEP_S);

@@ -40,7 +40,7 @@ pub(super) struct Board {
 }
 
 impl Board {
-    pub fn new(config: &BoardConfig, strapped: bool, seed: u64) -> Self {
+    pub(crate) fn new(config: &BoardConfig, strapped: bool, seed: u64) -> Self {
         let mut flash = MemoryFlash::default();
         if config.application {
             let image = image(config);
@@ -76,12 +76,12 @@ impl Board {
     }
 
     /// Returns the time of the board's next action, µs.
-    pub fn next_us(&self) -> u64 {
+    pub(crate) fn next_us(&self) -> u64 {
         if self.unpowered { u64::MAX } else { self.next_us }
     }
 
     /// Advances the time to `now_us`; returns the frame that the board puts into its controller.
-    pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
+    pub(crate) fn poll(&mut self, now_us: u64) -> Option<Frame> {
         if self.unpowered {
             return None;
         }
@@ -131,7 +131,7 @@ impl Board {
     }
 
     /// Reports that the board's frame was on the bus.
-    pub fn sent(&mut self, now_us: u64, frame: &Frame) {
+    pub(crate) fn sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
         }
@@ -142,7 +142,7 @@ impl Board {
     }
 
     /// Reports that the board's controller gave up the frame.
-    pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
+    pub(crate) fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
         }
@@ -153,7 +153,7 @@ impl Board {
     }
 
     /// Receives a frame of another member from the bus.
-    pub fn receive(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
+    pub(crate) fn receive(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
         if !self.unpowered && !self.deaf {
             if let (1.., Some(payload)) = (self.behind_us, Payload::new(data)) {
                 self.coming.push_back((now_us + self.behind_us, id, format, payload));
@@ -167,19 +167,19 @@ impl Board {
     }
 
     /// Returns the level of the outgoing pin.
-    pub fn outgoing(&self) -> bool {
+    pub(crate) fn outgoing(&self) -> bool {
         !self.unpowered && self.node.pins.output.load(Ordering::SeqCst)
     }
 
     /// Sets the level of the wire from the previous board. The level is inactive if the wire is broken or the previous board has no power.
-    pub fn set_incoming(&mut self, now_us: u64, level: bool) {
+    pub(crate) fn set_incoming(&mut self, now_us: u64, level: bool) {
         let level = self.strapped || level;
         if self.node.pins.input.swap(level, Ordering::SeqCst) != level {
             self.next_us = self.next_us.min(now_us);
         }
     }
 
-    pub fn power(&mut self, now_us: u64, on: bool) {
+    pub(crate) fn power(&mut self, now_us: u64, on: bool) {
         if on == self.unpowered {
             self.unpowered = !on;
             self.waiting = None;
@@ -197,7 +197,7 @@ impl Board {
     }
 
     /// Lets the application crash. The watchdog then reboots the board (D-26).
-    pub fn crash(&mut self, now_us: u64) {
+    pub(crate) fn crash(&mut self, now_us: u64) {
         if !self.unpowered {
             self.waiting = None;
             self.held = None;
@@ -207,7 +207,7 @@ impl Board {
     }
 
     /// Gives the board a number that another board has already taken, as if both had received the same PC_INIT.
-    pub fn take_number(&mut self, now_us: u64, number: Sequence) {
+    pub(crate) fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;
         }
@@ -224,11 +224,11 @@ impl Board {
         self.next_us = now_us;
     }
 
-    pub fn break_flash(&mut self, broken: bool) {
+    pub(crate) fn break_flash(&mut self, broken: bool) {
         self.node.flash.fail_after = broken.then_some(0);
     }
 
-    pub fn state(&self) -> BoardState {
+    pub(crate) fn state(&self) -> BoardState {
         BoardState {
             powered: !self.unpowered,
             phase: self.node.phase(),

@@ -35,7 +35,7 @@ pub(super) struct Model {
 }
 
 impl Model {
-    pub fn new(axes: &[AxisConfig]) -> Self {
+    pub(crate) fn new(axes: &[AxisConfig]) -> Self {
         let axes: Vec<Axis> = axes.iter().map(Axis::new).collect();
         let names = |words: &[(&str, &str)]| -> Vec<String> {
             let of = |axis: &Axis, (name, unit): &(&str, &str)| match axis.config().name.as_str() {
@@ -62,28 +62,28 @@ impl Model {
         Self { axes, ci_names, so_names, par_names, initial_ci, initial_par, limited }
     }
 
-    pub fn ci_names(&self) -> &[String] {
+    pub(crate) fn ci_names(&self) -> &[String] {
         &self.ci_names
     }
 
-    pub fn so_names(&self) -> &[String] {
+    pub(crate) fn so_names(&self) -> &[String] {
         &self.so_names
     }
 
-    pub fn par_names(&self) -> &[String] {
+    pub(crate) fn par_names(&self) -> &[String] {
         &self.par_names
     }
 
-    pub fn initial_ci(&self) -> &[u16] {
+    pub(crate) fn initial_ci(&self) -> &[u16] {
         &self.initial_ci
     }
 
-    pub fn initial_par(&self) -> &[u16] {
+    pub(crate) fn initial_par(&self) -> &[u16] {
         &self.initial_par
     }
 
     /// Advances by `seconds`; the outputs are enabled if `active`. Returns a text to report, if any.
-    pub fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
+    pub(crate) fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
         let mut reported = None;
         for (i, axis) in self.axes.iter_mut().enumerate() {
             let (Some(ci), Some(par)) = (triple(ci, 3 * i), five(par, 5 * i)) else { continue };
@@ -101,7 +101,7 @@ impl Model {
     }
 
     /// Returns the outputs in the order of their names.
-    pub fn outputs(&self) -> impl Iterator<Item = u16> {
+    pub(crate) fn outputs(&self) -> impl Iterator<Item = u16> {
         self.axes.iter().flat_map(|a| {
             [
                 word(a.position * 100.0),

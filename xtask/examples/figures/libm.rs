@@ -5,7 +5,7 @@ use test_kit::clock::least_ns;
 
 use crate::print;
 
-pub fn figures() {
+pub(crate) fn figures() {
     const ROUNDS: usize = 101;
     let angles: Vec<f64> = (0..6144).map(|i| f64::from(i) * 0.001 - 3.0).collect();
     let least = least_ns(ROUNDS, || {

@@ -6,7 +6,7 @@ use jtc_sim::SimConfig;
 use crate::world::{Result, holding};
 use crate::{path, print};
 
-pub fn figures() -> Result<()> {
+pub(crate) fn figures() -> Result<()> {
     let trajectory = Trajectory { step_ms: path::STEP_MS, points: path::smooth(12_000) };
     let checked = CheckedTrajectory::check(&trajectory, &Arm::avena(), &[0.0; 6], &CheckOptions::default())?;
     for baud in [115_200, 921_600, 3_000_000] {

@@ -3,11 +3,11 @@ use jtc_host::Point;
 use jtc_wire::RawPoint;
 
 /// Time between points, ms.
-pub const STEP_MS: u16 = 10;
+pub(crate) const STEP_MS: u16 = 10;
 
 /// Returns `points` points of a smooth motion of all joints, which begins and ends at rest at zero, in whole periods of about
 /// 10 s.
-pub fn smooth(points: usize) -> Vec<Point> {
+pub(crate) fn smooth(points: usize) -> Vec<Point> {
     const AMPLITUDE: [f64; 6] = [0.8, -0.5, 0.9, 0.7, -0.8, 1.0];
     let seconds = points.saturating_sub(1) as f64 * f64::from(STEP_MS) * 1e-3;
     let omega = std::f64::consts::TAU * (seconds / 10.0).round().max(1.0) / seconds;
@@ -30,6 +30,6 @@ pub fn smooth(points: usize) -> Vec<Point> {
 }
 
 /// Returns the points in the format of the wire.
-pub fn raw(points: &[Point]) -> Result<Vec<RawPoint>, Box<dyn std::error::Error>> {
+pub(crate) fn raw(points: &[Point]) -> Result<Vec<RawPoint>, Box<dyn std::error::Error>> {
     Ok(points.iter().enumerate().map(|(i, point)| point.raw(i)).collect::<Result<_, _>>()?)
 }

@@ -20,7 +20,7 @@ const IN_AN_HOUR: f64 = 3600.0 / SECONDS as f64;
 
 /// Prints for both formats: the time of a report, the time for reading the same file, and the memory of a program that only makes the
 /// report.
-pub fn figures() -> Result<()> {
+pub(crate) fn figures() -> Result<()> {
     let dir = tempfile::tempdir()?;
     for format in ["mcap", "csv"] {
         let path = dir.path().join(format!("recording.{format}"));
@@ -44,7 +44,7 @@ pub fn figures() -> Result<()> {
 }
 
 /// Prints the largest memory of a report, MB, if the system reports it.
-pub fn memory(path: &Path) -> Result<()> {
+pub(crate) fn memory(path: &Path) -> Result<()> {
     report(path)?;
     let status = std::fs::read_to_string("/proc/self/status")?;
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -91,7 +91,7 @@ fn lines(path: &Path) -> Result<()> {
 }
 
 /// Writes a recording of `seconds` at 1 kHz in which all values are known.
-pub fn write(path: &Path, seconds: u32) -> Result<()> {
+pub(crate) fn write(path: &Path, seconds: u32) -> Result<()> {
     let arm = Arm::avena();
     let info = RecordingInfo { trajectory: "long".into(), ..RecordingInfo::of(&arm) };
     let mut recorder = Recorder::create(path, &info)?;

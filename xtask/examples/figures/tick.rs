@@ -89,7 +89,7 @@ fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
     seen
 }
 
-pub fn figures() -> Result<()> {
+pub(crate) fn figures() -> Result<()> {
     let frames = script()?;
     let seen = record(&frames);
     // The minimum of all rounds is used, because it does not contain the time of other programs on the machine.

@@ -95,7 +95,7 @@ fn follow(name: &str, points: &[RawPoint], step_ms: u16) -> Result<()> {
     Ok(())
 }
 
-pub fn figures() -> Result<()> {
+pub(crate) fn figures() -> Result<()> {
     let (points, recorded) = motion()?;
     print("tracking_recorded_motion", f64::from(u8::from(recorded)));
     follow("tracking", &points, path::STEP_MS)?;

@@ -145,7 +145,7 @@ impl Bench {
     }
 }
 
-pub fn figures() -> Result<()> {
+pub(crate) fn figures() -> Result<()> {
     let mut chain = Bench::new(31, Profile::default());
     let cost = chain.run(Request::Init(InitOptions::default()))?;
     let Outcome::Init(report) = &cost.outcome else { return Err("init ended otherwise".into()) };

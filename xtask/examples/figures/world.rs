@@ -7,10 +7,10 @@ use jtc_sim::{Operator, SimConfig, World, host};
 use jtc_wire::{ExecCommand, RawPoint};
 
 /// Result with an error of any type.
-pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// Returns a session with a controller in HoldPos that uses its default parameters.
-pub fn holding(config: SimConfig) -> Result<Session<SimPort>> {
+pub(crate) fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     let mut session = Session::new(SimPort::new(World::new(config)));
     session.use_defaults()?;
     session.wait_hold(Duration::from_secs(30))?;
@@ -19,7 +19,7 @@ pub fn holding(config: SimConfig) -> Result<Session<SimPort>> {
 
 /// Uploads and starts `points` with the simulator's own operator. The library's session cannot be used for all measurements, because it
 /// uploads only points that pass its check, and points without velocities do not.
-pub fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
+pub(crate) fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;
     operator.upload(points, step_ms)?;

@@ -41,7 +41,7 @@ impl Pid {
 
 /// Phase of the existing controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Phase {
+pub(crate) enum Phase {
     /// The drives are being configured and enabled.
     BringUp,
     /// The arm is in position hold, for this number of ticks.
@@ -53,7 +53,7 @@ pub enum Phase {
 }
 
 /// The existing firmware's controller.
-pub struct Existing {
+pub(crate) struct Existing {
     dynamics: Dynamics,
     gains: [PidGains; JOINTS],
     friction: [[f64; 6]; JOINTS],
@@ -76,7 +76,7 @@ pub struct Existing {
 impl Existing {
     /// Creates the controller for a path, with the parameters of the built-in arm. The existing firmware has the same
     /// parameters.
-    pub fn new(config: &Config, parameters: &Parameters, points: &[RawPoint], step_ms: u16) -> Self {
+    pub(crate) fn new(config: &Config, parameters: &Parameters, points: &[RawPoint], step_ms: u16) -> Self {
         let Friction::Polynomial(friction) = parameters.friction else { unreachable!("it has a polynomial") };
         Self {
             dynamics: Dynamics::new(&parameters.model, config.gravity),
@@ -97,7 +97,7 @@ impl Existing {
     }
 
     /// Takes the answers since the last call and returns the frame to send. Called once per millisecond.
-    pub fn tick(&mut self, received: &[Frame]) -> Frame {
+    pub(crate) fn tick(&mut self, received: &[Frame]) -> Frame {
         for frame in received {
             if let Ok(Answer::Joint { node, report }) = Answer::parse(frame, self.scale) {
                 let j = usize::from(node);

@@ -7,7 +7,7 @@ use crate::run::Figures;
 use crate::{Condition, Runs, paths};
 
 /// Results of both controllers under one condition on one path.
-pub struct Comparison {
+pub(crate) struct Comparison {
     pub path: &'static str,
     pub condition: Condition,
     pub existing: Runs,
@@ -64,7 +64,7 @@ The figures have these meanings:
 
 impl Comparison {
     /// Returns the joints (from 0) that miss the goal, with our error and the goal in mrad.
-    pub fn missed(&self) -> Vec<(usize, f64, f64)> {
+    pub(crate) fn missed(&self) -> Vec<(usize, f64, f64)> {
         let (Some(existing), Some(ours)) = (self.existing.figures, self.ours.figures) else {
             return Vec::new();
         };
@@ -74,7 +74,7 @@ impl Comparison {
     }
 
     /// Returns the result in one sentence.
-    pub fn verdict(&self) -> String {
+    pub(crate) fn verdict(&self) -> String {
         if self.ours.finished < self.existing.finished {
             return format!(
                 "Ours stops in {} of {} runs: {}.",
@@ -175,7 +175,7 @@ fn reference(page: &mut String, all: &[Comparison]) {
 }
 
 /// Returns the whole page.
-pub fn text(all: &[Comparison]) -> String {
+pub(crate) fn text(all: &[Comparison]) -> String {
     let mut page = INTRODUCTION.to_owned();
     reference(&mut page, all);
     let _ = writeln!(page, "\n## Comparison");

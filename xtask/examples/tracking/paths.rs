@@ -7,12 +7,12 @@ use crate::run::{Path, Result};
 /// Points of the recorded path, from 0, after which its recording lacks a point.
 const MISSING_AFTER: [usize; 5] = [184, 358, 544, 726, 906];
 /// Name of the recorded path on the page.
-pub const RECORDED: &str = "recorded path";
+pub(crate) const RECORDED: &str = "recorded path";
 /// Time between its points, ms.
 const STEP_MS: u16 = 10;
 
 /// Returns the path of `jtc demo`, and the path that was recorded with the existing arm if its data are available.
-pub fn all() -> Result<Vec<Path>> {
+pub(crate) fn all() -> Result<Vec<Path>> {
     let demo = example::demo_motion();
     let mut paths = vec![Path { name: "demo path", points: demo.raw()?, step_ms: demo.step_ms }];
     if let Some(points) = recorded() {

@@ -6,10 +6,10 @@ use jtc_wire::{ExecCommand, RawPoint};
 
 use crate::existing::{Existing, Phase};
 
-pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// Figures of a run, or the reason why the run ended early.
-pub type Outcome = std::result::Result<Figures, String>;
+pub(crate) type Outcome = std::result::Result<Figures, String>;
 
 /// Path: points, and the time between them.
 pub struct Path {
@@ -67,7 +67,7 @@ impl Sums {
 }
 
 /// Runs our controller in the simulated world.
-pub fn ours(config: SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
+pub(crate) fn ours(config: SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;
     operator.run(1_000);
@@ -102,7 +102,7 @@ pub fn ours(config: SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
 }
 
 /// Runs the existing law on the same plant and bus.
-pub fn existing(config: &SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
+pub(crate) fn existing(config: &SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
     let mut plant = Plant::new(config);
     let mut bus = Bus::new(
         config.drives.map(|drive| Scale { velocity: drive.velocity_full_scale }),

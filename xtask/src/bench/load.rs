@@ -2,22 +2,22 @@
 use std::time::Instant;
 
 /// Largest share of one processor that other programs may use while figures are judged.
-pub const OTHERS_MAX: f64 = 0.1;
+pub(super) const OTHERS_MAX: f64 = 0.1;
 
 /// Processor times, to measure the load by other programs.
-pub struct Load {
+pub(super) struct Load {
     began: Instant,
     /// Processor time of all programs, and of this one with its child processes, s, if the system reports them.
     busy: Option<(f64, f64)>,
 }
 
 impl Load {
-    pub fn now() -> Self {
+    pub(super) fn now() -> Self {
         Self { began: Instant::now(), busy: busy() }
     }
 
     /// Returns the share of one processor that other programs have used since the first measurement.
-    pub fn others(&self) -> Option<f64> {
+    pub(super) fn others(&self) -> Option<f64> {
         let ((all_before, own_before), (all, own)) = (self.busy?, busy()?);
         let others = (all - all_before) - (own - own_before);
         Some(others.max(0.0) / self.began.elapsed().as_secs_f64())

@@ -258,13 +258,13 @@ const ROWS: &[Row] = &[
 ];
 
 /// Returns the number of targets.
-pub fn targets() -> usize {
+pub(super) fn targets() -> usize {
     ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
 }
 
 /// Prints every row, with the cause if its measurement failed. Returns the number of missed targets. If the machine was not `quiet`,
 /// the measurements are not judged.
-pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
+pub(super) fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
     println!("\n| figure | ours | anchor | ratio | target | met |\n|---|---|---|---|---|---|");
     let mut missed = 0;
     for row in ROWS {

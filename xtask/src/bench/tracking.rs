@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::shell::{cargo, nothing_left, root, run};
 
 /// Runs the comparison, which is in virtual time, and writes the page.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     nothing_left(arguments)?;
     let mut example = cargo(&["run", "--quiet", "--package", "xtask", "--example", "tracking", "--"]);
     run(example.arg(root().join("docs/tracking.md")))?;

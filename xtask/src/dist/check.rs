@@ -11,7 +11,7 @@ use crate::shell::{self, run};
 use crate::tally::{Outcome, Tally};
 
 /// Runs the steps that belong to `cargo xtask test`, with the programs that it has built.
-pub fn steps(tally: &mut Tally) {
+pub(crate) fn steps(tally: &mut Tally) {
     tally.step("packages: assembled twice, installed, used, removed", || {
         if programs::own().is_err() || !Path::new("/var/lib/dpkg/status").exists() {
             return Ok(Outcome::Skipped("packages are for Debian on x86_64 and aarch64".into()));
@@ -35,7 +35,7 @@ fn cheaply() -> Result<()> {
 }
 
 /// Installs the packages of a release in a fresh Debian.
-pub fn install(out: &Path) -> Result<()> {
+pub(super) fn install(out: &Path) -> Result<()> {
     let paths: Vec<PathBuf> = fs::read_dir(out)?.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
     let own = format!("_{}.deb", programs::own()?.debian);
     let debs: Vec<PathBuf> =

@@ -29,7 +29,7 @@ const LEFT_OUT: [&str; 5] =
     ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
 
 /// Folder of the system, which is removed on drop.
-pub struct Root(Scratch);
+pub(super) struct Root(Scratch);
 
 /// Package of this computer, according to dpkg.
 struct Installed {
@@ -40,7 +40,7 @@ struct Installed {
 
 impl Root {
     /// Copies the essential packages of this computer's Debian. Needs no network, and takes seconds.
-    pub fn copied(name: &str) -> Result<Self> {
+    pub(super) fn copied(name: &str) -> Result<Self> {
         let root = Self(Scratch::new(name)?);
         for folder in ["bin", "sbin", "lib", "lib32", "lib64", "libx32"] {
             if let Ok(to) = fs::read_link(Path::new("/").join(folder)) {
@@ -61,7 +61,7 @@ impl Root {
     }
 
     /// Creates a new Debian 12 from its archive, with the programs that the trial uses.
-    pub fn bootstrapped(name: &str) -> Result<Self> {
+    pub(super) fn bootstrapped(name: &str) -> Result<Self> {
         if !works(shell::command("debootstrap").arg("--version")) {
             apt_install(&["debootstrap"])?;
         }
@@ -73,7 +73,7 @@ impl Root {
     }
 
     /// Returns the path of the folder.
-    pub fn path(&self) -> &Path {
+    pub(super) fn path(&self) -> &Path {
         self.0.path()
     }
 
@@ -119,17 +119,17 @@ impl Root {
     }
 
     /// Returns the path of a file of the system, if it exists.
-    pub fn has(&self, path: &str) -> Option<PathBuf> {
+    pub(super) fn has(&self, path: &str) -> Option<PathBuf> {
         Some(self.path().join(path)).filter(|path| path.symlink_metadata().is_ok())
     }
 
     /// Returns a command that runs `program` in the system as root.
-    pub fn command(&self, program: &str) -> Command {
+    pub(super) fn command(&self, program: &str) -> Command {
         self.chroot(&[], program)
     }
 
     /// Returns a command that runs `program` in the system as a user without privileges.
-    pub fn as_nobody(&self, program: &str) -> Command {
+    pub(super) fn as_nobody(&self, program: &str) -> Command {
         self.chroot(&["--userspec=65534:65534"], program)
     }
 
@@ -146,7 +146,7 @@ impl Root {
 
     /// Returns a command that runs dpkg on the system. The command also installs manual pages, which dpkg is configured to leave
     /// out in some containers.
-    pub fn dpkg(&self) -> Command {
+    pub(super) fn dpkg(&self) -> Command {
         let mut dpkg = shell::command("dpkg");
         dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");
         dpkg.env("PATH", "/usr/sbin:/usr/bin:/sbin:/bin").env("DEBIAN_FRONTEND", "noninteractive");
@@ -154,7 +154,7 @@ impl Root {
     }
 
     /// Returns all files that packages could have left, by path, with kind, mode, owner and content.
-    pub fn files(&self) -> Result<BTreeMap<String, String>> {
+    pub(super) fn files(&self) -> Result<BTreeMap<String, String>> {
         let mut found = BTreeMap::new();
         let mut waiting = vec![self.path().to_owned()];
         while let Some(folder) = waiting.pop() {

@@ -8,7 +8,7 @@ use crate::shell::root;
 const NAMES: [&str; 4] = ["clsx", "svelte", "three", "uplot"];
 
 /// Library of the dashboard.
-pub struct Library {
+pub(super) struct Library {
     /// Name in the registry npm.
     pub name: String,
     /// Version in the lock file.
@@ -20,7 +20,7 @@ pub struct Library {
 }
 
 /// Returns all libraries. The texts are stored next to this program, so that a release can be made without Node.js.
-pub fn libraries() -> Result<Vec<Library>> {
+pub(super) fn libraries() -> Result<Vec<Library>> {
     let lock = root().join("web/package-lock.json");
     let lock: Value =
         serde_json::from_str(&std::fs::read_to_string(lock)?).context("web/package-lock.json")?;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use super::tree::Tree;
 
 /// Debian package.
-pub struct Deb<'a> {
+pub(super) struct Deb<'a> {
     /// Name.
     pub name: &'a str,
     /// Version with Debian's revision.
@@ -24,12 +24,12 @@ pub struct Deb<'a> {
 
 impl Deb<'_> {
     /// Returns the file name, such as `jtc_0.2.0-1_amd64.deb`.
-    pub fn file_name(&self) -> String {
+    pub(super) fn file_name(&self) -> String {
         format!("{}_{}_{}.deb", self.name, self.version, self.architecture)
     }
 
     /// Returns the bytes of the package, in which all files have this `time` (Unix time, s).
-    pub fn bytes(&self, time: u64) -> Result<Vec<u8>> {
+    pub(super) fn bytes(&self, time: u64) -> Result<Vec<u8>> {
         let mut ar = ar::Builder::new(Vec::new());
         for (name, bytes) in [
             ("debian-binary", b"2.0\n".to_vec()),

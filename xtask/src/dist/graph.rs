@@ -10,7 +10,7 @@ use crate::{firmware, shell};
 
 /// Crate.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Crate {
+pub(crate) struct Crate {
     /// Name.
     pub name: String,
     /// Version.
@@ -31,7 +31,7 @@ pub struct Crate {
 
 /// Crates by `name version`, with the dependencies of each.
 #[derive(Default)]
-pub struct Graph {
+pub(crate) struct Graph {
     /// The crates.
     pub crates: BTreeMap<String, Crate>,
     /// Dependencies of each crate, by the same names.
@@ -40,7 +40,7 @@ pub struct Graph {
 
 /// Kinds of dependencies to include.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Dependencies that become a part of a program, or generate a part of it during compilation.
     Shipped,
     /// All dependencies, including those of build scripts and tests.
@@ -49,7 +49,7 @@ pub enum Kind {
 
 /// Returns the crates in the programs, the Python package and the boards' programs. The features of the whole workspace are used, so the
 /// graph may contain more crates than a program, but never fewer.
-pub fn shipped() -> Result<Graph> {
+pub(crate) fn shipped() -> Result<Graph> {
     let mut graph = Graph::default();
     for platform in PLATFORMS {
         let metadata = metadata(Path::new("Cargo.toml"), platform.triple)?;
@@ -66,7 +66,7 @@ pub fn shipped() -> Result<Graph> {
 }
 
 /// Returns all dependencies of a manifest on these platforms, including those of tests.
-pub fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
+pub(crate) fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
     let mut graph = Graph::default();
     for platform in platforms {
         graph.add(&metadata(manifest, platform)?, Kind::All, |_| true)?;
@@ -161,7 +161,7 @@ impl Graph {
     }
 
     /// Returns the third-party crates.
-    pub fn foreign(&self) -> impl Iterator<Item = &Crate> {
+    pub(crate) fn foreign(&self) -> impl Iterator<Item = &Crate> {
         self.crates.values().filter(|found| found.source.is_some())
     }
 }

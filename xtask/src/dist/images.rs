@@ -15,7 +15,7 @@ const ROOM: u64 = (2048 - 2 * 128) * 1024;
 const ERASED: u8 = 0xff;
 
 /// Program of a board.
-pub struct Image {
+pub(super) struct Image {
     /// Name of the board.
     pub board: &'static str,
     /// Contents of flash from 0x0800_0000 on.
@@ -24,7 +24,7 @@ pub struct Image {
 
 /// Builds the programs of all boards. The contents of flash are the same in every build folder. The names in the ELF files, which
 /// debuggers read, are not the same, so a release does not contain the ELF files.
-pub fn build() -> Result<Vec<Image>> {
+pub(super) fn build() -> Result<Vec<Image>> {
     let image = |board| {
         let path = firmware::build(board)?;
         let elf = std::fs::read(&path).with_context(|| path.display().to_string())?;
@@ -71,7 +71,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
 }
 
 /// Adds the images and their list, `firmware.json`, to a folder.
-pub fn install(images: &[Image], version: &str, folder: &str, tree: &mut Tree) -> Result<()> {
+pub(super) fn install(images: &[Image], version: &str, folder: &str, tree: &mut Tree) -> Result<()> {
     for image in images {
         tree.put(format!("{folder}/{}", name(image)), &*image.bin);
     }
@@ -80,12 +80,12 @@ pub fn install(images: &[Image], version: &str, folder: &str, tree: &mut Tree) -
 }
 
 /// Returns the file name, such as `nucleo-h745zi-q.bin`.
-pub fn name(image: &Image) -> String {
+pub(super) fn name(image: &Image) -> String {
     format!("{}.bin", image.board)
 }
 
 /// Returns the list of images: file, board, SHA-256, address and size of each.
-pub fn list(images: &[Image], version: &str) -> Result<String> {
+pub(super) fn list(images: &[Image], version: &str) -> Result<String> {
     let images: Vec<_> = images
         .iter()
         .map(|image| {

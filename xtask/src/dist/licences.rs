@@ -15,12 +15,12 @@ const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"
 const NOT_SHIPPED: [&str; 7] = ["tests", "test", "examples", "benches", "fuzz", "target", "node_modules"];
 
 /// Returns a licence as an SPDX expression. Old manifests contain `/` instead of `OR`.
-pub fn expression(licence: &str) -> String {
+pub(crate) fn expression(licence: &str) -> String {
     licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
 }
 
 /// Returns THIRD-PARTY.txt: each crate and library with its licence, then each text once. Returns an error for a crate without a licence.
-pub fn third_party(graph: &Graph) -> Result<String> {
+pub(crate) fn third_party(graph: &Graph) -> Result<String> {
     let mut list =
         String::from("openjtc contains what others wrote. Their licences, and below them the texts.\n\n");
     let mut texts = Texts::default();
@@ -46,7 +46,7 @@ pub fn third_party(graph: &Graph) -> Result<String> {
 }
 
 /// Parts that the compiler and the linker put into programs in addition to crates.
-pub const RUNTIME: [(&str, &str); 3] = [
+pub(crate) const RUNTIME: [(&str, &str); 3] = [
     ("musl", "MIT"),
     ("llvm-libunwind", "Apache-2.0 WITH LLVM-exception"),
     ("llvm-compiler-rt", "Apache-2.0 WITH LLVM-exception"),

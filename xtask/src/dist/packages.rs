@@ -27,7 +27,7 @@ NAME: maintainer-script-calls-systemctl
 ";
 
 /// Data shared by all packages of a release.
-pub struct Release {
+pub(super) struct Release {
     /// Version, such as `0.2.0`.
     pub version: String,
     /// Unix time of the release, s.
@@ -39,7 +39,7 @@ pub struct Release {
 }
 
 /// File of a release.
-pub struct Made {
+pub(super) struct Made {
     /// Name.
     pub name: String,
     /// Contents.
@@ -49,7 +49,7 @@ pub struct Made {
 impl Release {
     /// Returns the Debian package and the archive of each command. `programs` is the folder of the programs, `runnable` the folder of
     /// programs that run on this computer.
-    pub fn packages(&self, platform: Platform, programs: &Path, runnable: &Path) -> Result<Vec<Made>> {
+    pub(super) fn packages(&self, platform: Platform, programs: &Path, runnable: &Path) -> Result<Vec<Made>> {
         let mut made = Vec::new();
         for (name, _) in PROGRAMS {
             let pages = Pages::of(runnable, name)?;

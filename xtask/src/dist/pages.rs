@@ -7,7 +7,7 @@ use super::tree::Tree;
 use crate::shell::{self, Scratch};
 
 /// Pages printed by `program`, which must run on this computer.
-pub struct Pages {
+pub(super) struct Pages {
     /// Manual pages by their file names, such as `jtc-serve.1`.
     pub manual: Vec<(String, Vec<u8>)>,
     bash: Vec<u8>,
@@ -17,7 +17,7 @@ pub struct Pages {
 
 impl Pages {
     /// Returns the pages of the program with this name in `folder`.
-    pub fn of(folder: &Path, name: &str) -> Result<Self> {
+    pub(super) fn of(folder: &Path, name: &str) -> Result<Self> {
         let program = folder.join(name);
         // The environment variables of `jtc` and `ucom` are removed, because options that this user has set must not
         // get into the packages.
@@ -45,7 +45,7 @@ impl Pages {
     }
 
     /// Installs the pages at Debian's paths.
-    pub fn install(&self, name: &str, tree: &mut Tree) -> Result<()> {
+    pub(super) fn install(&self, name: &str, tree: &mut Tree) -> Result<()> {
         for (page, text) in &self.manual {
             tree.put(format!("usr/share/man/man1/{page}.gz"), super::tree::gzip(text)?);
         }
@@ -56,7 +56,7 @@ impl Pages {
     }
 
     /// Adds the pages at the paths of the archives.
-    pub fn unpacked(&self, name: &str, tree: &mut Tree) {
+    pub(super) fn unpacked(&self, name: &str, tree: &mut Tree) {
         for (page, text) in &self.manual {
             tree.put(format!("man/man1/{page}"), &**text);
         }

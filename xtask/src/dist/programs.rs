@@ -9,11 +9,11 @@ use crate::shell::{self, run};
 use crate::{paths, python};
 
 /// Names of the programs, with their packages.
-pub const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
+pub(super) const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
 
 /// Platform of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Platform {
+pub(super) struct Platform {
     /// Name used by the Linux kernel and Rust.
     pub machine: &'static str,
     /// Name used by Debian.
@@ -25,7 +25,7 @@ pub struct Platform {
 }
 
 /// Platforms for which a release has programs.
-pub const PLATFORMS: [Platform; 2] = [
+pub(super) const PLATFORMS: [Platform; 2] = [
     Platform {
         machine: "x86_64",
         debian: "amd64",
@@ -41,14 +41,14 @@ pub const PLATFORMS: [Platform; 2] = [
 ];
 
 /// Returns the platform of this computer. Returns an error if a release has no programs for it.
-pub fn own() -> Result<Platform> {
+pub(super) fn own() -> Result<Platform> {
     let machine = std::env::consts::ARCH;
     let own = PLATFORMS.into_iter().find(|platform| platform.machine == machine);
     own.with_context(|| format!("there are no packages for computers like this ({machine}), which would have to run their programs"))
 }
 
 /// Adds the compiler's target if rustup manages the toolchain. Returns an error if the target is not available here.
-pub fn add_target(triple: &str) -> Result<()> {
+pub(super) fn add_target(triple: &str) -> Result<()> {
     let installed = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))?;
     if installed.lines().any(|target| target == triple) {
         return Ok(());
@@ -57,7 +57,7 @@ pub fn add_target(triple: &str) -> Result<()> {
 }
 
 /// Returns the Unix time that all archives contain, s. This is the time of the last commit, or `SOURCE_DATE_EPOCH`.
-pub fn time() -> Result<u64> {
+pub(super) fn time() -> Result<u64> {
     let time = match std::env::var("SOURCE_DATE_EPOCH") {
         Ok(time) => time,
         Err(_) => shell::read(shell::command("git").args(["log", "-1", "--format=%ct"])).context(
@@ -68,13 +68,13 @@ pub fn time() -> Result<u64> {
 }
 
 /// Returns the folder of the tools that requirements-dist.txt lists.
-pub fn tools() -> Result<PathBuf> {
+pub(super) fn tools() -> Result<PathBuf> {
     let python = python::environment("requirements-dist.txt")?;
     Ok(python.parent().context("an interpreter in no folder")?.to_owned())
 }
 
 /// Adds switches for `triple` to a cargo command that keep paths of this computer out of the output.
-pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
+pub(super) fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
     // C code and its assembler code need these options.
     let folders = paths::folders()?;
@@ -85,7 +85,7 @@ pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
 }
 
 /// Sets the environment in which the compilers and the linker of `tools` are used.
-pub fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Result<()> {
+pub(super) fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Result<()> {
     let others = std::env::var_os("PATH").unwrap_or_default();
     let all = [tools.to_owned()].into_iter().chain(std::env::split_paths(&others));
     command.env("PATH", std::env::join_paths(all)?).env("SOURCE_DATE_EPOCH", time.to_string());
@@ -93,7 +93,7 @@ pub fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Result<()> 
 }
 
 /// Builds the programs and returns their folder.
-pub fn build(platform: Platform, time: u64) -> Result<PathBuf> {
+pub(super) fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     add_target(platform.triple)?;
     let tools = tools()?;
     let mut build = shell::command(tools.join("cargo-zigbuild"));
@@ -130,7 +130,7 @@ fn is_static(name: &str, bytes: &[u8]) -> Result<()> {
 }
 
 /// Returns an error for a file that contains a folder of this computer.
-pub fn has_no_paths(name: &str, bytes: &[u8]) -> Result<()> {
+pub(super) fn has_no_paths(name: &str, bytes: &[u8]) -> Result<()> {
     for (path, _) in paths::folders()? {
         let path = path.to_string_lossy();
         if let Some(at) = bytes.windows(path.len()).position(|window| window == path.as_bytes()) {

@@ -9,7 +9,7 @@ use crate::shell::{self, Scratch, run};
 
 /// Returns the bill of materials of `graph` and of the libraries in the dashboard's pages. Equal lock files give equal
 /// bytes.
-pub fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
+pub(super) fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
     let scripts = dashboard::libraries()?;
     let crates = graph.crates.values().map(component);
     let scripts_listed = scripts.iter().map(|library| {
@@ -91,7 +91,7 @@ fn stamp(time: u64) -> Result<String> {
 }
 
 /// Validates a bill against the schema of CycloneDX, with CycloneDX's own library.
-pub fn validate(bill: &str) -> Result<()> {
+pub(super) fn validate(bill: &str) -> Result<()> {
     let scratch = Scratch::new("sbom")?;
     let file = scratch.path().join("bill.json");
     std::fs::write(&file, bill)?;

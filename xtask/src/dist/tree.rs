@@ -9,11 +9,11 @@ use sha2::{Digest as _, Sha256};
 
 /// Files by their path below the root, such as `usr/bin/jtc`.
 #[derive(Clone, Default, Debug, PartialEq)]
-pub struct Tree(BTreeMap<String, File>);
+pub(super) struct Tree(BTreeMap<String, File>);
 
 /// File with its content and kind.
 #[derive(Clone, Debug, PartialEq)]
-pub struct File {
+pub(super) struct File {
     /// Content of the file.
     pub bytes: Vec<u8>,
     /// `true` if the file is executable.
@@ -22,30 +22,30 @@ pub struct File {
 
 impl Tree {
     /// Adds a file that everyone can read.
-    pub fn put(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
+    pub(super) fn put(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         self.0.insert(path.into(), File { bytes: bytes.into(), runs: false });
     }
 
     /// Adds a program.
-    pub fn put_program(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
+    pub(super) fn put_program(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         self.0.insert(path.into(), File { bytes: bytes.into(), runs: true });
     }
 
     /// Adds a file of this computer.
-    pub fn copy(&mut self, path: impl Into<String>, from: &Path) -> Result<()> {
+    pub(super) fn copy(&mut self, path: impl Into<String>, from: &Path) -> Result<()> {
         let bytes = std::fs::read(from).with_context(|| from.display().to_string())?;
         self.put(path, bytes);
         Ok(())
     }
 
     /// Returns the files in the order of their paths.
-    pub fn files(&self) -> impl Iterator<Item = (&str, &File)> {
+    pub(super) fn files(&self) -> impl Iterator<Item = (&str, &File)> {
         self.0.iter().map(|(path, file)| (path.as_str(), file))
     }
 
     /// Returns a tar archive with sorted paths. All files belong to root and have the time `time` (Unix time, s). `prefix` (`./` or
     /// `name/`) is put before each path. The archive also contains the folders.
-    pub fn tar(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
+    pub(super) fn tar(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         let mut tar = tar::Builder::new(Vec::new());
         let mut folders = BTreeSet::new();
         folders.insert(prefix.to_owned());
@@ -67,7 +67,7 @@ impl Tree {
     }
 
     /// Returns the archive compressed.
-    pub fn tar_gz(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
+    pub(super) fn tar_gz(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         compress(&self.tar(prefix, time)?, Compression::default())
     }
 }
@@ -87,7 +87,7 @@ fn header(kind: tar::EntryType, mode: u32, size: u64, time: u64) -> tar::Header 
 }
 
 /// Compresses a page or a text as much as gzip can, as Debian requires.
-pub fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
+pub(super) fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
     compress(bytes, Compression::best())
 }
 
@@ -100,15 +100,15 @@ fn compress(bytes: &[u8], by: Compression) -> Result<Vec<u8>> {
 }
 
 /// Returns the SHA-256 in the format of `sha256sum`.
-pub fn sha256(bytes: &[u8]) -> String {
+pub(super) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Name of the list that `sha256sum --check` reads.
-pub const SUMS: &str = "SHA256SUMS";
+pub(super) const SUMS: &str = "SHA256SUMS";
 
 /// Writes the list into a folder, with the sums of all other files of the folder.
-pub fn write_sums(folder: &Path) -> Result<()> {
+pub(super) fn write_sums(folder: &Path) -> Result<()> {
     let mut lines = BTreeMap::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use crate::shell::{self, run};
 
 /// Makes the release of `first` again elsewhere. If files differ, returns an error that lists them and keeps both releases.
-pub fn compare(first: &Path, quick: bool) -> Result<()> {
+pub(super) fn compare(first: &Path, quick: bool) -> Result<()> {
     // The folder for temporary files is not used, because some systems keep it in memory, and this needs gigabytes.
     let folder = shell::target().join("made-again-in-a-folder-with-a-longer-name");
     if folder.exists() {

@@ -9,7 +9,7 @@ use super::programs::{self, Platform};
 use crate::shell::{self, Scratch, run};
 
 /// Returns the folder of its source; `None` in a checkout without it.
-pub fn folder() -> Option<PathBuf> {
+pub(super) fn folder() -> Option<PathBuf> {
     Some(shell::root().join("crates/openjtc-py")).filter(|folder| folder.join("pyproject.toml").exists())
 }
 
@@ -17,7 +17,7 @@ pub fn folder() -> Option<PathBuf> {
 const THIRD_PARTY: &str = "LICENSE-THIRD-PARTY.txt";
 
 /// Builds the wheel, which works with every glibc from 2.17 on.
-pub fn build(platform: Platform, time: u64, third_party: &str) -> Result<Made> {
+pub(super) fn build(platform: Platform, time: u64, third_party: &str) -> Result<Made> {
     let folder = folder().context("crates/openjtc-py is not there")?;
     programs::add_target(platform.library)?;
     let tools = programs::tools()?;

@@ -2,7 +2,7 @@
 
 /// Effect of an instruction on the flow of control and on the formation of addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flow {
+pub(super) enum Flow {
     /// Branch to an address: B, `B<cc>`, CBZ, CBNZ or BL.
     Direct(u32),
     /// BX, BLX, MOV or LDR to the program counter. The address is known only at run time.
@@ -18,12 +18,12 @@ pub enum Flow {
 }
 
 /// Returns the number of bytes of the instruction that begins with this halfword.
-pub fn len(first: u16) -> u32 {
+pub(super) fn len(first: u16) -> u32 {
     if first >> 11 >= 0b11101 { 4 } else { 2 }
 }
 
 /// Decodes the instruction at `address`. `second` is used only for instructions of four bytes.
-pub fn flow(address: u32, first: u16, second: u16) -> Flow {
+pub(super) fn flow(address: u32, first: u16, second: u16) -> Flow {
     if len(first) == 4 { wide(address, first.into(), second.into()) } else { narrow(address, first.into()) }
 }
 

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use regex::Regex;
 
 /// Names of the marks, with the pattern of each.
-pub const MARKS: [(&str, &str); 10] = [
+pub(super) const MARKS: [(&str, &str); 10] = [
     ("begins with What, Who, Whose, Whether", r"(?:^|[.!;:] )(?:What|Who|Whose|Whether)\b"),
     (
         "begins with It, They, Nobody, Somebody, One, Nothing",
@@ -25,7 +25,7 @@ static PATTERNS: LazyLock<Vec<(&str, Regex)>> = LazyLock::new(|| {
 });
 
 /// Returns the marks in a text, with the byte at which each begins.
-pub fn find(words: &str) -> Vec<(&'static str, usize)> {
+pub(super) fn find(words: &str) -> Vec<(&'static str, usize)> {
     let mut found = Vec::new();
     for (mark, pattern) in PATTERNS.iter() {
         found.extend(pattern.find_iter(words).map(|at| (*mark, at.start())));
@@ -34,7 +34,7 @@ pub fn find(words: &str) -> Vec<(&'static str, usize)> {
 }
 
 /// Returns the sentence around a byte.
-pub fn sentence(words: &str, at: usize) -> &str {
+pub(super) fn sentence(words: &str, at: usize) -> &str {
     let start = words[..at].rfind(". ").map_or(0, |end| end + 2);
     let end = words[at..].find(". ").map_or(words.len(), |end| at + end + 1);
     words.get(start..end.max(start)).unwrap_or(words).trim()

@@ -3,7 +3,7 @@ use ra_ap_rustc_lexer::{FrontmatterAllowed, LiteralKind, TokenKind, tokenize};
 
 /// Comment, string or paragraph, joined into one line.
 #[derive(Debug, Default, PartialEq)]
-pub struct Text {
+pub(super) struct Text {
     pub words: String,
     /// Position in `words` at which each line of the file begins, with the number of the line.
     lines: Vec<(usize, usize)>,
@@ -11,7 +11,7 @@ pub struct Text {
 
 impl Text {
     /// Returns the number of the line that contains this byte of `words`.
-    pub fn line_at(&self, offset: usize) -> usize {
+    pub(super) fn line_at(&self, offset: usize) -> usize {
         // A mark may begin at the end of the previous sentence.
         let before = |(start, _): &&(usize, usize)| *start <= offset + 2;
         self.lines.iter().rev().find(before).map_or(1, |(_, number)| *number)
@@ -27,7 +27,7 @@ impl Text {
 }
 
 /// Returns the prose of a file with this extension.
-pub fn of(source: &str, extension: &str) -> Vec<Text> {
+pub(super) fn of(source: &str, extension: &str) -> Vec<Text> {
     let prose: fn(&str) -> Option<&str> = match extension {
         "rs" => return rust(source),
         "md" => |line| Some(line),

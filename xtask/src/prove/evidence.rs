@@ -10,12 +10,12 @@ use crate::shell::root;
 const PAGE: &str = "docs/evidence.md";
 
 /// Returns the page.
-pub fn read() -> Result<String> {
+pub(super) fn read() -> Result<String> {
     read_to_string(root().join(PAGE)).with_context(|| format!("cannot read {PAGE}"))
 }
 
 /// Replaces the text between the marks `<!-- name -->` and `<!-- end of name -->`.
-pub fn replace(name: &str, table: &str) -> Result<()> {
+pub(super) fn replace(name: &str, table: &str) -> Result<()> {
     let page = read()?;
     let (before, rest) = parts(&page, name)?;
     let (_, after) = rest;
@@ -24,7 +24,7 @@ pub fn replace(name: &str, table: &str) -> Result<()> {
 }
 
 /// Returns the text between the marks of `name`.
-pub fn table(page: &str, name: &str) -> Result<String> {
+pub(super) fn table(page: &str, name: &str) -> Result<String> {
     Ok(parts(page, name)?.1.0.trim().to_owned())
 }
 
@@ -39,7 +39,7 @@ fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))>
 
 /// Mutant, identified without its line number: by the file, the line of source without indentation, and the change.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Named {
+pub(super) struct Named {
     /// Path from the root of the workspace.
     pub file: String,
     /// Line in which the mutant begins.
@@ -50,7 +50,7 @@ pub struct Named {
 
 /// Returns the mutants that the page explains as equivalent. These are the items ``- `LINE` → `CHANGE`: sentence`` below a heading
 /// `### FILE`.
-pub fn explained(page: &str) -> BTreeSet<Named> {
+pub(super) fn explained(page: &str) -> BTreeSet<Named> {
     let mut file = "";
     let mut explained = BTreeSet::new();
     for text in page.lines() {

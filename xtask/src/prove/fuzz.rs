@@ -30,7 +30,7 @@ fn nightly(arguments: &[&str]) -> Command {
 }
 
 /// `arguments`: a target, `--runs N`, `--keep`.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let wanted = shell::option(&mut arguments, "--runs")?;
     let wanted: u64 = wanted.as_deref().unwrap_or(RUNS).parse().context("--runs needs a number")?;

@@ -63,7 +63,7 @@ enum Which {
 }
 
 /// `arguments`: `--package NAME`, `--survivors`, `--changed`, `--resume`, `--report`.
-pub fn main(arguments: &[String]) -> Result<ExitCode> {
+pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let package = shell::option(&mut arguments, "--package")?;
     let mut which = Which::All;

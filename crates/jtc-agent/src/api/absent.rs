@@ -18,7 +18,7 @@ use crate::owner::ClientPort;
 /// Joints that are set absent.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct AbsentObject {
+pub(super) struct AbsentObject {
     /// Joints, each at most once; empty: no joint is absent.
     #[schema(max_items = 6)]
     pub absent: Vec<AbsentJoint>,
@@ -27,7 +27,7 @@ pub struct AbsentObject {
 /// Absent joint.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct AbsentJoint {
+pub(super) struct AbsentJoint {
     /// Number of the joint, 1 to 6 from the base.
     #[schema(minimum = 1, maximum = 6)]
     pub joint: u8,

@@ -22,7 +22,7 @@ use crate::owner::ClientPort;
 
 /// Arm that the controller uses.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ArmObject {
+pub(super) struct ArmObject {
     /// Name of the arm.
     pub name: String,
     /// Hash of all parameters that decide how the arm moves.
@@ -34,7 +34,7 @@ pub struct ArmObject {
 /// Arm to send to the controller.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ArmRequest {
+pub(super) struct ArmRequest {
     /// Text of an arm file (TOML), or of a robot description (URDF) in which only the arm has movable joints.
     pub text: String,
     /// `true`: store the arm in non-volatile memory. The arm has no torque meanwhile, and the controller stays in Init
@@ -45,7 +45,7 @@ pub struct ArmRequest {
 
 /// Parameters that were sent to the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct GivenObject {
+pub(super) struct GivenObject {
     /// Number of settings that have changed.
     pub settings: usize,
     /// `true` if the controller has the name of the arm.
@@ -62,7 +62,7 @@ pub struct GivenObject {
 
 /// Parameter frame that the controller confirmed.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct PartObject {
+pub(super) struct PartObject {
     /// Name of the parameter.
     pub parameter: String,
     /// Length of its frame, bytes.

@@ -28,7 +28,7 @@ const SPEED_MIN: u8 = 5;
 /// Speed, % of the speed of the trajectory.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SpeedObject {
+pub(super) struct SpeedObject {
     /// Speed, 5 to 100 %.
     #[schema(minimum = 5, maximum = 100)]
     pub percent: u8,
@@ -37,7 +37,7 @@ pub struct SpeedObject {
 /// On or off.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Switch {
+pub(super) struct Switch {
     /// `true`: on.
     pub on: bool,
 }

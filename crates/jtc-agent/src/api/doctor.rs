@@ -18,7 +18,7 @@ const LISTEN: Duration = Duration::from_secs(2);
 
 /// Result of a diagnosis.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct DoctorObject {
+pub(super) struct DoctorObject {
     /// `true` if no finding is a problem.
     pub healthy: bool,
     /// Listening time, s.
@@ -31,7 +31,7 @@ pub struct DoctorObject {
 
 /// Finding of a diagnosis.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct FindingObject {
+pub(super) struct FindingObject {
     /// `problem`, `warning` or `good`.
     pub severity: String,
     /// Text of the finding.

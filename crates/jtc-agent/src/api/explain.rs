@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 
 /// Page about a code.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct PageObject {
+pub(super) struct PageObject {
     /// Name of the code, unique; as in `error_codes` of the status.
     pub code: String,
     /// Title for display.

@@ -31,13 +31,13 @@ pub(super) struct Identity {
 
 impl Identity {
     /// Returns the identity that is used before the first answer of the controller.
-    pub fn of(arm: &Arm) -> Self {
+    pub(super) fn of(arm: &Arm) -> Self {
         let hash = arm.hash().ok().flatten();
         Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash, changes: 0 }
     }
 
     /// Returns the identity that the controller reports, if the known arm is its arm in use.
-    pub fn of_controller(&self) -> Option<&Info> {
+    pub(super) fn of_controller(&self) -> Option<&Info> {
         self.info.as_ref().filter(|info| Some(info.hash) == self.hash)
     }
 }

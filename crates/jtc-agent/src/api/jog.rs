@@ -22,7 +22,7 @@ const AHEAD: Duration = Duration::from_millis(100);
 /// Joint rates of a jog.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JogRequest {
+pub(super) struct JogRequest {
     /// Joint rates, rad/s, base to wrist. Rates act for 200 ms: send them again within this time, and send zeros at the end.
     #[schema(min_items = 6, max_items = 6)]
     pub rates_rad_s: [f64; 6],

@@ -21,7 +21,7 @@ use crate::line::{Denied, Introduction, Policy};
 /// Request for the lease.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct LeaseRequest {
+pub(super) struct LeaseRequest {
     /// Name of the client for people: the first 64 characters.
     pub name: String,
     /// Time without a request of this client after which the lease lapses, s.
@@ -39,7 +39,7 @@ pub struct LeaseRequest {
 
 /// Client that holds the lease or waits for it.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LeaseGrant {
+pub(super) struct LeaseGrant {
     /// Secret key, which this client sends with each request in the header `Lease-Key`.
     pub key: String,
     /// `true` if the client holds the lease; otherwise it waits until the holder releases it.

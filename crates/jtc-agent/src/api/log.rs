@@ -27,7 +27,7 @@ const FILE: &str = "flight-recorder.mcap";
 
 /// State of the flight recorder.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LogStatusObject {
+pub(super) struct LogStatusObject {
     /// State in words: recording, or the reason why the recorder has stopped.
     pub state: String,
     /// Number of blocks of 1 KiB begun since the start of the controller, including overwritten ones.
@@ -38,11 +38,11 @@ pub struct LogStatusObject {
 #[derive(ToSchema)]
 #[schema(value_type = String, format = Binary)]
 #[expect(dead_code, reason = "describes a body")]
-pub struct LogFile(Vec<u8>);
+pub(super) struct LogFile(Vec<u8>);
 
 /// Values of the log in columns of the same length. A row is a tick: 1000 rows per second. An unknown value is null.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LogValues {
+pub(super) struct LogValues {
     /// Time of each row, s; 0 at the last row.
     pub times_s: Vec<f64>,
     /// State of the controller in the last row.
@@ -53,7 +53,7 @@ pub struct LogValues {
 
 /// Values of a joint in the log.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LogJoint {
+pub(super) struct LogJoint {
     /// Measured position, rad.
     pub position_rad: Vec<Option<f64>>,
     /// Commanded position, rad.

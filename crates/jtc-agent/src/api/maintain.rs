@@ -20,7 +20,7 @@ use crate::owner::ClientPort;
 /// Nodes whose errors to clear.
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ClearRequest {
+pub(super) struct ClearRequest {
     /// Joints, 1 to 6 from the base.
     #[serde(default)]
     #[schema(max_items = 6)]
@@ -33,7 +33,7 @@ pub struct ClearRequest {
 /// Nodes to restart.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ResetRequest {
+pub(super) struct ResetRequest {
     /// Joints, 1 to 6 from the base.
     #[serde(default)]
     #[schema(max_items = 6)]

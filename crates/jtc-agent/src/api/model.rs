@@ -13,7 +13,7 @@ use super::identity::Identity;
 /// Source of an arm model.
 #[derive(Clone, Copy, Debug, serde::Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum ModelSource {
+pub(super) enum ModelSource {
     /// Arm in use by the controller.
     Controller,
     /// Arm of the agent: the controller cannot be asked for its own, or has not answered yet.
@@ -22,7 +22,7 @@ pub enum ModelSource {
 
 /// Arm in use.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ModelObject {
+pub(super) struct ModelObject {
     /// Name of the arm.
     pub name: String,
     /// Hash of all parameters that decide how the arm moves; missing if the agent's arm lacks one of them.
@@ -45,7 +45,7 @@ pub struct ModelObject {
 
 /// Frame and limits of a joint.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ModelJoint {
+pub(super) struct ModelJoint {
     /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
     /// Name of the joint.
@@ -71,7 +71,7 @@ pub struct ModelJoint {
 
 /// Position and orientation of a frame.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct FrameObject {
+pub(super) struct FrameObject {
     /// Origin x, y, z, m.
     #[schema(min_items = 3, max_items = 3)]
     pub origin_xyz_m: [f64; 3],
@@ -82,7 +82,7 @@ pub struct FrameObject {
 
 /// Link of the arm.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ModelLink {
+pub(super) struct ModelLink {
     /// Name of the link.
     pub name: String,
     /// Mass, kg.

@@ -31,7 +31,7 @@ const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=120.0;
 /// Waypoints, and options of the path through them.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PlanRequest {
+pub(super) struct PlanRequest {
     /// Waypoints, 500 at most, as CSV or JSON in a format that `jtc plan` accepts. The columns are q1 to q6, or x, y, z with
     /// an orientation, or pose.
     pub waypoints: String,
@@ -78,7 +78,7 @@ pub struct PlanRequest {
 /// Number and name of a planned trajectory.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct KeepRequest {
+pub(super) struct KeepRequest {
     /// Number of the trajectory; it replaces a trajectory with the same number.
     #[schema(minimum = 1, maximum = 99)]
     pub number: u16,
@@ -103,7 +103,7 @@ pub(super) fn margin() -> f64 {
 
 /// Motion that passed the check.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct PlanObject {
+pub(super) struct PlanObject {
     /// Duration, s.
     pub duration_s: f64,
     /// Number of points.
@@ -135,7 +135,7 @@ pub struct PlanObject {
 
 /// Limiting constraint of a motion during an interval.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct BoundObject {
+pub(super) struct BoundObject {
     /// Start of the interval, s from the start.
     pub from_s: f64,
     /// End of the interval, s from the start.
@@ -156,7 +156,7 @@ impl From<&Bound> for BoundObject {
 
 /// Smallest torque margin of a motion, with its joint and time.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct MarginObject {
+pub(super) struct MarginObject {
     /// Margin: unused part of the torque limit, % of the limit.
     pub percent: f64,
     /// Number of the joint with the smallest margin, 1 to 6 from the base.
@@ -180,7 +180,7 @@ impl From<TorqueMargin> for MarginObject {
 
 /// Results for a joint.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct JointPlan {
+pub(super) struct JointPlan {
     /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
     /// Lowest position, rad.

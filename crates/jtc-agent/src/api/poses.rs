@@ -16,7 +16,7 @@ use super::{Agent, Caller};
 
 /// Place where a pose is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, ToSchema)]
-pub enum PoseFrom {
+pub(super) enum PoseFrom {
     /// Arm file of the agent; change the pose there.
     #[serde(rename = "arm file")]
     ArmFile,
@@ -27,7 +27,7 @@ pub enum PoseFrom {
 
 /// Named pose.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct PoseObject {
+pub(super) struct PoseObject {
     /// Name of the pose.
     pub name: String,
     /// Joint positions, from the base, rad.
@@ -43,7 +43,7 @@ pub struct PoseObject {
 /// Position of a pose.
 #[derive(Clone, Copy, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PoseRequest {
+pub(super) struct PoseRequest {
     /// Joint positions, rad, from the base; missing: the current position of the arm.
     #[serde(default)]
     #[schema(min_items = 6, max_items = 6)]

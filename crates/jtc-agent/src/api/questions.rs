@@ -14,7 +14,7 @@ use crate::owner::ClientPort;
 
 /// Identity of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct InfoObject {
+pub(super) struct InfoObject {
     /// Version of the protocol extensions. 0: the controller has no extensions, and all other values are unknown.
     pub extension: u8,
     /// Version of the firmware.

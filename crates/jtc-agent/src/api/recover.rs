@@ -24,7 +24,7 @@ use crate::owner::ClientPort;
 /// Options of a recovery.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RecoverRequest {
+pub(super) struct RecoverRequest {
     /// `true`: a controller without arm parameters uses its defaults. These are the parameters of the stored arm, or of
     /// the built-in arm if no arm is stored.
     #[serde(default)]

@@ -17,7 +17,7 @@ const PAGE_POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src
 #[derive(ToSchema)]
 #[schema(value_type = String)]
 #[expect(dead_code, reason = "describes a body")]
-pub struct ReportPage(String);
+pub(super) struct ReportPage(String);
 
 /// Returns the report of the last motion of a finished job: a page with figures and plots.
 ///

@@ -25,7 +25,7 @@ use crate::line::Policy;
 /// Run of a kept trajectory.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RunRequest {
+pub(super) struct RunRequest {
     /// Number of the trajectory.
     #[schema(minimum = 1, maximum = 99)]
     pub trajectory: u16,
@@ -56,7 +56,7 @@ pub struct RunRequest {
 /// Move from the current position to one of the three targets.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct MoveRequest {
+pub(super) struct MoveRequest {
     /// Target joint positions, rad, base to wrist.
     #[serde(default)]
     #[schema(min_items = 6, max_items = 6)]
@@ -89,7 +89,7 @@ pub struct MoveRequest {
 /// Pose of the flange in the frame of the base.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct FlangeObject {
+pub(super) struct FlangeObject {
     /// Position x, y, z, m.
     #[schema(min_items = 3, max_items = 3)]
     pub xyz_m: [f64; 3],
@@ -104,7 +104,7 @@ fn one() -> u32 {
 
 /// Job: a request that continues after its answer.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct JobObject {
+pub(super) struct JobObject {
     /// Number of the job.
     pub number: u64,
     /// Description of the job.
@@ -132,7 +132,7 @@ pub struct JobObject {
 
 /// Results of a motion.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ResultObject {
+pub(super) struct ResultObject {
     /// Duration of the execution, s.
     pub executed_s: f64,
     /// Joints, from the base.
@@ -142,7 +142,7 @@ pub struct ResultObject {
 
 /// Results for a joint.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct JointResult {
+pub(super) struct JointResult {
     /// Name of the joint in the arm file.
     pub name: String,
     /// Root mean square of the position error, mrad.

@@ -22,7 +22,7 @@ const CODE: &str = "setting";
 /// Condition under which a setting may be changed.
 #[derive(Clone, Copy, Debug, serde::Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum When {
+pub(super) enum When {
     /// Without torque: in Init and in Error.
     Unpowered,
     /// Also during position hold, Teaching or a pause.
@@ -43,7 +43,7 @@ impl From<Live> for When {
 
 /// Setting of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct SettingObject {
+pub(super) struct SettingObject {
     /// Name of the setting, with its unit.
     pub name: String,
     /// Number of the joint, 1 to 6 from the base; missing: a setting of the whole arm.
@@ -87,7 +87,7 @@ impl SettingObject {
 /// New value of a setting.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SettingChange {
+pub(super) struct SettingChange {
     /// Name of the setting, with its unit.
     pub name: String,
     /// Number of the joint, from the base; missing for a setting of the arm.
@@ -101,7 +101,7 @@ pub struct SettingChange {
 /// Settings to change. The controller changes all of them, or none.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SettingsRequest {
+pub(super) struct SettingsRequest {
     /// Settings, each at most once.
     #[schema(min_items = 1, max_items = 256)]
     pub settings: Vec<SettingChange>,

@@ -26,7 +26,7 @@ const POINTS_MAX: usize = 2000;
 /// Trajectory to keep.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TrajectoryRequest {
+pub(super) struct TrajectoryRequest {
     /// Name for people: the first 64 characters.
     pub name: String,
     /// Text of a file in a format that `jtc traj run` accepts: CSV with a time column and joints, JSON, or a ROS
@@ -39,7 +39,7 @@ pub struct TrajectoryRequest {
 
 /// Kept trajectory.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct TrajectoryObject {
+pub(super) struct TrajectoryObject {
     /// Number of the trajectory.
     pub number: u16,
     /// Name for people.
@@ -101,7 +101,7 @@ fn some_points() -> usize {
 
 /// Trajectory for a plot.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct PointsObject {
+pub(super) struct PointsObject {
     /// Number of the trajectory.
     pub number: u16,
     /// Name for people.
@@ -143,7 +143,7 @@ impl PointsObject {
 
 /// Result of a check.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct CheckObject {
+pub(super) struct CheckObject {
     /// `true` if the trajectory can run from its first point.
     pub passed: bool,
     /// Duration, s.
@@ -159,7 +159,7 @@ pub struct CheckObject {
 
 /// Problem of a trajectory.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ProblemObject {
+pub(super) struct ProblemObject {
     /// Message with value, limit and point.
     pub message: String,
     /// Number of the joint; missing: the trajectory as a whole.

@@ -109,7 +109,7 @@ pub(super) fn make_room(jobs: &mut VecDeque<Job>) {
 }
 
 /// Report of the last motion of a job.
-pub type Kept = Option<Arc<MotionReport>>;
+pub(super) type Kept = Option<Arc<MotionReport>>;
 
 #[cfg(test)]
 mod tests {

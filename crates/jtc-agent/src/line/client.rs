@@ -149,7 +149,7 @@ pub(super) struct Client {
 }
 
 impl Client {
-    pub fn new(introduction: Introduction) -> Self {
+    pub(super) fn new(introduction: Introduction) -> Self {
         Self {
             introduction,
             partial: Vec::new(),
@@ -171,7 +171,7 @@ impl Client {
     }
 
     /// Takes bytes from the front of `bytes` until a frame is complete.
-    pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<HostFrame>, PutOut> {
+    pub(super) fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<HostFrame>, PutOut> {
         loop {
             let wanted = match self.partial.get(2..4) {
                 None => 4,
@@ -195,7 +195,7 @@ impl Client {
     }
 
     /// Checks that the client may send another frame now.
-    pub fn allow(&mut self, now: Duration) -> Result<(), PutOut> {
+    pub(super) fn allow(&mut self, now: Duration) -> Result<(), PutOut> {
         let passed = now.saturating_sub(self.allowed_at).as_secs_f64();
         self.allowance = (self.allowance + passed * FRAMES_PER_S).min(FRAMES_AT_ONCE) - 1.0;
         self.allowed_at = now;
@@ -203,18 +203,18 @@ impl Client {
     }
 
     /// Queues the record of a refused frame, which is sent with one of the next statuses.
-    pub fn refuse(&mut self, response: Response) -> Result<(), PutOut> {
+    pub(super) fn refuse(&mut self, response: Response) -> Result<(), PutOut> {
         self.refusals.push_back(response);
         if self.refusals.len() > REFUSALS_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
     /// Takes the next queued record of a refused frame.
-    pub fn take_refusal(&mut self) -> Option<Response> {
+    pub(super) fn take_refusal(&mut self) -> Option<Response> {
         self.refusals.pop_front()
     }
 
     /// Queues a frame for the line.
-    pub fn wait(&mut self, frame: HostFrame) -> Result<(), PutOut> {
+    pub(super) fn wait(&mut self, frame: HostFrame) -> Result<(), PutOut> {
         self.waiting_bytes += frame.bytes.len();
         self.commands += usize::from(frame.class.needs_lease());
         self.waiting.push_back(frame);
@@ -226,7 +226,7 @@ impl Client {
     }
 
     /// Takes the next queued frame.
-    pub fn take_waiting(&mut self) -> Option<HostFrame> {
+    pub(super) fn take_waiting(&mut self) -> Option<HostFrame> {
         let frame = self.waiting.pop_front()?;
         self.waiting_bytes -= frame.bytes.len();
         self.commands -= usize::from(frame.class.needs_lease());
@@ -235,7 +235,7 @@ impl Client {
 
     /// Removes the queued frames that need the lease; the others keep their order. Returns at once if no such frame is
     /// queued, because every Stop calls this for all clients.
-    pub fn take_commands(&mut self) -> Vec<HostFrame> {
+    pub(super) fn take_commands(&mut self) -> Vec<HostFrame> {
         if self.commands == 0 {
             return Vec::new();
         }
@@ -246,14 +246,14 @@ impl Client {
     }
 
     /// Queues a delivery. Returns an error if the client has left too many bytes unread.
-    pub fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
+    pub(super) fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
         self.unread += delivery.len();
         self.deliveries.push_back(delivery);
         if self.unread > UNREAD_MAX { Err(PutOut::Unread) } else { Ok(()) }
     }
 
     /// Takes the queued deliveries.
-    pub fn take_deliveries(&mut self) -> Vec<Delivery> {
+    pub(super) fn take_deliveries(&mut self) -> Vec<Delivery> {
         self.unread = 0;
         self.deliveries.drain(..).collect()
     }

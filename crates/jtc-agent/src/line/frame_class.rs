@@ -47,7 +47,7 @@ pub(super) struct HostFrame {
 
 impl HostFrame {
     /// Returns `None` if the bytes are not a valid frame of a host.
-    pub fn parse(bytes: Vec<u8>) -> Option<Self> {
+    pub(super) fn parse(bytes: Vec<u8>) -> Option<Self> {
         let frame = FrameRef::new_checked(&bytes).filter(|frame| frame.frame_type.from_host())?;
         let (frame_type, class) = (frame.frame_type, FrameClass::of(frame));
         Some(Self { bytes, frame_type, class })
@@ -55,18 +55,18 @@ impl HostFrame {
 
     /// Returns true if the frame reads the log of the flight recorder. Viewers may not send it, because the recorder
     /// pauses meanwhile (J-56).
-    pub fn reads_log(&self) -> bool {
+    pub(super) fn reads_log(&self) -> bool {
         let command = FrameRef::new_checked(&self.bytes).map(Command::parse);
         matches!(command, Some(Ok(Command::GetLog { block, .. })) if block != LOG_NO_BLOCK)
     }
 
     /// Returns the type of the frame that the controller sends in addition to the record.
-    pub fn returns(&self) -> Option<FrameType> {
+    pub(super) fn returns(&self) -> Option<FrameType> {
         returned_by(self.frame_type)
     }
 
     /// Returns the record of a frame that the agent refuses before the controller receives it.
-    pub fn refusal(&self) -> Response {
+    pub(super) fn refusal(&self) -> Response {
         Response::good(self.frame_type, DataStatus::NotAllowed, self.bytes.len() as u16)
     }
 }

@@ -29,30 +29,30 @@ pub(super) struct MotionTracker {
 
 impl MotionTracker {
     /// Notes that a frame that may begin a motion was sent at `at`.
-    pub fn begun(&mut self, frame_type: FrameType, at: Duration) {
+    pub(super) fn begun(&mut self, frame_type: FrameType, at: Duration) {
         self.begun_at = Some(at);
         self.teaches |= frame_type == FrameType::TeachingModeEnable;
     }
 
     /// Notes that a part of a trajectory was sent at `at`.
-    pub fn uploaded(&mut self, at: Duration) {
+    pub(super) fn uploaded(&mut self, at: Duration) {
         self.uploaded_at = Some(at);
     }
 
     /// Notes that the frame that ends Teaching was sent.
-    pub fn taught(&mut self) {
+    pub(super) fn taught(&mut self) {
         self.teaches = false;
     }
 
     /// Returns false only if the arm is certainly at rest and no motion is about to begin.
-    pub fn may_move(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
+    pub(super) fn may_move(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
         let shown = |at: Duration| now.saturating_sub(at) < SHOWS;
         let rests = status.is_some_and(|(at, status)| shown(*at) && !shows_motion(status));
         self.teaches || self.begun_at.is_some_and(shown) || !rests
     }
 
     /// Returns the cause of the present or next motion. If no recent status shows it, returns `before`.
-    pub fn what(
+    pub(super) fn what(
         &self,
         status: Option<&(Duration, Status)>,
         now: Duration,
@@ -73,36 +73,36 @@ impl MotionTracker {
 
     /// Returns true during a motion or Teaching, which host supervision (J-59) would end. A paused arm is not supervised, because it
     /// does not move.
-    pub fn is_supervised(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
+    pub(super) fn is_supervised(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
         let moves = [ControllerState::Operate, ControllerState::Teaching];
         self.begun_at.is_some_and(|at| now.saturating_sub(at) < SHOWS)
             || status.is_some_and(|(_, status)| status.state.is_in(&moves))
     }
 
     /// Returns true if Teaching may be on, or may begin.
-    pub fn may_teach(&self, status: Option<&(Duration, Status)>) -> bool {
+    pub(super) fn may_teach(&self, status: Option<&(Duration, Status)>) -> bool {
         self.teaches || status.is_some_and(|(_, status)| status.state == ControllerState::Teaching)
     }
 
     /// Requests the end of Teaching.
-    pub fn end_teaching(&mut self, now: Duration) {
+    pub(super) fn end_teaching(&mut self, now: Duration) {
         self.end_at = Some(now);
     }
 
     /// Returns the frame that ends Teaching if it is due.
-    pub fn frame(&mut self, now: Duration) -> Option<HostFrame> {
+    pub(super) fn frame(&mut self, now: Duration) -> Option<HostFrame> {
         self.end_at.take_if(|at| now >= *at)?;
         self.end_at = Some(now + AGAIN);
         HostFrame::parse(fixed::empty(FrameType::TeachingModeDisable).to_vec())
     }
 
     /// Notes that the controller confirmed the end of Teaching, or refused the frame because Teaching was off.
-    pub fn answered(&mut self) {
+    pub(super) fn answered(&mut self) {
         self.end_at = None;
     }
 
     /// Returns the time at which the frame that ends Teaching is due.
-    pub fn due(&self) -> Option<Duration> {
+    pub(super) fn due(&self) -> Option<Duration> {
         self.end_at
     }
 }

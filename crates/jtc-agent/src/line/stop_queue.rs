@@ -46,7 +46,7 @@ pub(super) struct StopQueue {
 
 impl StopQueue {
     /// Adds the request of a client. A Stop replaces a queued Pause, but a Pause never replaces a Stop.
-    pub fn ask(&mut self, client: ClientId, command: ExecCommand) {
+    pub(super) fn ask(&mut self, client: ClientId, command: ExecCommand) {
         let covers = |halt: &Halt| halt.command == ExecCommand::Stop || halt.command == command;
         if let Some(waiting) = &mut self.waiting {
             if !covers(waiting) {
@@ -65,12 +65,12 @@ impl StopQueue {
     }
 
     /// Returns the frame that must be written before all others.
-    pub fn frame(&self) -> Option<HostFrame> {
+    pub(super) fn frame(&self) -> Option<HostFrame> {
         self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
     }
 
     /// Notes that the frame was written. The line finishes its last byte at `at`.
-    pub fn written(&mut self, at: Duration, baud: Option<u32>) {
+    pub(super) fn written(&mut self, at: Duration, baud: Option<u32>) {
         if let Some(mut halt) = self.waiting.take() {
             halt.tries += 1;
             let awaited = if halt.tries > TRIES { LATER } else { AWAITED };
@@ -81,13 +81,13 @@ impl StopQueue {
     }
 
     /// Notes that a frame that may begin a motion was written.
-    pub fn motion_written(&mut self) {
+    pub(super) fn motion_written(&mut self) {
         self.motion_since = true;
     }
 
     /// Takes the record of the oldest written frame. Returns the clients that receive the record. If the controller
     /// received the frame damaged, it is sent again.
-    pub fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
+    pub(super) fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
         let Some(halt) = self.written.pop_front() else { return Vec::new() };
         if !arrived {
             self.again(halt);
@@ -97,7 +97,7 @@ impl StopQueue {
     }
 
     /// Repeats the frames whose record is overdue. Returns true if one of the frames has now been sent [`TRIES`] times.
-    pub fn look(&mut self, now: Duration) -> bool {
+    pub(super) fn look(&mut self, now: Duration) -> bool {
         let mut many = false;
         while let Some(halt) = self.written.pop_front_if(|halt| now >= halt.again_at) {
             many |= halt.tries == TRIES;
@@ -123,19 +123,19 @@ impl StopQueue {
     }
 
     /// Returns the time at which the next frame is written or repeated.
-    pub fn due(&self, now: Duration) -> Option<Duration> {
+    pub(super) fn due(&self, now: Duration) -> Option<Duration> {
         if self.waiting.is_some() { Some(now) } else { self.written.front().map(|halt| halt.again_at) }
     }
 
     /// Returns the command that was sent more than once because the controller does not confirm it. If both a Stop and
     /// a Pause were, returns the Stop.
-    pub fn untaken(&self) -> Option<ExecCommand> {
+    pub(super) fn untaken(&self) -> Option<ExecCommand> {
         let again = self.waiting.iter().chain(&self.written).filter(|halt| halt.tries > 1);
         again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)
     }
 
     /// Returns true if every request has its record.
-    pub fn are_done(&self) -> bool {
+    pub(super) fn are_done(&self) -> bool {
         self.waiting.is_none() && self.written.is_empty()
     }
 }

@@ -25,21 +25,21 @@ impl Supervision {
     }
 
     /// Takes the timeout from settings that the device returns.
-    pub fn take_answer(&mut self, answer: &Answer<'_>) {
+    pub(super) fn take_answer(&mut self, answer: &Answer<'_>) {
         if let Answer::Settings { values, .. } = answer {
             self.set(host_timeout_ms(values.iter()));
         }
     }
 
     /// Notes the timeout in a SetSettings that was written.
-    pub fn note_written(&mut self, frame: &[u8]) {
+    pub(super) fn note_written(&mut self, frame: &[u8]) {
         if let Some(Ok(Command::SetSettings(values))) = FrameRef::new_checked(frame).map(Command::parse) {
             self.written_ms = host_timeout_ms(values.iter());
         }
     }
 
     /// Takes the record of a SetSettings.
-    pub fn take_record(&mut self, response: &Response) {
+    pub(super) fn take_record(&mut self, response: &Response) {
         let written = self.written_ms.take();
         if response.accepted() {
             self.set(written);
@@ -48,7 +48,7 @@ impl Supervision {
 
     /// Takes a status. In Start and Init, the controller may have restarted with other settings, so the timeout is
     /// forgotten.
-    pub fn take_status(&mut self, status: &Status) {
+    pub(super) fn take_status(&mut self, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.timeout = None;
         }

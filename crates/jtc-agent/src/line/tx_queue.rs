@@ -23,7 +23,7 @@ const PIECE: usize = 64;
 
 /// A frame for the controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Outgoing {
+pub(super) struct Outgoing {
     /// Client that sent it.
     pub client: ClientId,
     /// Whole frame.
@@ -32,7 +32,7 @@ pub struct Outgoing {
 
 /// End of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Passed {
+pub(super) enum Passed {
     /// Its last byte was written.
     Written(Outgoing),
     /// The frame was abandoned halfway.
@@ -46,7 +46,7 @@ struct Writing {
 }
 
 /// Paces the bytes of a line. An urgent frame can overtake a frame that is being written.
-pub struct TxQueue {
+pub(super) struct TxQueue {
     baud: Option<u32>,
     urgent: Option<Outgoing>,
     writing: Option<Writing>,
@@ -60,7 +60,7 @@ pub struct TxQueue {
 
 impl TxQueue {
     /// Creates the queue of a line with this rate in Bd; `None` for a line without a rate.
-    pub fn new(baud: Option<u32>) -> Self {
+    pub(super) fn new(baud: Option<u32>) -> Self {
         Self {
             baud,
             urgent: None,
@@ -72,32 +72,32 @@ impl TxQueue {
     }
 
     /// When the line will have carried everything that was written.
-    pub fn free_at(&self) -> Duration {
+    pub(super) fn free_at(&self) -> Duration {
         self.free_at
     }
 
     /// Sets the frame that overtakes all others.
-    pub fn set_urgent(&mut self, urgent: Option<Outgoing>) {
+    pub(super) fn set_urgent(&mut self, urgent: Option<Outgoing>) {
         self.urgent = urgent;
     }
 
     /// Rate of the line, Bd, if it has one.
-    pub fn baud(&self) -> Option<u32> {
+    pub(super) fn baud(&self) -> Option<u32> {
         self.baud
     }
 
     /// Returns true if a new frame can be begun.
-    pub fn is_free(&self) -> bool {
+    pub(super) fn is_free(&self) -> bool {
         self.writing.is_none() && self.urgent.is_none()
     }
 
     /// Begins a frame; call it only if [`is_free`](Self::is_free) returns true.
-    pub fn begin(&mut self, outgoing: Outgoing) {
+    pub(super) fn begin(&mut self, outgoing: Outgoing) {
         self.writing = Some(Writing { outgoing, at: 0 });
     }
 
     /// Returns the time at which [`next`](Self::next) may have more to write. `None`: no bytes wait.
-    pub fn due(&self, now: Duration) -> Option<Duration> {
+    pub(super) fn due(&self, now: Duration) -> Option<Duration> {
         if now < self.silent_until {
             return Some(self.silent_until);
         }
@@ -115,7 +115,7 @@ impl TxQueue {
     }
 
     /// Returns the bytes to write now, and the frames that end with them.
-    pub fn next(&mut self, now: Duration) -> (Vec<u8>, Vec<Passed>) {
+    pub(super) fn next(&mut self, now: Duration) -> (Vec<u8>, Vec<Passed>) {
         let (mut bytes, mut passed) = (Vec::new(), Vec::new());
         if now < self.silent_until {
             return (bytes, passed);
@@ -168,14 +168,14 @@ impl TxQueue {
 
     /// Notes that the operating system accepted the bytes only now. If the line was idle, it began later than
     /// estimated, so it is free later.
-    pub fn handed_over(&mut self, now: Duration) {
+    pub(super) fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);
         }
     }
 
     /// Abandons the frame that has begun. Returns it, and true if the controller has received a part of it.
-    pub fn give_up(&mut self, now: Duration) -> Option<(Outgoing, bool)> {
+    pub(super) fn give_up(&mut self, now: Duration) -> Option<(Outgoing, bool)> {
         let writing = self.writing.take()?;
         if writing.at > 0 {
             self.silent_until = self.free_at.max(now) + GAP;
@@ -190,7 +190,7 @@ impl TxQueue {
     }
 
     /// Returns the current frame, and the number of its bytes that were written.
-    pub fn writing(&self) -> Option<(&Outgoing, usize)> {
+    pub(super) fn writing(&self) -> Option<(&Outgoing, usize)> {
         self.writing.as_ref().map(|w| (&w.outgoing, w.at))
     }
 }

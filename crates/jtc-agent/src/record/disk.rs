@@ -46,7 +46,7 @@ pub struct Notice {
 pub type Notify = Box<dyn FnMut(Notice) + Send>;
 
 /// Input of the writer's queue.
-pub struct Disk {
+pub(super) struct Disk {
     queue: SyncSender<Message>,
     waiting: Arc<AtomicUsize>,
     /// Number of samples of this recording that did not fit into the queue.
@@ -60,7 +60,7 @@ impl Disk {
     }
 
     /// Starts the thread that writes into `shelf`.
-    pub fn begin(retention: Retention, notify: Notify) -> io::Result<(Self, JoinHandle<()>)> {
+    pub(super) fn begin(retention: Retention, notify: Notify) -> io::Result<(Self, JoinHandle<()>)> {
         let (disk, messages) = Self::new();
         let taken = disk.waiting.clone();
         let writer = Writer::new(retention, notify, AGAIN);
@@ -83,25 +83,25 @@ impl Disk {
     }
 
     /// Begins a recording. Like the other methods, this never waits.
-    pub fn open(&mut self, info: RecordingInfo) {
+    pub(super) fn open(&mut self, info: RecordingInfo) {
         self.lost = 0;
         self.send(Message::Begin(Box::new(info)), 0);
     }
 
     /// Queues a sample. If the queue is full, the sample is counted as lost.
-    pub fn write(&mut self, sample: &Sample) {
+    pub(super) fn write(&mut self, sample: &Sample) {
         if !self.send(Message::Sample(Box::new(*sample)), RESERVED) {
             self.lost += 1;
         }
     }
 
     /// Adds a number of samples that were lost before they reached this queue.
-    pub fn lose(&mut self, samples: u64) {
+    pub(super) fn lose(&mut self, samples: u64) {
         self.lost += samples;
     }
 
     /// Ends the recording.
-    pub fn close(&mut self, ending: Ending) {
+    pub(super) fn close(&mut self, ending: Ending) {
         let lost = std::mem::take(&mut self.lost);
         self.send(Message::End(ending, lost), 0);
     }

@@ -19,11 +19,11 @@ const STANDS: Duration = Duration::from_secs(10);
 /// Time for which a Jog acts (J-58), plus its time on the line.
 const JOG: Duration = Duration::from_millis(400);
 /// Time without a status after which the recording of a motion ends, because the connection is considered lost.
-pub const SILENT: Duration = Duration::from_secs(2);
+pub(super) const SILENT: Duration = Duration::from_secs(2);
 
 /// Kinds of motions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub(super) enum Motion {
     /// Motion along a trajectory: a run, or the approach to its first point.
     Execution,
     /// Jog: joints with commanded velocities.
@@ -34,7 +34,7 @@ pub enum Motion {
 
 impl Motion {
     /// Returns the name in recordings.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Execution => "execution",
             Self::Jog => "jog",
@@ -45,7 +45,7 @@ impl Motion {
 
 /// Step of a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Step {
+pub(super) enum Step {
     /// Begins a recording, with a status that arrived at this time.
     Begin(Motion, Duration),
     /// Adds a status.
@@ -67,7 +67,7 @@ struct Open {
 
 /// Finds recordings in a stream of statuses.
 #[derive(Default)]
-pub struct Follower {
+pub(super) struct Follower {
     before: VecDeque<(Duration, Status)>,
     open: Option<Open>,
     last: Option<(Duration, TrajectoryState, u32)>,
@@ -76,17 +76,17 @@ pub struct Follower {
 
 impl Follower {
     /// Notes that a Jog was sent.
-    pub fn jog(&mut self, now: Duration) {
+    pub(super) fn jog(&mut self, now: Duration) {
         self.jogged = Some(now);
     }
 
     /// Returns `true` while a recording is in progress.
-    pub fn is_recording(&self) -> bool {
+    pub(super) fn is_recording(&self) -> bool {
         self.open.is_some()
     }
 
     /// Takes the next status, which arrived at `now`.
-    pub fn status(&mut self, now: Duration, status: &Status) -> Vec<Step> {
+    pub(super) fn status(&mut self, now: Duration, status: &Status) -> Vec<Step> {
         let mut steps = self.silence(now);
         let motion = self.motion(now, status);
         // Another motion gets a separate recording, even directly after the last one.
@@ -124,7 +124,7 @@ impl Follower {
     }
 
     /// Notes that no status has arrived until `now`.
-    pub fn silence(&mut self, now: Duration) -> Vec<Step> {
+    pub(super) fn silence(&mut self, now: Duration) -> Vec<Step> {
         let silent = self.last.is_some_and(|(at, ..)| now.saturating_sub(at) > SILENT);
         if !silent {
             return Vec::new();
@@ -133,7 +133,7 @@ impl Follower {
     }
 
     /// Ends the recording with the given reason, because no more statuses will be taken.
-    pub fn end(&mut self, outcome: &str, reason: &str) -> Vec<Step> {
+    pub(super) fn end(&mut self, outcome: &str, reason: &str) -> Vec<Step> {
         self.last = None;
         self.before.clear();
         let ending = Ending { outcome: outcome.into(), reason: reason.into(), ..Ending::default() };

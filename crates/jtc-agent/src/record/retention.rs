@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Name of the list.
-pub const LIST: &str = ".jtc-recordings";
+pub(super) const LIST: &str = ".jtc-recordings";
 /// Ending of a complete recording.
 const WHOLE: &str = ".mcap";
 /// Ending of a recording that is incomplete or in progress. Every command can read such a file.
@@ -38,7 +38,7 @@ impl Own {
 type Make = fn(&Path) -> io::Result<File>;
 
 /// Recording directory.
-pub struct Retention {
+pub(super) struct Retention {
     dir: PathBuf,
     make: Make,
     limit: u64,
@@ -50,7 +50,7 @@ pub struct Retention {
 }
 
 /// Recording in progress.
-pub struct Begun {
+pub(super) struct Begun {
     /// Path of its file.
     pub path: PathBuf,
     name: String,
@@ -62,7 +62,7 @@ impl Retention {
     /// # Errors
     ///
     /// The directory cannot be created or written, or another agent uses it.
-    pub fn open(dir: &Path, limit: u64) -> io::Result<Self> {
+    pub(super) fn open(dir: &Path, limit: u64) -> io::Result<Self> {
         std::fs::create_dir_all(dir)?;
         let path = dir.join(LIST);
         let mut list = OpenOptions::new().read(true).append(true).create(true).open(path)?;
@@ -146,7 +146,7 @@ impl Retention {
     /// # Errors
     ///
     /// The disk cannot be written.
-    pub fn begin(&mut self, now: Duration) -> io::Result<(File, Begun)> {
+    pub(super) fn begin(&mut self, now: Duration) -> io::Result<(File, Begun)> {
         loop {
             let name = name(now, self.number + 1);
             let (whole, path) =
@@ -167,7 +167,7 @@ impl Retention {
     /// # Errors
     ///
     /// The recording keeps its name of an incomplete recording.
-    pub fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
+    pub(super) fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
         let bytes = length(&begun.path).unwrap_or(0);
         let mut own = Own { name: begun.name, bytes, part: true };
         let whole = Own { part: false, ..own.clone() }.path(&self.dir);
@@ -179,7 +179,7 @@ impl Retention {
     }
 
     /// Ends a recording without completing it. The file is kept if it contains samples.
-    pub fn break_off(&mut self, begun: Begun, samples: u64) {
+    pub(super) fn break_off(&mut self, begun: Begun, samples: u64) {
         if samples == 0 && std::fs::remove_file(&begun.path).is_ok() {
             let _ = self.note(&format!("gone {}", begun.name));
             self.gone += 1;
@@ -193,7 +193,7 @@ impl Retention {
     }
 
     /// Removes the oldest recordings until `bytes` fit within the limit; returns the removed paths.
-    pub fn make_room(&mut self, bytes: u64) -> Vec<PathBuf> {
+    pub(super) fn make_room(&mut self, bytes: u64) -> Vec<PathBuf> {
         let mut removed = Vec::new();
         while self.bytes() + bytes > self.limit
             && let Some(oldest) = self.own.pop_front()
@@ -214,13 +214,13 @@ impl Retention {
     }
 
     /// Returns the size in bytes after which a recording continues in another file. So old parts can be removed.
-    pub fn longest(&self) -> u64 {
+    pub(super) fn longest(&self) -> u64 {
         self.limit / 4
     }
 
     /// Replaces the function that creates files.
     #[cfg(test)]
-    pub fn making(self, make: Make) -> Self {
+    pub(super) fn making(self, make: Make) -> Self {
         Self { make, ..self }
     }
 

@@ -15,7 +15,7 @@ const TURN_US: u64 = 2000;
 const REPORT_US: u64 = 15_500;
 
 /// Line and board.
-pub struct Board {
+pub(crate) struct Board {
     pub line: SharedLine,
     baud: f64,
     now_us: u64,
@@ -45,7 +45,7 @@ pub struct Board {
 }
 
 impl Board {
-    pub fn new(baud: u32) -> Self {
+    pub(crate) fn new(baud: u32) -> Self {
         Self {
             line: SharedLine::new(Some(baud)),
             baud: f64::from(baud),
@@ -66,20 +66,20 @@ impl Board {
         }
     }
 
-    pub fn join(&mut self, name: &str, role: Role, policy: Policy) -> ClientId {
+    pub(crate) fn join(&mut self, name: &str, role: Role, policy: Policy) -> ClientId {
         self.line.join(Introduction { name: name.into(), role, policy })
     }
 
-    pub fn now(&self) -> Duration {
+    pub(crate) fn now(&self) -> Duration {
         Duration::from_micros(self.now_us)
     }
 
-    pub fn send(&mut self, client: ClientId, bytes: &[u8]) {
+    pub(crate) fn send(&mut self, client: ClientId, bytes: &[u8]) {
         let now = self.now();
         self.line.from_client(client, bytes, now);
     }
 
-    pub fn run_ms(&mut self, ms: u64) {
+    pub(crate) fn run_ms(&mut self, ms: u64) {
         for _ in 0..ms * 1000 / STEP_US {
             self.step();
         }
@@ -138,12 +138,12 @@ impl Board {
     }
 
     /// Returns the number of frames of this type that have arrived.
-    pub fn arrived(&self, frame_type: FrameType) -> usize {
+    pub(crate) fn arrived(&self, frame_type: FrameType) -> usize {
         self.frames.iter().filter(|(_, t, _)| *t == Some(frame_type)).count()
     }
 
     /// Returns the records that a client has received, and the reasons for its refused requests.
-    pub fn take(&mut self, client: ClientId) -> (Vec<Response>, Vec<String>) {
+    pub(crate) fn take(&mut self, client: ClientId) -> (Vec<Response>, Vec<String>) {
         let (mut records, mut denied) = (Vec::new(), Vec::new());
         for delivery in self.line.take_deliveries(client).expect("it is there") {
             match delivery {

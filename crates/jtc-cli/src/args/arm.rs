@@ -8,7 +8,7 @@ use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
 /// `jtc arm …`
 #[derive(Debug, Subcommand)]
-pub enum ArmCommand {
+pub(crate) enum ArmCommand {
     /// Make an arm file from a robot description (URDF)
     #[command(after_help = "The command lists all frames that it turned and all values that it guessed.\n\n\
             The arm must be a chain of six revolute or continuous joints. If more joints move (a gripper, a \
@@ -107,7 +107,7 @@ pub enum ArmCommand {
 
 /// Options of `jtc arm import`.
 #[derive(Args, Debug)]
-pub struct ImportArgs {
+pub(crate) struct ImportArgs {
     /// Robot description (URDF)
     #[arg(value_name = "URDF")]
     pub urdf: PathBuf,

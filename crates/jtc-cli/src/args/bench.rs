@@ -7,7 +7,7 @@ use super::LinkArgs;
 
 /// `jtc bench …`
 #[derive(Debug, Subcommand)]
-pub enum BenchCommand {
+pub(crate) enum BenchCommand {
     /// Set these joints absent, and all others present
     #[command(
         after_help = "Name each absent joint, counted from 1, with the angle that it has in the model. The \

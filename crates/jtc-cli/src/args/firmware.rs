@@ -8,7 +8,7 @@ use super::LinkArgs;
 
 /// `jtc firmware …`
 #[derive(Debug, Subcommand)]
-pub enum FirmwareCommand {
+pub(crate) enum FirmwareCommand {
     /// List installed images and mounted board drives
     #[command(
         after_help = "The file firmware.json lists the images. The variable OPENJTC_FIRMWARE names the \
@@ -56,7 +56,7 @@ pub enum FirmwareCommand {
 
 /// Options that select the image.
 #[derive(Args, Clone, Debug)]
-pub struct ImageArgs {
+pub(crate) struct ImageArgs {
     /// Use this image, a binary (.bin) or an ELF file
     #[arg(long, value_name = "FILE", conflicts_with = "board")]
     pub image: Option<PathBuf>,
@@ -69,7 +69,7 @@ pub struct ImageArgs {
 
 /// Options of `jtc firmware flash`.
 #[derive(Args, Debug)]
-pub struct FlashArgs {
+pub(crate) struct FlashArgs {
     #[command(flatten)]
     pub image: ImageArgs,
     /// Use the board drive that is mounted at this directory.

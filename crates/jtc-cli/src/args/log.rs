@@ -8,7 +8,7 @@ use super::{LinkArgs, OverwriteArgs};
 
 /// `jtc log …`
 #[derive(Debug, Subcommand)]
-pub enum LogCommand {
+pub(crate) enum LogCommand {
     /// Read the flight recorder, and report the first error
     #[command(
         after_help = "The report shows the first error, and the events before and after this error.\n\n\

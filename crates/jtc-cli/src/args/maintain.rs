@@ -8,7 +8,7 @@ use super::{AcceptArgs, LinkArgs};
 
 /// Options of `jtc monitor`.
 #[derive(Args, Debug)]
-pub struct MonitorArgs {
+pub(crate) struct MonitorArgs {
     #[command(flatten)]
     pub link: LinkArgs,
     /// End after this number of statuses
@@ -18,7 +18,7 @@ pub struct MonitorArgs {
 
 /// Options of `jtc clear`.
 #[derive(Args, Debug)]
-pub struct ClearArgs {
+pub(crate) struct ClearArgs {
     #[command(flatten)]
     pub link: LinkArgs,
     /// Also clear the record of errors that occurred
@@ -28,7 +28,7 @@ pub struct ClearArgs {
 
 /// Options of `jtc reset`.
 #[derive(Args, Debug)]
-pub struct ResetArgs {
+pub(crate) struct ResetArgs {
     /// Reset these joints, counted from 1, as 2 or 1,3
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
     pub joints: Vec<u8>,
@@ -50,7 +50,7 @@ pub struct ResetArgs {
 
 /// Options of `jtc gripper`.
 #[derive(Args, Debug)]
-pub struct GripperArgs {
+pub(crate) struct GripperArgs {
     /// State of the pump
     pub pump: Switch,
     #[command(flatten)]
@@ -59,7 +59,7 @@ pub struct GripperArgs {
 
 /// On or off.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-pub enum Switch {
+pub(crate) enum Switch {
     /// Switch the pump on.
     On,
     /// Switch the pump off.
@@ -68,7 +68,7 @@ pub enum Switch {
 
 /// Options of `jtc recover`.
 #[derive(Args, Debug)]
-pub struct RecoverArgs {
+pub(crate) struct RecoverArgs {
     #[command(flatten)]
     pub link: LinkArgs,
     /// Send friction, gains and arm model of this arm file
@@ -83,7 +83,7 @@ pub struct RecoverArgs {
 
 /// Options of `jtc jog`.
 #[derive(Args, Debug)]
-pub struct JogArgs {
+pub(crate) struct JogArgs {
     /// Joint, counted from 1 (1 to 6).
     ///
     /// Without a joint, you jog with keys on the terminal

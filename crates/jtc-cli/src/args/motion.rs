@@ -34,7 +34,7 @@ pub(super) const STOP_EXAMPLES: &str = "The Stop also reaches the arm if an agen
 
 /// Options of the check of a trajectory.
 #[derive(Args, Clone, Debug)]
-pub struct CheckArgs {
+pub(crate) struct CheckArgs {
     /// Use the limits and masses of this arm, TOML or URDF.
     ///
     /// Default: the built-in arm. Before a motion, the command uses the arm of the controller instead, if the controller
@@ -55,14 +55,14 @@ pub struct CheckArgs {
 
 impl CheckArgs {
     /// Percent of the file's own speed.
-    pub fn speed(&self) -> f64 {
+    pub(crate) fn speed(&self) -> f64 {
         self.speed.unwrap_or(100.0)
     }
 }
 
 /// `jtc traj …`
 #[derive(Debug, Subcommand)]
-pub enum TrajCommand {
+pub(crate) enum TrajCommand {
     /// Check the limits of a trajectory; nothing is sent
     #[command(
         after_help = "The check covers the limits at and between points, and the torques by the arm model. \
@@ -181,7 +181,7 @@ pub enum TrajCommand {
 
 /// Options of `jtc traj run`.
 #[derive(Args, Debug)]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     /// Trajectory file.
     ///
     /// Formats: CSV, JSON, or trajectory_msgs/JointTrajectory as YAML or JSON
@@ -208,7 +208,7 @@ pub struct RunArgs {
 
 /// Options of `jtc traj resume`.
 #[derive(Args, Debug)]
-pub struct ResumeArgs {
+pub(crate) struct ResumeArgs {
     /// Check the remainder of this trajectory before the motion.
     ///
     /// Name the trajectory file of the run, or an MCAP recording of the run, which contains the trajectory
@@ -222,7 +222,7 @@ pub struct ResumeArgs {
 
 /// Options of `jtc traj continue`.
 #[derive(Args, Debug)]
-pub struct ContinueArgs {
+pub(crate) struct ContinueArgs {
     /// Recording of the interrupted run, .mcap or .csv
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
@@ -247,7 +247,7 @@ pub struct ContinueArgs {
 
 /// Options of every command that executes a motion.
 #[derive(Args, Clone, Debug)]
-pub struct ExecuteArgs {
+pub(crate) struct ExecuteArgs {
     /// Set the reaction of the motion to the loss of this program.
     ///
     /// The motion continues, pauses or stops if this program is killed or loses its agent. This option needs an agent
@@ -264,7 +264,7 @@ pub struct ExecuteArgs {
 
 /// Files that a run writes.
 #[derive(Args, Clone, Debug)]
-pub struct RunFiles {
+pub(crate) struct RunFiles {
     /// Record the motion to this .mcap or .csv file
     #[arg(long, env = "JTC_RUN_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -279,7 +279,7 @@ pub struct RunFiles {
 
 /// `jtc teach …`
 #[derive(Debug, Subcommand)]
-pub enum TeachCommand {
+pub(crate) enum TeachCommand {
     /// Start teaching, to move the arm by hand
     #[command(after_help = "During teaching, the controller compensates gravity and part of the friction, \
         and damps the motion. The controller does not hold a position against the hand.\n\n\
@@ -325,7 +325,7 @@ pub enum TeachCommand {
 
 impl ExecuteArgs {
     /// The policy in the word of the agent.
-    pub fn policy(&self) -> Option<&'static str> {
+    pub(crate) fn policy(&self) -> Option<&'static str> {
         ["continue", "pause", "stop"].into_iter().find(|word| self.when_gone.as_deref() == Some(word))
     }
 }

@@ -8,7 +8,7 @@ use super::OverwriteArgs;
 
 /// Options of `jtc dynamics`.
 #[derive(Args, Debug)]
-pub struct DynamicsArgs {
+pub(crate) struct DynamicsArgs {
     /// Quantity to compute
     pub what: DynamicsKind,
     /// Use this arm, TOML or URDF (default: the built-in arm)
@@ -26,7 +26,7 @@ pub struct DynamicsArgs {
 
 /// Kinds of dynamics.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-pub enum DynamicsKind {
+pub(crate) enum DynamicsKind {
     /// Compute the torques of a motion.
     Inverse,
     /// Compute the accelerations that torques cause.
@@ -37,7 +37,7 @@ pub enum DynamicsKind {
 
 /// Options of `jtc explain`.
 #[derive(Args, Debug)]
-pub struct ExplainArgs {
+pub(crate) struct ExplainArgs {
     /// Name, number or words of the code, as shown on the screen.
     ///
     /// `faults` explains the format of fault files. Without a code, the command lists all codes
@@ -46,7 +46,7 @@ pub struct ExplainArgs {
 
 /// Options of `jtc example`.
 #[derive(Args, Debug)]
-pub struct ExampleArgs {
+pub(crate) struct ExampleArgs {
     /// Name of the example.
     ///
     /// Without a name, or with `list`, the command lists all examples
@@ -60,14 +60,14 @@ pub struct ExampleArgs {
 
 /// Options of `jtc help`.
 #[derive(Args, Debug)]
-pub struct HelpArgs {
+pub(crate) struct HelpArgs {
     /// Page (files, faults or events), or the words of a command
     pub topic: Vec<String>,
 }
 
 /// Options of `jtc report`.
 #[derive(Args, Debug)]
-pub struct ReportArgs {
+pub(crate) struct ReportArgs {
     /// Recording, .mcap or .csv
     pub file: PathBuf,
     /// Write this page (default: next to the recording)

@@ -8,7 +8,7 @@ use super::LinkArgs;
 
 /// `jtc params …`
 #[derive(Debug, Subcommand)]
-pub enum ParamsCommand {
+pub(crate) enum ParamsCommand {
     /// Send friction, gains and arm model from files
     #[command(after_help = "The command accepts these files:\n  \
             TOML or URDF               an arm\n  \
@@ -70,7 +70,7 @@ pub enum FrictionKind {
 
 /// Option for values of an arm file that no frame carries.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct AcceptArgs {
+pub(crate) struct AcceptArgs {
     /// Continue even if limits, gravity or rotor inertia differ.
     ///
     /// The controller then uses its own values instead of those of the arm file. For a motion on a controller with

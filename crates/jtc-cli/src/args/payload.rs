@@ -7,7 +7,7 @@ use super::LinkArgs;
 
 /// `jtc payload …`
 #[derive(Debug, Subcommand)]
-pub enum PayloadCommand {
+pub(crate) enum PayloadCommand {
     /// Set the payload
     #[command(
         after_help = "The controller then holds and moves the arm with this payload. The flange is the last \
@@ -42,7 +42,7 @@ pub enum PayloadCommand {
 
 /// A body at the flange.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct PayloadArgs {
+pub(crate) struct PayloadArgs {
     /// Set the mass, kg
     #[arg(long, value_name = "KG", allow_hyphen_values = true)]
     pub mass: f64,
@@ -58,7 +58,7 @@ pub struct PayloadArgs {
 
 impl PayloadArgs {
     /// The body.
-    pub fn payload(&self) -> Payload {
+    pub(crate) fn payload(&self) -> Payload {
         let Self { mass, com, inertia } = *self;
         let [xx, yy, zz, xy, xz, yz] = inertia.unwrap_or_default();
         Payload { mass, com, inertia: [xx, xy, xz, yy, yz, zz] }
@@ -90,7 +90,7 @@ fn inertia(text: &str) -> Result<[f64; 6], String> {
 }
 
 /// A point mass for the simulator: `KG` or `KG,X,Y,Z`.
-pub fn carried(text: &str) -> Result<Payload, String> {
+pub(super) fn carried(text: &str) -> Result<Payload, String> {
     let payload = match numbers(text)?[..] {
         [mass] => Payload { mass, ..Payload::NONE },
         [mass, x, y, z] => Payload { mass, com: [x, y, z], ..Payload::NONE },

@@ -10,7 +10,7 @@ use super::{ExecuteArgs, LinkArgs, OverwriteArgs};
 
 /// Options of `jtc plan`.
 #[derive(Args, Debug)]
-pub struct PlanArgs {
+pub(crate) struct PlanArgs {
     /// Waypoints, CSV or JSON
     pub file: PathBuf,
     /// Write the trajectory to this .csv file
@@ -74,7 +74,7 @@ pub struct PlanArgs {
 /// Options of `jtc move`.
 #[derive(Args, Debug)]
 #[command(group = clap::ArgGroup::new("target").required(true))]
-pub struct MoveArgs {
+pub(crate) struct MoveArgs {
     /// Move to joint positions, rad, or to a pose of the arm file
     #[arg(
         long,
@@ -121,7 +121,7 @@ pub struct MoveArgs {
 
 /// Torque that a plan leaves.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct MarginArgs {
+pub(crate) struct MarginArgs {
     /// Reserve torque, in percent of each limit (0 to 50).
     ///
     /// The reserve is for masses and friction that the model does not know
@@ -138,7 +138,7 @@ pub struct MarginArgs {
 
 /// Target of a move.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Target {
+pub(crate) enum Target {
     /// As typed, base to wrist.
     Joints([f64; JOINTS]),
     /// Name of a pose.
@@ -178,7 +178,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 
 /// `jtc pose …`
 #[derive(Debug, Subcommand)]
-pub enum PoseCommand {
+pub(crate) enum PoseCommand {
     /// Save the present position in the arm file
     #[command(
         after_help = "The arm must be at rest. The command is refused during a trajectory or a jog. The \
@@ -223,7 +223,7 @@ pub enum PoseCommand {
 
 /// The file that holds the poses.
 #[derive(Args, Debug)]
-pub struct PoseArm {
+pub(crate) struct PoseArm {
     /// Use this arm file, TOML.
     ///
     /// `jtc example arm` writes an example, and `jtc arm pull` writes the arm of the controller

@@ -12,7 +12,7 @@ use super::LinkArgs;
 
 /// Options of `jtc serve`.
 #[derive(Args, Debug)]
-pub struct ServeArgs {
+pub(crate) struct ServeArgs {
     /// Use a simulated controller instead of a port
     #[arg(long, env = "JTC_SIM", value_parser = on_off, conflicts_with = "port")]
     pub sim: bool,

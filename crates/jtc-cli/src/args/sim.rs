@@ -11,7 +11,7 @@ use super::OverwriteArgs;
 
 /// Speed of virtual time.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-pub enum SimSpeed {
+pub(crate) enum SimSpeed {
     /// Run at the speed of a real arm.
     Realtime,
     /// Run as fast as this computer can.
@@ -20,7 +20,7 @@ pub enum SimSpeed {
 
 /// Support of a simulated arm while its drives do not hold it.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-pub enum SimSupport {
+pub(crate) enum SimSupport {
     /// No support: the arm falls while its drives are off
     None,
     /// A stand until all drives were enabled once, then no support
@@ -55,7 +55,7 @@ fn of_joints(text: &str, (low, high): (f64, f64), unit: &str) -> Result<[f64; JO
 
 /// Options of `jtc demo`.
 #[derive(Args, Debug)]
-pub struct DemoArgs {
+pub(crate) struct DemoArgs {
     /// Write recording, report and picture to this directory
     #[arg(long, env = "JTC_DEMO_DIR", value_name = "DIR", default_value = "demo")]
     pub out: PathBuf,
@@ -68,7 +68,7 @@ pub struct DemoArgs {
 
 /// Options of `jtc sim`.
 #[derive(Args, Debug)]
-pub struct SimArgs {
+pub(crate) struct SimArgs {
     /// Make this path a symbolic link to the pseudo-terminal.
     ///
     /// By default the command prints the name of the pseudo-terminal

@@ -3,7 +3,7 @@
 use cli_kit::variables::{Retired, Variables};
 
 /// Variables of `jtc`, and those that earlier versions used.
-pub const VARIABLES: Variables = Variables {
+pub(crate) const VARIABLES: Variables = Variables {
     json: "JTC_JSON",
     retired: &[
         // Variables that made a command move, reset, program, answer a question, override a check or overwrite a file, or that set

@@ -13,10 +13,10 @@ use jtc_host::doctor::Finding;
 use serde_json::json;
 
 use crate::args::ArmCommand;
-pub use show::poses as poses_table;
+pub(super) use show::poses as poses_table;
 
 /// Runs a command of the family.
-pub fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
     match command {
         ArmCommand::Import(args) => import::import(args, out),
         ArmCommand::Check { file } => check(file, out),

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::args::{BenchCommand, LinkArgs};
 
 /// Runs a command of the family.
-pub fn bench(command: &BenchCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn bench(command: &BenchCommand, out: &Output) -> Result<(), Failure> {
     match command {
         BenchCommand::Absent { joints, deg, link } => {
             let mut absent = [None; JOINTS];
@@ -54,7 +54,7 @@ fn refused(error: Error) -> Failure {
 }
 
 /// Describes the absent joints.
-pub fn words(absent: &[Option<f64>; JOINTS]) -> String {
+pub(super) fn words(absent: &[Option<f64>; JOINTS]) -> String {
     let all = Joint::ALL.iter().zip(absent);
     let all: Vec<String> =
         all.filter_map(|(joint, at)| at.map(|at| format!("{joint} at {at} rad"))).collect();
@@ -66,7 +66,7 @@ fn as_text(absent: &[Option<f64>; JOINTS]) -> String {
 }
 
 /// Returns the absent joints as JSON.
-pub fn as_json(absent: &[Option<f64>; JOINTS]) -> Value {
+pub(super) fn as_json(absent: &[Option<f64>; JOINTS]) -> Value {
     let all = Joint::ALL.iter().zip(absent);
     let all: Vec<Value> = all
         .filter_map(|(joint, at)| at.map(|at| json!({ "joint": joint.number(), "position_rad": at })))

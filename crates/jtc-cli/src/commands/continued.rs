@@ -13,7 +13,7 @@ use super::run::{Course, perform};
 use crate::args::ContinueArgs;
 
 /// Finds the resume point, and runs the remainder from there.
-pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
     let recording = Recording::read(&args.run).map_err(Failure::nothing_sent)?;
     if let Some(cut) = &recording.cut {
         out.note(format!("note: {}: {cut}", args.run.display()));

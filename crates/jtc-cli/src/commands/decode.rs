@@ -13,7 +13,7 @@ use super::status;
 const SHOWN: usize = 32;
 
 /// Decodes stdin to its end. Exit code 2 if it contains no frame.
-pub fn decode(out: &Output) -> Result<(), Failure> {
+pub(super) fn decode(out: &Output) -> Result<(), Failure> {
     let mut input = Vec::new();
     std::io::stdin().lock().read_to_end(&mut input)?;
     let mut frames = 0;

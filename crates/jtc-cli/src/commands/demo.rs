@@ -43,7 +43,7 @@ struct Run {
 }
 
 /// Runs the demo and writes its files.
-pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::usage(format!("{}: {e}", args.out.display())))?;
     let file = |name: &str| args.out.join(name);

@@ -18,7 +18,7 @@ const LISTEN: Duration = Duration::from_secs(2);
 const TRY: Duration = Duration::from_millis(300);
 
 /// Checks link, bus and set-up. The exit code is 0 without a problem, 3 without a link, and else 1.
-pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));
     let mut session = link.session()?;

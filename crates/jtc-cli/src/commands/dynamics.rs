@@ -10,7 +10,7 @@ use super::named_arm;
 use crate::args::{DynamicsArgs, DynamicsKind};
 
 /// Reads lines of numbers until the end of stdin.
-pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
     let arm = named_arm::load(args.arm.as_deref())?;
     named_arm::note_warnings(&arm, out);
     if args.rotors && arm.rotors_given.contains(&false) {

@@ -9,7 +9,7 @@ use crate::args::ExampleArgs;
 use cli_kit::OutputFile;
 
 /// Writes an example, or lists them.
-pub fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
     let name = args.name.as_deref().unwrap_or("list");
     if name.eq_ignore_ascii_case("list") {
         list(out);

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::args::ExplainArgs;
 
 /// Prints the matching pages, or the list of all pages.
-pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let code = &args.code.join(" ");
     if code.is_empty() {
         list(out);

@@ -18,7 +18,7 @@ use crate::args::{FirmwareCommand, FlashArgs, ImageArgs, LinkArgs};
 use crate::ask::confirm;
 
 /// `jtc firmware …`
-pub fn firmware(command: &FirmwareCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn firmware(command: &FirmwareCommand, out: &Output) -> Result<(), Failure> {
     match command {
         FirmwareCommand::List => list(out),
         FirmwareCommand::Flash(args) => flash(args, out),

@@ -36,7 +36,7 @@ const REST: Duration = Duration::from_secs(5);
 const STILL_MOVING: &str = "still-moving";
 
 /// Stops the arm, and waits until it is at rest.
-pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arms = arms(link);
     let not_asked = if link.port.is_some() { Vec::new() } else { not_asked(&arms) };
     out.stream()?;
@@ -94,7 +94,7 @@ fn not_asked(arms: &[Arm]) -> Vec<String> {
 }
 
 /// Pauses the motion on its path.
-pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let (answer, words) = match reach(link, Halt::Pause, false).map_err(|error| error.told(Halt::Pause))? {
         Reached::Line(session) => {

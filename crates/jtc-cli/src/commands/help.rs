@@ -14,7 +14,7 @@ const PAGES: [(&str, &str); 3] = [
 ];
 
 /// Prints a page, or the help of the command that the words name.
-pub fn help(args: &HelpArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn help(args: &HelpArgs, out: &Output) -> Result<(), Failure> {
     if let [word] = args.topic.as_slice()
         && let Some((_, text)) = PAGES.iter().find(|(name, _)| name == word)
     {

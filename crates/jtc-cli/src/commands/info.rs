@@ -15,7 +15,7 @@ use crate::ask::confirm;
 const DISABLED: Duration = Duration::from_secs(5);
 
 /// Prints the identity of the controller.
-pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     let info = session.info()?;
     let status = session.fresh_status()?;
@@ -40,7 +40,7 @@ pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 }
 
 /// Formats a hash in the form that all outputs use.
-pub fn hash(hash: u64) -> String {
+pub(super) fn hash(hash: u64) -> String {
     format!("{hash:016x}")
 }
 
@@ -163,7 +163,7 @@ fn without_extensions(s: &Status) -> String {
 }
 
 /// Removes the torque from an arm that is held at rest.
-pub fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     if !yes {
         confirm("the arm loses its torque: an arm without holding brakes falls", "--yes")?;

@@ -20,7 +20,7 @@ use crate::args::CheckArgs;
 const TRIES: usize = 4;
 
 /// Formats a path as the user can type it in a shell.
-pub fn typed(path: &Path) -> String {
+pub(super) fn typed(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
     if !text.is_empty() && text.chars().all(plain) {
@@ -31,7 +31,7 @@ pub fn typed(path: &Path) -> String {
 }
 
 /// Returns the name of a file without directory and ending.
-pub fn stem(path: &Path) -> String {
+pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
@@ -43,7 +43,7 @@ fn arm_of(args: &CheckArgs, out: &Output) -> Result<Arm, Failure> {
 }
 
 /// A trajectory at the requested speed, and the arm for its check.
-pub struct Job {
+pub(super) struct Job {
     /// Loaded file and the data derived from it.
     pub loaded: Loaded,
     /// Trajectory at the requested speed.
@@ -68,14 +68,14 @@ pub struct Job {
 
 impl Job {
     /// Reads the files. Prints notes and warnings on stderr.
-    pub fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
+    pub(super) fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         let arm = arm_of(args, out)?;
         let loaded = Loaded::load(file, Some(&arm.joint_names))?;
         Self::with(arm, loaded, file, args, out)
     }
 
     /// Like [`Self::load`], with a trajectory that was already read.
-    pub fn of(loaded: Loaded, file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
+    pub(super) fn of(loaded: Loaded, file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         Self::with(arm_of(args, out)?, loaded, file, args, out)
     }
 
@@ -109,7 +109,7 @@ impl Job {
     }
 
     /// Creates a job without a file. [`Job::take`] sets its motion later. `words` is the command as the user typed it.
-    pub fn made(arm: Arm, words: String, out: &Output) -> Self {
+    pub(super) fn made(arm: Arm, words: String, out: &Output) -> Self {
         named_arm::note_warnings(&arm, out);
         let loaded = Loaded {
             trajectory: Trajectory::default(),
@@ -135,14 +135,14 @@ impl Job {
     }
 
     /// Sets the motion of this job.
-    pub fn take(&mut self, trajectory: Trajectory) {
+    pub(super) fn take(&mut self, trajectory: Trajectory) {
         self.loaded.trajectory = trajectory.clone();
         self.trajectory = trajectory;
     }
 
     /// Plans the same path within the limits if a measured motion violates them with its own times. The check reports
     /// the errors that remain.
-    pub fn plan_anew(&mut self, out: &Output) {
+    pub(super) fn plan_anew(&mut self, out: &Output) {
         let verdict = self.verdict(&self.trajectory, None, UploadOptions::default());
         let Some(why) = verdict.refusals().next() else { return };
         let friction = self.arm.friction();
@@ -161,7 +161,7 @@ impl Job {
 
     /// Returns the hint after a verdict, with the names that the user typed and the [passing
     /// speed](Self::passing_speed).
-    pub fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> Next {
+    pub(super) fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> Next {
         if self.made {
             return format!(
                 "check the position of the arm with `jtc status`; `jtc {}` plans again from there",
@@ -203,7 +203,7 @@ impl Job {
 
     /// Returns the highest speed in whole percent that passes the check. `None`: no speed passes, or the speed is not
     /// the problem.
-    pub fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
+    pub(super) fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
         let passes = |percent: f64| {
             let slower = plan::at_speed(&self.loaded.trajectory, percent);
             slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
@@ -229,7 +229,7 @@ impl Job {
     }
 
     /// Prints the verdict of a failed check, and returns the failure with exit code 4.
-    pub fn refuse(&self, verdict: &Verdict, out: &Output) -> Failure {
+    pub(super) fn refuse(&self, verdict: &Verdict, out: &Output) -> Failure {
         let passing_speed = self.passing_speed(verdict);
         let hint = self.hint(verdict, passing_speed);
         let value = json!({
@@ -247,7 +247,7 @@ impl Job {
     }
 
     /// Adds the name of the file to a failure of this job, if its hint does not contain it.
-    pub fn named(&self, failure: Failure) -> Failure {
+    pub(super) fn named(&self, failure: Failure) -> Failure {
         let again =
             if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };
         let next = failure.next.with_command(Action::TrajRun, &again);
@@ -256,7 +256,7 @@ impl Job {
     }
 
     /// Returns the parts of the torque that are missing in the check because the arm file does not give them.
-    pub fn left_out(&self) -> Vec<&'static str> {
+    pub(super) fn left_out(&self) -> Vec<&'static str> {
         let arm = &self.arm;
         let rotors = (0..JOINTS).any(|j| !arm.rotors_given[j] && self.config.joints[j].rotor_inertia == 0.0);
         let parts = [(arm.friction().is_none(), "friction"), (rotors, "rotor inertia")];
@@ -264,7 +264,7 @@ impl Job {
     }
 
     /// Returns the parts that are missing in the torques, and how the user can add them. `None`: no part is missing.
-    pub fn without(&self) -> Option<String> {
+    pub(super) fn without(&self) -> Option<String> {
         let parts = self.left_out();
         (!parts.is_empty()).then(|| {
             format!(
@@ -277,20 +277,20 @@ impl Job {
     }
 
     /// Prints the missing parts of the torque, as a note.
-    pub fn note_what_is_left_out(&self, out: &Output) {
+    pub(super) fn note_what_is_left_out(&self, out: &Output) {
         if let Some(words) = self.without() {
             out.note(format!("note: {words}"));
         }
     }
 
     /// Returns a planner for the arm of this job, with the limits in use. `friction` is the friction of this arm.
-    pub fn planner<'a>(&'a self, friction: Option<&'a Friction>) -> Planner<'a> {
+    pub(super) fn planner<'a>(&'a self, friction: Option<&'a Friction>) -> Planner<'a> {
         Planner { model: Some(&self.arm.model), friction, ..Planner::new(&self.config) }
     }
 
     /// Checks the limits at every point and between points, the torque from the arm model, and the start pose, if there
     /// is one.
-    pub fn verdict(
+    pub(super) fn verdict(
         &self,
         trajectory: &Trajectory,
         start: Option<[f64; 6]>,

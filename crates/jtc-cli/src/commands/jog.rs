@@ -23,7 +23,7 @@ const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 const FIRST_MAX: usize = 2;
 
 /// Jogs until a key, the time or a signal ends the jog. The arm is then at rest.
-pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let rate = args.rate.map(|rate| if args.deg { rate.to_radians() } else { rate });
     if let Some(rate) = rate
         && !rate.is_finite()

@@ -15,7 +15,7 @@ use crate::args::{LinkArgs, LogCommand};
 use crate::failure::output_lost;
 
 /// Runs a command of the family.
-pub fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
     match command {
         LogCommand::Fetch { out: file, report, arm, overwrite, link } => {
             let files = Files::open(file.as_deref(), report.as_deref(), arm.as_deref(), overwrite.overwrite)?;

@@ -21,7 +21,7 @@ use crate::progress::Progress;
 const EFFECT: Duration = Duration::from_millis(300);
 
 /// Clears errors, and reports the remaining ones.
-pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     if args.occurred {
         session.clear_occurred()?;
@@ -45,7 +45,7 @@ pub fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
 }
 
 /// Switches the pump.
-pub fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
     let on = args.pump == Switch::On;
     args.link.session()?.gripper(on)?;
     out.result(&json!({ "pump": on }), || format!("pump {}", if on { "on" } else { "off" }));
@@ -53,7 +53,7 @@ pub fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
 }
 
 /// Brings the controller back to HoldPos.
-pub fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;
     if args.defaults && arm.is_some() {

@@ -21,7 +21,7 @@ const PICTURE: Duration = Duration::from_millis(40);
 const SILENT: Duration = Duration::from_secs(1);
 
 /// Shows statuses until `q`, Ctrl-C, or the requested number of them.
-pub fn monitor(args: &MonitorArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn monitor(args: &MonitorArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;
     let screen = if out.is_json() { None } else { Screen::take()? };

@@ -12,7 +12,7 @@ use super::run::{Course, perform};
 use crate::args::{MoveArgs, Target};
 
 /// Plans the move once the position of the arm is known, and runs it.
-pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     if let Some(percent) = args.speed.filter(|percent| !(1.0..=100.0).contains(percent)) {
         return Err(Failure::nothing_sent(PlanError::Speed { percent, most: 100.0 }));
     }

@@ -9,18 +9,18 @@ use jtc_host::file::FileError;
 use super::job::typed;
 
 /// Loads the given arm file, or the built-in arm.
-pub fn load(path: Option<&Path>) -> Result<Arm, FileError> {
+pub(super) fn load(path: Option<&Path>) -> Result<Arm, FileError> {
     path.map_or_else(|| Ok(Arm::avena()), Arm::load)
 }
 
 /// Prints the missing parameters of an arm file to stderr.
-pub fn note_warnings(arm: &Arm, out: &Output) {
+pub(super) fn note_warnings(arm: &Arm, out: &Output) {
     for warning in &arm.warnings {
         out.note(format!("note: {warning}"));
     }
 }
 
 /// Returns the option for the arm file, as the user can type it after other words. Empty for the built-in arm.
-pub fn typed_option(path: Option<&Path>) -> String {
+pub(super) fn typed_option(path: Option<&Path>) -> String {
     path.map_or(String::new(), |path| format!(" --arm {}", typed(path)))
 }

@@ -14,7 +14,7 @@ use crate::link::LinkPort;
 use crate::progress::Progress;
 
 /// Runs a command of the family.
-pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
     match command {
         ParamsCommand::Push { files, friction, accept, link } => {
             push(files, (*friction).into(), *accept, link, out)

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::args::{LinkArgs, PayloadCommand};
 
 /// Runs a command of the family.
-pub fn payload(command: &PayloadCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn payload(command: &PayloadCommand, out: &Output) -> Result<(), Failure> {
     match command {
         PayloadCommand::Set { body, link } => set(&body.payload(), link, out),
         PayloadCommand::Clear { link } => set(&Payload::NONE, link, out),
@@ -37,7 +37,7 @@ fn set(payload: &Payload, link: &LinkArgs, out: &Output) -> Result<(), Failure> 
 }
 
 /// Describes a payload in a few words.
-pub fn words(payload: &Payload) -> String {
+pub(super) fn words(payload: &Payload) -> String {
     let [x, y, z] = payload.com;
     if payload.is_there() { format!("{} kg at ({x}, {y}, {z}) m", payload.mass) } else { "none".into() }
 }
@@ -53,7 +53,7 @@ fn as_text(payload: &Payload) -> String {
 }
 
 /// Returns a payload as JSON.
-pub fn as_json(payload: &Payload) -> Value {
+pub(super) fn as_json(payload: &Payload) -> Value {
     let [xx, xy, xz, yy, yz, zz] = payload.inertia;
     json!({
         "mass_kg": payload.mass,

@@ -21,7 +21,7 @@ const NO_LINES: &str = "--blend-m has no effect: it rounds corners between lines
     has no lines or arcs; use --line, or a column `leg`";
 
 /// Plans a trajectory, checks it, and writes it.
-pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     if !(-40.0..=120.0).contains(&args.temperature) {
         return Err(Failure::usage(format!(
             "--temperature is out of range: {} °C, expected -40 to 120 °C",
@@ -182,12 +182,12 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
 }
 
 /// Returns the smallest torque margin of a motion as a line. Empty if no margin was computed.
-pub fn margin_line(margin: Option<TorqueMargin>) -> String {
+pub(super) fn margin_line(margin: Option<TorqueMargin>) -> String {
     margin.map_or(String::new(), |margin| format!("{margin}\n"))
 }
 
 /// Prints a warning if the torque margin is low.
-pub fn note_low_margin(margin: Option<TorqueMargin>, out: &Output) {
+pub(super) fn note_low_margin(margin: Option<TorqueMargin>, out: &Output) {
     if let Some(warning) = margin.and_then(|margin| margin.warning()) {
         out.note(format!("warning: {warning}"));
     }

@@ -5,7 +5,7 @@ use jtc_host::port::{PortKind, list};
 use serde_json::json;
 
 /// Lists the serial ports.
-pub fn ports(out: &Output) -> Result<(), Failure> {
+pub(super) fn ports(out: &Output) -> Result<(), Failure> {
     let ports = list()?;
     let rows: Vec<_> = ports
         .iter()

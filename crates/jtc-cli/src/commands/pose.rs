@@ -11,7 +11,7 @@ use super::job::typed;
 use crate::args::{LinkArgs, PoseCommand};
 
 /// Runs a command of the family.
-pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
     match command {
         PoseCommand::Save { name, arm, link, overwrite } => save(name, &arm.arm, link, *overwrite, out),
         PoseCommand::List { arm, deg } => list(&arm.arm, *deg, out),

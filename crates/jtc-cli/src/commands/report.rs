@@ -14,7 +14,7 @@ use crate::args::ReportArgs;
 use cli_kit::OutputFile;
 
 /// Writes the page and prints the figures.
-pub fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let page = args.out.clone().unwrap_or_else(|| args.file.with_extension("html"));
     let picture = page.with_extension("svg");
     let inputs: Vec<&Path> =

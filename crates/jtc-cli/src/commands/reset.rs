@@ -14,7 +14,7 @@ const ALL: u8 = 0x7F;
 /// The gripper's bit.
 const GRIPPER: u8 = 1 << 6;
 /// Resets the given nodes. If the arm is held, this needs the user's agreement. While the arm moves, no joint is reset.
-pub fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let nodes = nodes(args)?;
     let reset = labels::node_names(nodes);
     let names = reset.join(", ");

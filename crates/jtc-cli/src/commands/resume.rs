@@ -13,7 +13,7 @@ use crate::link::LinkPort;
 use crate::progress::Progress;
 
 /// Resumes the motion, unless the remainder of the given trajectory no longer passes the check (J-36, J-60).
-pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let job = args.trajectory.as_deref().map(|file| Job::load(file, &args.check, out)).transpose();
     let mut job = job.map_err(Failure::nothing_sent)?;

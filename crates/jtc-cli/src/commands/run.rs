@@ -27,7 +27,7 @@ use terminal::{Terminal, cancelled};
 
 /// Settings of a motion, for all commands that run one.
 #[derive(Clone, Debug)]
-pub struct Course {
+pub(super) struct Course {
     /// Link, files that the command writes, and accepted risks.
     pub execute: ExecuteArgs,
     /// Name in recordings.
@@ -51,11 +51,11 @@ pub struct Course {
 
 /// Function that creates the trajectory of a job, when the position of the arm and the speed of a move on this
 /// controller are known.
-pub type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
+pub(super) type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
 
 impl Course {
     /// Returns the settings for a trajectory file.
-    pub fn of(args: &RunArgs) -> Self {
+    pub(super) fn of(args: &RunArgs) -> Self {
         Self {
             execute: args.execute.clone(),
             name: stem(&args.file),
@@ -80,13 +80,13 @@ impl Course {
 }
 
 /// Runs a trajectory from a file.
-pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     let course = Course::of(args);
     perform(&course, |out| Job::load(&args.file, &args.check, out), None, out)
 }
 
 /// Runs a job: the unchanged trajectory of a file, or a motion that is planned when the position of the arm is known.
-pub fn perform(
+pub(super) fn perform(
     course: &Course,
     load: impl FnOnce(&Output) -> Result<Job, Failure>,
     make: Option<Make<'_>>,

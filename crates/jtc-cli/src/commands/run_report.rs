@@ -8,7 +8,7 @@ use jtc_host::session::{LinkStatistics, UploadReport};
 use jtc_wire::{Joint, Status, TrajectoryState};
 
 /// Returns the description in a recording of this arm.
-pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
+pub(super) fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
     RecordingInfo {
         source: source.to_owned(),
         trajectory: trajectory.to_owned(),
@@ -18,7 +18,7 @@ pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> Re
 }
 
 /// Returns the text of the first failure, if there was one, followed by the figures.
-pub fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
+pub(super) fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
     let Some(failure) = failure else { return figures(summary) };
     let rows: Vec<Vec<String>> = failure.rows().into_iter().map(|row| row.to_vec()).collect();
     let head = RunFailure::HEAD
@@ -37,7 +37,7 @@ pub fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
 }
 
 /// Returns the figures as a table.
-pub fn figures(summary: &Summary) -> String {
+pub(super) fn figures(summary: &Summary) -> String {
     let rows: Vec<Vec<String>> = Joint::ALL
         .iter()
         .zip(&summary.joints)
@@ -63,14 +63,14 @@ fn figure(value: Option<f64>, digits: usize) -> String {
 }
 
 /// Returns the result of an upload as an event.
-pub fn uploaded(phase: &str, upload: &UploadReport) -> serde_json::Value {
+pub(super) fn uploaded(phase: &str, upload: &UploadReport) -> serde_json::Value {
     let mut value = serde_json::to_value(upload).unwrap_or_default();
     value["phase"] = phase.into();
     value
 }
 
 /// Describes the link in one line.
-pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
+pub(super) fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
     let share = upload.line_share_percent().map_or(String::new(), |s| format!(" ({s:.1} % of the line)"));
     format!(
         "upload {} points in {:.2} s{share}; {} statuses, {} frames sent again, {} damaged",
@@ -79,7 +79,7 @@ pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
 }
 
 /// Describes a motion in one line, below its bar: its state, and the joint that is closest to a limit.
-pub fn motion_line(s: &Status) -> String {
+pub(super) fn motion_line(s: &Status) -> String {
     let what = match s.trajectory.known() {
         Some(TrajectoryState::Stop) => "stopped",
         Some(TrajectoryState::Pause) => "paused; press space to resume",

@@ -32,7 +32,7 @@ use crate::args::ServeArgs;
 const STOPPING: Duration = Duration::from_secs(5);
 
 /// Serves the port until SIGINT or SIGTERM. Then stops a motion on its path before it ends.
-pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let token_file = args.link.token_file.clone().or_else(default_token_file).ok_or_else(|| {
         Failure::usage("no folder for a token file: neither XDG_STATE_HOME nor HOME is set")
             .next("choose a file with --token-file FILE")

@@ -18,7 +18,7 @@ const NOTHING: &str = "note: nothing supports the simulated arm: it falls withou
 
 /// Serves a simulated controller until SIGINT or SIGTERM.
 #[cfg(unix)]
-pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use std::path::Path;
 
     use jtc_host::recording::{Ending, Format};

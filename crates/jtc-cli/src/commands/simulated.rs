@@ -11,7 +11,7 @@ use super::named_arm;
 /// Returns the given arm, or the built-in arm, and its simulated world. Prints missing parameters of the arm file on
 /// stderr. The controller has stored the image `kept`. Without it, the controller has stored the given arm, if its file
 /// is complete.
-pub fn simulated(
+pub(super) fn simulated(
     path: Option<&Path>,
     kept: Option<Vec<u8>>,
     out: &Output,

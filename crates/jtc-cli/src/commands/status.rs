@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::args::LinkArgs;
 
 /// Prints one status.
-pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     let status = session.fresh_status()?;
     let reactions = if status.is_held_stop() { session.reactions() } else { None };
@@ -26,7 +26,7 @@ pub fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 }
 
 /// Returns a status as JSON. The keys contain the units.
-pub fn as_json(s: &Status) -> Value {
+pub(super) fn as_json(s: &Status) -> Value {
     let joints: Vec<Value> = Joint::ALL
         .into_iter()
         .zip(&s.joints)
@@ -84,7 +84,7 @@ pub fn as_json(s: &Status) -> Value {
 }
 
 /// Returns the state of joint `j` (from 0). This is the last state that the joint has sent, unless the joint is silent.
-pub fn joint_state(s: &Status, j: usize) -> &'static str {
+pub(super) fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
     // A joint that is not ready may still answer. An enabled joint that is not measured does not answer.
     let silent = !is_measured(s, j) && (labels::is_silent(s, j) || state == NodeState::ENABLED);
@@ -98,12 +98,12 @@ pub fn joint_state(s: &Status, j: usize) -> &'static str {
 }
 
 /// Returns `true` if the gripper has sent the pump and vacuum values of the status.
-pub fn gripper_answers(s: &Status) -> bool {
+pub(super) fn gripper_answers(s: &Status) -> bool {
     !labels::is_silent(s, GRIPPER)
 }
 
 /// Returns the state of the gripper. This is the last state that the gripper has sent, unless the gripper is silent.
-pub fn gripper_state(s: &Status) -> &'static str {
+pub(super) fn gripper_state(s: &Status) -> &'static str {
     match s.gripper {
         Some(g) if gripper_answers(s) => g.state.name(),
         _ => "does not answer",

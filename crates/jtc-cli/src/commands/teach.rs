@@ -22,7 +22,7 @@ use taught_file::TaughtFile;
 const TOLERANCE: f64 = 0.01;
 
 /// Runs a command of the family.
-pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
         // The events begin here, so that a note about a file that cannot be opened is an event as well.
         out.stream()?;

@@ -17,7 +17,7 @@ use super::{continued, halt, resume, run};
 use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
 
 /// Runs a command of the family.
-pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
+pub(super) fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TrajCommand::Check { file, check: args, payload } => {
             check(file, args, payload.unwrap_or_default(), out)

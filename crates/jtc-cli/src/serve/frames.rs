@@ -10,7 +10,7 @@ use jtc_wire::{FRAME_MAX, HEADER, STATUS_LEN};
 const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8];
 
 /// Silence that ends a frame (J-03).
-pub const GAP: Duration = Duration::from_millis(5);
+pub(super) const GAP: Duration = Duration::from_millis(5);
 /// Smallest size of the first piece when the operating system passes a long write to a terminal in pieces, bytes.
 const PIECE: usize = 2048;
 /// Time of a byte on a serial line of 115,200 baud.
@@ -18,14 +18,14 @@ const BYTE: Duration = Duration::from_micros(87);
 
 /// Received bytes, and the complete frames.
 #[derive(Default)]
-pub struct Frames {
+pub(super) struct Frames {
     partial: Vec<u8>,
     whole: VecDeque<Vec<u8>>,
 }
 
 impl Frames {
     /// Takes bytes. Bytes that are not a status (from a disturbed line) are passed on unchanged.
-    pub fn push(&mut self, bytes: &[u8]) {
+    pub(super) fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let n = self.partial.len();
             if n < START.len() && byte != START[n] {
@@ -51,12 +51,12 @@ impl Frames {
     }
 
     /// Returns `true` if no frame is complete.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.whole.is_empty()
     }
 
     /// Takes the oldest frame.
-    pub fn pop(&mut self) -> Option<Vec<u8>> {
+    pub(super) fn pop(&mut self) -> Option<Vec<u8>> {
         self.whole.pop_front()
     }
 }
@@ -69,7 +69,7 @@ impl Frames {
 /// A busy system can suspend a host between two pieces of one write for longer than the gap that ends a frame. On a
 /// real line the adapter would still be sending the bytes in its buffer. So in a long frame, the silence begins only
 /// after a real line would have sent the received bytes.
-pub struct Incoming {
+pub(super) struct Incoming {
     head: Vec<u8>,
     /// Number of received bytes of the current frame.
     come: usize,
@@ -83,12 +83,12 @@ pub struct Incoming {
 
 impl Incoming {
     /// Creates the state before the first byte.
-    pub fn new(now: Instant) -> Self {
+    pub(super) fn new(now: Instant) -> Self {
         Self { head: Vec::new(), come: 0, missing: 0, continued: false, heard: now }
     }
 
     /// Takes bytes of the host that arrived at `now`.
-    pub fn push(&mut self, bytes: &[u8], now: Instant) {
+    pub(super) fn push(&mut self, bytes: &[u8], now: Instant) {
         self.continued |= self.mid_frame();
         for &byte in bytes {
             self.come += 1;
@@ -118,18 +118,18 @@ impl Incoming {
     }
 
     /// Notes that the line carries bytes at `now`.
-    pub fn carries(&mut self, now: Instant) {
+    pub(super) fn carries(&mut self, now: Instant) {
         self.heard = self.heard.max(now);
     }
 
     /// Returns `true` while bytes of a frame are missing.
-    pub fn mid_frame(&self) -> bool {
+    pub(super) fn mid_frame(&self) -> bool {
         self.missing > 0 || !self.head.is_empty()
     }
 
     /// Returns how long the host has been silent within a frame, also at the moment when the silence ends. Returns
     /// `None` outside a frame, or after a silence that is too long for the frame to be completed.
-    pub fn silence(&mut self, now: Instant) -> Option<Duration> {
+    pub(super) fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);
             return Some(Duration::ZERO);

@@ -15,7 +15,7 @@ use rustix::termios::{LocalModes, OptionalActions, OutputModes, QueueSelector};
 
 /// Reason why the terminal cannot be used.
 #[derive(Debug)]
-pub enum PtyError {
+pub(crate) enum PtyError {
     /// A file that must not be replaced already exists at the path.
     Taken {
         /// The requested path.
@@ -50,7 +50,7 @@ fn fails(what: &'static str) -> impl Fn(Errno) -> PtyError {
 }
 
 /// The controller's end of a pseudo-terminal, and the symbolic link to the host's end.
-pub struct Pty {
+pub(crate) struct Pty {
     master: OwnedFd,
     slave: PathBuf,
     link: Option<PathBuf>,
@@ -59,7 +59,7 @@ pub struct Pty {
 impl Pty {
     /// Creates a pseudo-terminal in raw mode, with `link` as a symbolic link to it. Replaces a link that an earlier run
     /// has left, but no other file.
-    pub fn open(link: Option<&Path>) -> Result<Self, PtyError> {
+    pub(crate) fn open(link: Option<&Path>) -> Result<Self, PtyError> {
         if let Some(link) = link {
             check_free(link)?;
         }
@@ -70,7 +70,7 @@ impl Pty {
     }
 
     /// Returns the name that a host opens.
-    pub fn name(&self) -> &Path {
+    pub(crate) fn name(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.slave)
     }
 
@@ -86,7 +86,7 @@ impl Pty {
     }
 
     /// Reads the available bytes. Returns 0 without bytes, or if no host has the port open.
-    pub fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
+    pub(crate) fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         match rustix::io::read(&self.master, buffer) {
             Ok(n) => Ok(n),
             // EIO: the other end is not open.
@@ -96,7 +96,7 @@ impl Pty {
     }
 
     /// Writes as many bytes as fit.
-    pub fn write(&self, bytes: &[u8]) -> Result<usize, PtyError> {
+    pub(crate) fn write(&self, bytes: &[u8]) -> Result<usize, PtyError> {
         match rustix::io::write(&self.master, bytes) {
             Ok(n) => Ok(n),
             Err(Errno::AGAIN | Errno::IO | Errno::INTR) => Ok(0),
@@ -105,17 +105,17 @@ impl Pty {
     }
 
     /// Returns `true` if a host has the port open.
-    pub fn host_is_there(&self) -> Result<bool, PtyError> {
+    pub(crate) fn host_is_there(&self) -> Result<bool, PtyError> {
         Ok(!self.poll(PollFlags::IN, Duration::ZERO)?.contains(PollFlags::HUP))
     }
 
     /// Waits for bytes of the host.
-    pub fn wait_input(&self, timeout: Duration) -> Result<(), PtyError> {
+    pub(crate) fn wait_input(&self, timeout: Duration) -> Result<(), PtyError> {
         self.wait(PollFlags::IN, timeout)
     }
 
     /// Waits until bytes to the host can be written.
-    pub fn wait_room(&self, timeout: Duration) -> Result<(), PtyError> {
+    pub(crate) fn wait_room(&self, timeout: Duration) -> Result<(), PtyError> {
         self.wait(PollFlags::OUT, timeout)
     }
 
@@ -140,7 +140,7 @@ impl Pty {
 
     /// Discards the bytes that a disconnected host did not read. If a killed host has left the port locked, a new
     /// pseudo-terminal replaces the old one under the same link.
-    pub fn renew(&mut self) -> Result<(), PtyError> {
+    pub(crate) fn renew(&mut self) -> Result<(), PtyError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
         match rustix::fs::open(&self.slave, flags, Mode::empty()) {
             Ok(slave) => rustix::termios::tcflush(&slave, QueueSelector::IOFlush)

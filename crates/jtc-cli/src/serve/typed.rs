@@ -14,13 +14,13 @@ const LOOK: Duration = Duration::from_millis(200);
 const LINE_MAX: usize = 4096;
 
 /// Lines of the standard input.
-pub struct Typed {
+pub(crate) struct Typed {
     lines: Receiver<String>,
 }
 
 impl Typed {
     /// Starts to read the standard input, in a separate thread.
-    pub fn listen() -> Self {
+    pub(crate) fn listen() -> Self {
         let (send, lines) = channel();
         std::thread::spawn(move || read(|line| send.send(line).is_ok()));
         Self { lines }
@@ -28,7 +28,7 @@ impl Typed {
 
     /// Applies the lines typed since the last call to `world`. Invalid lines are reported on stderr and have no effect
     /// on the arm.
-    pub fn act(&self, world: &mut World) {
+    pub(crate) fn act(&self, world: &mut World) {
         while let Ok(line) = self.lines.try_recv() {
             match TypedEvent::parse(&line).map_err(|e| e.to_string()) {
                 Ok(None) => {}
@@ -53,7 +53,7 @@ fn happen(event: &TypedEvent, world: &mut World) -> Result<(), String> {
 }
 
 /// Returns the joint positions of a trajectory file as the path of a hand that leads the arm.
-pub fn hand(path: &Path) -> Result<HandPath, String> {
+pub(crate) fn hand(path: &Path) -> Result<HandPath, String> {
     let trajectory = Loaded::load(path, None).map_err(|e| format!("hand: {e}"))?.trajectory;
     let points = trajectory.points.iter().map(|point| point.position).collect();
     let step_s = f64::from(trajectory.step_ms) * 1e-3;

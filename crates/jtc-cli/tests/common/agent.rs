@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::{command, slow_motion};
 
 /// Returns a `jtc` command that keeps its state and sockets in this directory.
-pub fn command_in(dir: &tempfile::TempDir) -> Command {
+pub(crate) fn command_in(dir: &tempfile::TempDir) -> Command {
     let mut command = command();
     command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
     command
@@ -17,7 +17,7 @@ pub fn command_in(dir: &tempfile::TempDir) -> Command {
 
 /// Starts an agent with these options at a free port of this computer. When it is ready, returns the process and its
 /// output.
-pub fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child, Value) {
+pub(crate) fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child, Value) {
     let mut child = command_in(dir)
         .args(["--json", "serve", "--listen", "127.0.0.1:0"])
         .args(options)
@@ -33,7 +33,7 @@ pub fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child,
 }
 
 /// Running agent, which ends with the test.
-pub struct Agent {
+pub(crate) struct Agent {
     pub child: Child,
     pub url: String,
     pub dir: tempfile::TempDir,
@@ -41,37 +41,37 @@ pub struct Agent {
 
 impl Agent {
     /// Starts an agent, and waits until it is ready.
-    pub fn start(options: &[&str]) -> Self {
+    pub(crate) fn start(options: &[&str]) -> Self {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
 
     /// Like `start`, in a directory that may hold files of another agent.
-    pub fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
+    pub(crate) fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let (child, ready) = serve(&dir, options);
         Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
     }
 
     /// Returns a `jtc` command for this port, or for the agent's address.
-    pub fn command(&self, words: &[&str], port: &str) -> Command {
+    pub(crate) fn command(&self, words: &[&str], port: &str) -> Command {
         let mut command = command_in(&self.dir);
         command.args(words).args(["--port", port]);
         command
     }
 
     /// Runs `jtc` through the agent.
-    pub fn jtc(&self, words: &[&str]) -> CommandOutput {
+    pub(crate) fn jtc(&self, words: &[&str]) -> CommandOutput {
         run(self.command(words, &self.url), &[], "")
     }
 
     /// Creates a file with a motion that takes `tenths` tenths of a second.
-    pub fn motion(&self, tenths: i32) -> String {
+    pub(crate) fn motion(&self, tenths: i32) -> String {
         let file = self.dir.path().join("motion.csv");
         std::fs::write(&file, slow_motion(tenths)).expect("a file");
         file.to_str().expect("a name").to_owned()
     }
 
     /// Ends the agent with this signal. Returns its exit code and its directory.
-    pub fn end(mut self, signal: &str) -> (Option<i32>, tempfile::TempDir) {
+    pub(crate) fn end(mut self, signal: &str) -> (Option<i32>, tempfile::TempDir) {
         Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
         let code = self.child.wait().expect("it ends").code();
         (code, std::mem::replace(&mut self.dir, tempfile::tempdir().expect("a directory")))

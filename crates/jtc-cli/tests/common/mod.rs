@@ -1,6 +1,6 @@
 //! Runs the `jtc` command like a user, and a simulated controller that it can connect to.
 
-pub mod agent;
+pub(crate) mod agent;
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -10,47 +10,47 @@ use cli_kit::testing::{CommandOutput, program, run};
 use serde_json::Value;
 
 /// Returns a `jtc` command without environment variables.
-pub fn command() -> Command {
+pub(crate) fn command() -> Command {
     program(env!("CARGO_BIN_EXE_jtc"), "JTC_")
 }
 
 /// Runs `jtc` with these words.
-pub fn jtc(words: &[&str]) -> CommandOutput {
+pub(crate) fn jtc(words: &[&str]) -> CommandOutput {
     jtc_with(words, "")
 }
 
 /// Runs `jtc` with this text on its stdin.
-pub fn jtc_with(words: &[&str], stdin: &str) -> CommandOutput {
+pub(crate) fn jtc_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
 
 /// A directory with files.
-pub struct Dir(tempfile::TempDir);
+pub(crate) struct Dir(tempfile::TempDir);
 
 impl Dir {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().expect("a directory"))
     }
 
     /// Returns a path in the directory.
-    pub fn path(&self, name: &str) -> String {
+    pub(crate) fn path(&self, name: &str) -> String {
         self.0.path().join(name).to_str().unwrap().to_owned()
     }
 
     /// Creates a file in it.
-    pub fn file(&self, name: &str, text: &str) -> String {
+    pub(crate) fn file(&self, name: &str, text: &str) -> String {
         std::fs::write(self.path(name), text).expect("a file");
         self.path(name)
     }
 
     /// Returns `true` if the file exists.
-    pub fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.0.path().join(name).exists()
     }
 }
 
 /// Simulated controller on a pseudo-terminal, which ends with the test.
-pub struct Sim {
+pub(crate) struct Sim {
     child: Child,
     stderr: BufReader<std::process::ChildStderr>,
     pub port: PathBuf,
@@ -59,12 +59,12 @@ pub struct Sim {
 
 impl Sim {
     /// Starts a simulator and waits until it is ready.
-    pub fn start(options: &[&str]) -> Self {
+    pub(crate) fn start(options: &[&str]) -> Self {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
 
     /// Like `start`, in a directory that may already contain files.
-    pub fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
+    pub(crate) fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let port = dir.path().join("jtc");
         let mut child = command()
             .args(["sim", "--serial", port.to_str().unwrap()])
@@ -86,7 +86,7 @@ impl Sim {
     }
 
     /// Like `start`, with a fault file.
-    pub fn with_faults(options: &[&str], faults: &str) -> Self {
+    pub(crate) fn with_faults(options: &[&str], faults: &str) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let file = dir.path().join("faults.toml");
         std::fs::write(&file, faults).expect("a file");
@@ -94,64 +94,64 @@ impl Sim {
     }
 
     /// Makes the controller use its default parameters.
-    pub fn with_parameters(self) -> Self {
+    pub(crate) fn with_parameters(self) -> Self {
         self.jtc(&["params", "use-defaults"]).ends(0);
         self
     }
 
     /// Recovers the controller with its default parameters, and waits until it holds the arm.
-    pub fn held(self) -> Self {
+    pub(crate) fn held(self) -> Self {
         self.jtc(&["recover", "--defaults"]).ends(0);
         self
     }
 
     /// Returns a `jtc` command for the simulator's port.
-    pub fn command(&self, words: &[&str]) -> Command {
+    pub(crate) fn command(&self, words: &[&str]) -> Command {
         let mut command = command();
         command.args(words).args(["--port", self.port.to_str().unwrap()]);
         command
     }
 
     /// Runs `jtc` at the simulator's port.
-    pub fn jtc(&self, words: &[&str]) -> CommandOutput {
+    pub(crate) fn jtc(&self, words: &[&str]) -> CommandOutput {
         run(self.command(words), &[], "")
     }
 
     /// Returns the answer of `jtc --json` with these words. Panics if the exit code is not `code`.
-    pub fn json(&self, words: &[&str], code: i32) -> Value {
+    pub(crate) fn json(&self, words: &[&str], code: i32) -> Value {
         self.jtc(&[&["--json"], words].concat()).ends(code).json()
     }
 
     /// Creates a file in its directory.
-    pub fn file(&self, name: &str, text: &str) -> String {
+    pub(crate) fn file(&self, name: &str, text: &str) -> String {
         std::fs::write(self.path(name), text).expect("a file");
         self.path(name)
     }
 
     /// Types a line on its standard input.
-    pub fn write_line(&mut self, line: &str) {
+    pub(crate) fn write_line(&mut self, line: &str) {
         writeln!(self.child.stdin.as_mut().expect("stdin"), "{line}").expect("it reads");
     }
 
     /// Waits for the next line of its stderr.
-    pub fn error_line(&mut self) -> String {
+    pub(crate) fn error_line(&mut self) -> String {
         let mut line = String::new();
         self.stderr.read_line(&mut line).expect("a line");
         line
     }
 
     /// Returns its process id.
-    pub fn pid(&self) -> String {
+    pub(crate) fn pid(&self) -> String {
         self.child.id().to_string()
     }
 
     /// Returns a path in its directory.
-    pub fn path(&self, name: &str) -> String {
+    pub(crate) fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
 
     /// Sends a signal, waits for the end and returns the exit code.
-    pub fn end(mut self, signal: &str) -> (i32, bool) {
+    pub(crate) fn end(mut self, signal: &str) -> (i32, bool) {
         let pid = self.child.id().to_string();
         Command::new("kill").args([signal, &pid]).status().expect("kill");
         let code = self.child.wait().expect("it ends").code().unwrap_or(-1);
@@ -167,25 +167,25 @@ impl Drop for Sim {
 }
 
 /// Returns the position of the simulated arm, rad.
-pub fn place(sim: &Sim) -> Vec<f64> {
+pub(crate) fn place(sim: &Sim) -> Vec<f64> {
     let status = sim.json(&["status"], 0);
     status["joints"].as_array().unwrap().iter().map(|joint| joint["position_rad"].as_f64().unwrap()).collect()
 }
 
 /// Checks that the arm is at these joint positions.
-pub fn at(sim: &Sim, q: [f64; 6]) {
+pub(crate) fn at(sim: &Sim, q: [f64; 6]) {
     for (joint, (is, should)) in place(sim).into_iter().zip(q).enumerate() {
         assert!((is - should).abs() < 3e-3, "joint {}: {is} instead of {should}", joint + 1);
     }
 }
 
 /// Starts a command that moves the arm, and waits until the arm has moved for `seconds`.
-pub fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Child {
+pub(crate) fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Child {
     moving_after(sim, words, "", seconds)
 }
 
 /// Like [`moving_while`], for the motion after a line with this text.
-pub fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std::process::Child {
+pub(crate) fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std::process::Child {
     let mut child = sim
         .command(&[&["--json"], words].concat())
         .stdout(Stdio::piped())
@@ -211,7 +211,7 @@ pub fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std:
 }
 
 /// Returns a smooth trajectory file that moves `amplitude` rad from the zero pose and back in 1.2 s.
-pub fn motion(amplitude: f64) -> String {
+pub(crate) fn motion(amplitude: f64) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=120 {
         let s = f64::from(i) / 120.0;
@@ -222,7 +222,7 @@ pub fn motion(amplitude: f64) -> String {
 }
 
 /// Returns a slow motion of all joints, up to 0.2 rad and back, in `tenths` tenths of a second.
-pub fn slow_motion(tenths: i32) -> String {
+pub(crate) fn slow_motion(tenths: i32) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=tenths {
         let q = 0.2 * (std::f64::consts::PI * f64::from(i) / f64::from(tenths)).sin().powi(4);

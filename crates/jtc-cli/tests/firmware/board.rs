@@ -21,7 +21,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 const PROGRAM: usize = 0x1000;
 
 /// Returns the program data that a board with this image in flash reports. Computed bit by bit, as in the definition.
-pub fn program_of(image: &[u8]) -> Program {
+pub(super) fn program_of(image: &[u8]) -> Program {
     let mut register = u32::MAX;
     for byte in &image[..PROGRAM] {
         register ^= u32::from(*byte);
@@ -33,7 +33,7 @@ pub fn program_of(image: &[u8]) -> Program {
 }
 
 /// Processor and ST-LINK of a board. Both end when this is dropped.
-pub struct Board {
+pub(super) struct Board {
     /// Its serial port.
     pub port: String,
     flashed: Arc<Mutex<Flashed>>,
@@ -52,7 +52,7 @@ struct Flashed {
 
 impl Board {
     /// Creates a board with an arm without torque, and a drive at this folder that accepts an image of this length.
-    pub fn new(board: &str, drive: &Path, length: usize) -> Self {
+    pub(super) fn new(board: &str, drive: &Path, length: usize) -> Self {
         let (master, port) = pseudo_terminal();
         let mut status = Status { state: ControllerState::Init.into(), ..Status::default() };
         status.joints.iter_mut().for_each(|joint| joint.state = NodeState::READY);
@@ -76,7 +76,7 @@ impl Board {
     }
 
     /// Sets the status that it sends from now on.
-    pub fn set_status(&self, change: impl FnOnce(&mut Status)) {
+    pub(super) fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.flashed.lock().unwrap().status);
     }
 }
@@ -153,7 +153,7 @@ impl Running {
 }
 
 /// Creates a drive at this folder.
-pub fn appear(drive: &Path) {
+pub(super) fn appear(drive: &Path) {
     fs::create_dir_all(drive).unwrap();
     fs::write(drive.join("DETAILS.TXT"), "Version: V3J13M4B5S1\n").unwrap();
 }

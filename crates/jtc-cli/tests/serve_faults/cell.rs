@@ -12,7 +12,7 @@ use crate::common::agent::{self, command_in};
 use crate::common::{Sim, slow_motion};
 
 /// Agent and simulated controller.
-pub struct Cell {
+pub(super) struct Cell {
     pub sim: Option<Sim>,
     pub agent: Child,
     pub url: String,
@@ -23,7 +23,7 @@ pub struct Cell {
 
 impl Cell {
     /// Starts the processes. `tenths`: duration of the motion in tenths of a second.
-    pub fn new(baud: &str, tenths: i32) -> Self {
+    pub(super) fn new(baud: &str, tenths: i32) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let sim = Sim::start(&["--baud", baud]).with_parameters();
         let (agent, url) = serve(&dir, &sim.port, baud);
@@ -44,7 +44,7 @@ impl Cell {
     }
 
     /// Starts a run through the agent. The policy applies when the program of the run is lost.
-    pub fn run(&self, policy: &str) -> Child {
+    pub(super) fn run(&self, policy: &str) -> Child {
         self.jtc(&["--json", "traj", "run", &self.motion, "--when-gone", policy, "--port", &self.url])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -52,27 +52,27 @@ impl Cell {
             .expect("it starts")
     }
 
-    pub fn jtc(&self, words: &[&str]) -> Command {
+    pub(super) fn jtc(&self, words: &[&str]) -> Command {
         let mut command = command_in(&self.dir);
         command.args(words);
         command
     }
 
     /// Returns the status of the controller through the agent.
-    pub fn status(&self) -> Value {
+    pub(super) fn status(&self) -> Value {
         self.status_at(&self.url)
     }
 
-    pub fn status_at(&self, port: &str) -> Value {
+    pub(super) fn status_at(&self, port: &str) -> Value {
         let shown = self.jtc(&["--json", "status", "--port", port]).stderr(Stdio::null()).output();
         serde_json::from_slice(&shown.expect("it ran").stdout).unwrap_or(Value::Null)
     }
 
-    pub fn until(&self, what: &str, reached: impl Fn(&Value) -> bool) -> Value {
+    pub(super) fn until(&self, what: &str, reached: impl Fn(&Value) -> bool) -> Value {
         self.until_at(&self.url, what, reached)
     }
 
-    pub fn until_at(&self, port: &str, what: &str, reached: impl Fn(&Value) -> bool) -> Value {
+    pub(super) fn until_at(&self, port: &str, what: &str, reached: impl Fn(&Value) -> bool) -> Value {
         let mut patience = Patience::begin();
         loop {
             let status = self.status_at(port);
@@ -84,19 +84,19 @@ impl Cell {
     }
 
     /// Kills the agent.
-    pub fn kill_agent(&mut self) {
+    pub(super) fn kill_agent(&mut self) {
         self.agent.kill().expect("it is there");
         self.agent.wait().expect("it ends");
     }
 
     /// Starts another agent in its place.
-    pub fn next_agent(&mut self) {
+    pub(super) fn next_agent(&mut self) {
         let port = &self.sim.as_ref().expect("it is there").port;
         (self.agent, self.url) = serve(&self.dir, port, &self.baud);
     }
 
     /// Starts `jtc --json` with these words at the agent, and waits for this event.
-    pub fn at(&self, words: &[&str], event: &str) -> Program {
+    pub(super) fn at(&self, words: &[&str], event: &str) -> Program {
         let words = [&["--json"], words, &["--port", &self.url]].concat();
         let mut jtc = self.jtc(&words);
         let mut child = jtc.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
@@ -106,13 +106,13 @@ impl Cell {
     }
 
     /// Like [`Self::jtc`], waits for the end of a command that must succeed.
-    pub fn done(&self, words: &[&str]) {
+    pub(super) fn done(&self, words: &[&str]) {
         let ended = self.jtc(&[words, &["--port", &self.url]].concat()).output().expect("it ran");
         assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
     }
 
     /// Returns a program that uses only HTTP, with the operator's token.
-    pub fn http(&self) -> Http {
+    pub(super) fn http(&self) -> Http {
         let file = self.dir.path().join("state/openjtc/tokens.toml");
         let text = std::fs::read_to_string(file).expect("a token file");
         let token = text.lines().find_map(|line| line.strip_prefix("operator = \"")?.strip_suffix('"'));
@@ -121,7 +121,7 @@ impl Cell {
     }
 
     /// Returns the log lines of agents about the policy of a killed agent.
-    pub fn found(&self) -> Vec<Value> {
+    pub(super) fn found(&self) -> Vec<Value> {
         let text = std::fs::read_to_string(self.dir.path().join("commands.jsonl")).expect("a log");
         // The last line may not be complete on the disk yet, so invalid lines are skipped.
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
@@ -129,14 +129,14 @@ impl Cell {
     }
 
     /// Returns the file with the policy for a motion, if it exists.
-    pub fn left(&self) -> Option<PathBuf> {
+    pub(super) fn left(&self) -> Option<PathBuf> {
         let files = std::fs::read_dir(self.dir.path().join("state/openjtc")).expect("it is there");
         let mut paths = files.map(|file| file.expect("a file").path());
         paths.find(|path| path.extension().is_some_and(|kind| kind == "json"))
     }
 
     /// Checks that the arm stays at rest for this time, and that no motion begins.
-    pub fn rests(&self, time: Duration) -> Value {
+    pub(super) fn rests(&self, time: Duration) -> Value {
         let (seen, mut patience) = (Instant::now(), Patience::begin());
         loop {
             let status = self.status();
@@ -164,14 +164,14 @@ fn serve(dir: &tempfile::TempDir, port: &Path, baud: &str) -> (Child, String) {
 }
 
 /// A running command.
-pub struct Program {
+pub(super) struct Program {
     child: Child,
     err: BufReader<ChildStderr>,
 }
 
 impl Program {
     /// Waits for this event.
-    pub fn until(&mut self, event: &str) {
+    pub(super) fn until(&mut self, event: &str) {
         let (mut line, mut all) = (String::new(), String::new());
         while !line.contains(&format!("\"event\":\"{event}\"")) {
             line.clear();
@@ -181,14 +181,14 @@ impl Program {
     }
 
     /// Kills the program.
-    pub fn kill(mut self) {
+    pub(super) fn kill(mut self) {
         assert!(self.child.try_wait().expect("a child").is_none(), "it is at work");
         self.child.kill().expect("it runs");
         self.child.wait().expect("it ends");
     }
 
     /// Waits until the program reports the lost link.
-    pub fn ends_without_link(self) -> String {
+    pub(super) fn ends_without_link(self) -> String {
         let Self { child, err } = self;
         let ended = child.wait_with_output().expect("it ends");
         drop(err);
@@ -203,10 +203,10 @@ fn is_status(value: &Value) -> bool {
     value["state"].is_string()
 }
 
-pub fn trajectory(status: &Value) -> &str {
+pub(super) fn trajectory(status: &Value) -> &str {
     status["trajectory"].as_str().unwrap_or_default()
 }
 
-pub fn moves(status: &Value) -> bool {
+pub(super) fn moves(status: &Value) -> bool {
     status["state"] == "Operate" || trajectory(status) == "Execute"
 }

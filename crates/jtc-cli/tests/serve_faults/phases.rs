@@ -6,29 +6,29 @@ use serde_json::{Value, json};
 use super::cell::{Cell, trajectory};
 
 /// Time after the check at which the upload of the long motion is in progress. The upload takes five seconds.
-pub const IN_UPLOAD: Duration = Duration::from_millis(700);
+pub(super) const IN_UPLOAD: Duration = Duration::from_millis(700);
 /// Slightly more than the hold-off after a Pause of a client or a policy. During the hold-off no other client can begin
 /// a motion.
 const CALM: Duration = Duration::from_millis(3100);
 /// Observation time during which the arm must stay at rest.
-pub const REST: Duration = Duration::from_millis(500);
+pub(super) const REST: Duration = Duration::from_millis(500);
 
-pub fn state(status: &Value) -> &str {
+pub(super) fn state(status: &Value) -> &str {
     status["state"].as_str().unwrap_or_default()
 }
 
-pub fn is_taught(status: &Value) -> bool {
+pub(super) fn is_taught(status: &Value) -> bool {
     state(status) == "Teaching"
 }
 
 /// Returns `true` if all drives are enabled, which takes some seconds after the start.
-pub fn is_held(status: &Value) -> bool {
+pub(super) fn is_held(status: &Value) -> bool {
     let enabled = |joint: &Value| joint["state"] == "OperationEnable";
     state(status) == "HoldPos" && status["joints"].as_array().is_some_and(|joints| joints.iter().all(enabled))
 }
 
 /// Returns a motion of 1600 points.
-pub fn long_motion(cell: &Cell) -> String {
+pub(super) fn long_motion(cell: &Cell) -> String {
     let text: String = (0..1600)
         .map(|i| {
             let (t, phase) = (0.005 * f64::from(i), std::f64::consts::PI * f64::from(i) / 1599.0);
@@ -42,7 +42,7 @@ pub fn long_motion(cell: &Cell) -> String {
 }
 
 /// Waits until the arm has moved, and then pauses.
-pub fn pause(cell: &Cell) {
+pub(super) fn pause(cell: &Cell) {
     cell.until("Execute", |status| trajectory(status) == "Execute");
     cell.done(&["traj", "pause"]);
     cell.until("Pause", |status| trajectory(status) == "Pause" && is_held(status));
@@ -129,7 +129,7 @@ fn a_command_that_is_killed_leaves_what_it_has_begun_to_its_policy_or_as_it_is()
 const LASTS: Duration = Duration::from_millis(1500);
 
 /// A program that uses only HTTP, and is silent after its last request.
-pub struct Silent<'a> {
+pub(super) struct Silent<'a> {
     cell: &'a Cell,
     key: String,
 }
@@ -139,14 +139,14 @@ impl<'a> Silent<'a> {
         Self::come_for(cell, policy, LASTS)
     }
 
-    pub fn come_for(cell: &'a Cell, policy: &str, lasts: Duration) -> Self {
+    pub(super) fn come_for(cell: &'a Cell, policy: &str, lasts: Duration) -> Self {
         let lease = json!({ "name": "cell 3", "lasts_s": lasts.as_secs_f64(), "policy": policy });
         let (status, grant) = cell.http().api("POST /api/lease", None, Some(lease));
         assert_eq!((status, grant["held"].as_bool()), (200, Some(true)), "{grant}");
         Self { cell, key: grant["key"].as_str().expect("a key").to_owned() }
     }
 
-    pub fn ask(&self, request: &str, body: Value) -> Value {
+    pub(super) fn ask(&self, request: &str, body: Value) -> Value {
         let (status, answer) = self.cell.http().api(request, Some(&self.key), Some(body));
         assert!((200..300).contains(&status), "{request}: {answer}");
         answer

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Writes all files.
-pub fn write(dir: &Path) {
+pub(super) fn write(dir: &Path) {
     let save = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
     // Motion of all joints in 6 s, forward and back.
     let motion = |scale: f64, step_s: f64, offset: f64| {

@@ -11,18 +11,18 @@ use tungstenite::Message;
 use crate::common::socket;
 
 /// Number of viewers, with 25 statuses per second each; and paths for the clients that never read.
-pub const VIEWERS: usize = 50;
+pub(crate) const VIEWERS: usize = 50;
 const DEAF: [&str; 12] = [
     "stream", "line", "foxglove", "stream", "line", "foxglove", "stream", "line", "foxglove", "stream",
     "line", "foxglove",
 ];
 
 /// A group of clients that runs until `dismiss` is called.
-pub struct Crowd(Child);
+pub(crate) struct Crowd(Child);
 
 impl Crowd {
     /// Starts the clients. All of them are connected when this function returns.
-    pub fn gather(address: SocketAddr) -> Self {
+    pub(crate) fn gather(address: SocketAddr) -> Self {
         let program = std::env::current_exe().expect("this program");
         let mut child = Command::new(program)
             .args(["crowd", &address.to_string()])
@@ -35,14 +35,14 @@ impl Crowd {
     }
 
     /// Ends the clients. Returns the statuses per second of the viewer that has received the fewest.
-    pub fn dismiss(self) -> f64 {
+    pub(crate) fn dismiss(self) -> f64 {
         let ended = self.0.wait_with_output().expect("it ends");
         String::from_utf8_lossy(&ended.stdout).trim().parse().expect("a number")
     }
 }
 
 /// Runs the clients in their process until its stdin ends.
-pub fn look(address: &str) {
+pub(crate) fn look(address: &str) {
     let address: SocketAddr = address.parse().expect("an address");
     let ended = Arc::new(AtomicBool::new(false));
     let deaf: Vec<_> = DEAF.iter().map(|path| socket(address, path)).collect();

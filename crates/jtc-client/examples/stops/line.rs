@@ -14,12 +14,12 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use crate::common::simulated;
 
 /// Rate of the line, Bd.
-pub const BAUD: u32 = 115_200;
+pub(crate) const BAUD: u32 = 115_200;
 const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 
 /// A Stop on the line.
 #[derive(Clone, Copy, Debug)]
-pub struct Stop {
+pub(crate) struct Stop {
     pub first_byte: Instant,
     pub last_byte: Instant,
     /// Silence before the Stop, if it follows an abandoned frame.
@@ -28,7 +28,7 @@ pub struct Stop {
 
 /// Bytes that the agent has written to the line.
 #[derive(Debug)]
-pub struct Seen {
+pub(crate) struct Seen {
     /// Time at which the line has transmitted all bytes.
     free_at: Instant,
     /// Number of bytes that are missing in the current frame.
@@ -42,7 +42,7 @@ pub struct Seen {
 
 impl Seen {
     /// Returns `true` while a frame is incomplete.
-    pub fn is_in_a_frame(&self) -> bool {
+    pub(crate) fn is_in_a_frame(&self) -> bool {
         self.left > 0
     }
 
@@ -74,23 +74,23 @@ impl Seen {
 }
 
 /// The agent's port, which records the bytes that the agent writes.
-pub struct Watched {
+pub(crate) struct Watched {
     port: SerialPort,
     seen: Arc<Mutex<Seen>>,
 }
 
 /// Access to the record of a line's bytes.
 #[derive(Clone)]
-pub struct Watch(Arc<Mutex<Seen>>);
+pub(crate) struct Watch(Arc<Mutex<Seen>>);
 
 impl Watch {
-    pub fn look(&self) -> MutexGuard<'_, Seen> {
+    pub(crate) fn look(&self) -> MutexGuard<'_, Seen> {
         self.0.lock().expect("nobody panics with it")
     }
 }
 
 /// Creates a line with a controller.
-pub fn begin() -> (Watched, Watch) {
+pub(crate) fn begin() -> (Watched, Watch) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
     grantpt(&master).and_then(|()| unlockpt(&master)).expect("it is granted");
     let name = ptsname(&master, Vec::new()).expect("a name").into_string().expect("of letters");

@@ -34,7 +34,7 @@ struct Samples {
 
 /// Measures under each load and prints the results. If a measurement fails, its load is listed under `failed` with the
 /// cause.
-pub fn print(n: usize) {
+pub(crate) fn print(n: usize) {
     let (port, watch) = line::begin();
     let served = Served::start_on(port, None, &[]);
     let bare = bare_server();

@@ -17,14 +17,14 @@ const POINTS: usize = 1600;
 const AGAIN: Duration = Duration::from_millis(30);
 
 /// A client that holds the lease until it is dropped.
-pub struct Operator {
+pub(crate) struct Operator {
     uploads: Arc<AtomicBool>,
     ended: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Operator {
-    pub fn come(served: &Served, watch: &Watch) -> Self {
+    pub(crate) fn come(served: &Served, watch: &Watch) -> Self {
         let token = Some(served.tokens.operator.clone());
         let options = Options { name: "anna".into(), token, ..Options::default() };
         let url = served.url();
@@ -52,7 +52,7 @@ impl Operator {
         Self { uploads, ended, thread: Some(thread) }
     }
 
-    pub fn upload(&self, wanted: bool) {
+    pub(crate) fn upload(&self, wanted: bool) {
         self.uploads.store(wanted, Ordering::Relaxed);
     }
 }

@@ -1,6 +1,6 @@
 //! An agent for a simulated controller in this process, and requests of any client.
 
-pub mod program;
+pub(crate) mod program;
 
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket, connect};
 
 /// Creates a simulated arm on a line with this rate.
-pub fn simulated(baud: u32) -> LivePort {
+pub(crate) fn simulated(baud: u32) -> LivePort {
     let arm = Arm::avena();
     let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
     LivePort::new(World::new(config))
@@ -33,7 +33,7 @@ pub fn simulated(baud: u32) -> LivePort {
 
 /// Opens a viewer's WebSocket: `stream`, `line`, or `foxglove` with all its channels.
 #[allow(dead_code, reason = "the test of a load and the example of stops take it, the suite does not")]
-pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
+pub(crate) fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     let mut request = format!("ws://{address}/api/{path}").into_client_request().expect("an address");
     if path != "foxglove" {
         return connect(request).expect("it is let in").0;
@@ -48,7 +48,7 @@ pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpSt
 }
 
 /// An agent that ends with the test.
-pub struct Served {
+pub(crate) struct Served {
     pub address: SocketAddr,
     pub tokens: Tokens,
     pub line: Line,
@@ -69,17 +69,17 @@ impl std::ops::Deref for Served {
 
 impl Served {
     /// Starts an agent for a simulated arm on a line with this rate.
-    pub fn start(baud: u32) -> Self {
+    pub(crate) fn start(baud: u32) -> Self {
         Self::start_with(baud, None, &[])
     }
 
     /// Like [`Self::start`], with TLS if configured, and with read access for web pages from these origins.
-    pub fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>, origins: &[String]) -> Self {
+    pub(crate) fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>, origins: &[String]) -> Self {
         Self::start_on(simulated(baud), tls, origins)
     }
 
     /// Like [`Self::start_with`], for any port.
-    pub fn start_on(
+    pub(crate) fn start_on(
         port: impl Port + Send + 'static,
         tls: Option<Arc<rustls::ServerConfig>>,
         origins: &[String],
@@ -88,7 +88,7 @@ impl Served {
     }
 
     /// Like [`Self::start_on`], with stored files and the given arm.
-    pub fn start_with_store(
+    pub(crate) fn start_with_store(
         port: impl Port + Send + 'static,
         tls: Option<Arc<rustls::ServerConfig>>,
         origins: &[String],
@@ -117,22 +117,22 @@ impl Served {
         Self { http, address, tokens, line, log: log_path, ended, thread: Some(thread), _dir: dir }
     }
 
-    pub fn url(&self) -> String {
+    pub(crate) fn url(&self) -> String {
         format!("http://{}", self.address)
     }
 
     /// Opens a session of an operator.
-    pub fn operator(&self, name: &str) -> Session<AgentPort> {
+    pub(crate) fn operator(&self, name: &str) -> Session<AgentPort> {
         self.session(name, Some(&self.tokens.operator))
     }
 
-    pub fn session(&self, name: &str, token: Option<&String>) -> Session<AgentPort> {
+    pub(crate) fn session(&self, name: &str, token: Option<&String>) -> Session<AgentPort> {
         let options = Options { name: name.into(), token: token.cloned(), ..Options::default() };
         Session::new(AgentPort::open(&self.url(), &options).expect("it is let in"))
     }
 
     /// Ends the agent.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             thread.join().expect("it ends");

@@ -6,44 +6,44 @@ use test_kit::written::text_with;
 use super::Served;
 
 /// A program that holds the lease.
-pub struct Program<'a> {
+pub(crate) struct Program<'a> {
     pub served: &'a Served,
     pub key: String,
 }
 
 impl<'a> Program<'a> {
-    pub fn new(served: &'a Served, name: &str, lasts_s: f64, policy: &str) -> Self {
+    pub(crate) fn new(served: &'a Served, name: &str, lasts_s: f64, policy: &str) -> Self {
         let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
         let (status, grant) = served.api("POST /api/lease", None, Some(body));
         assert_eq!((status, grant["held"].as_bool()), (200, Some(true)), "{grant}");
         Self { served, key: grant["key"].as_str().expect("a key").to_owned() }
     }
 
-    pub fn ask(&self, request: &str, body: Option<Value>) -> (u16, Value) {
+    pub(crate) fn ask(&self, request: &str, body: Option<Value>) -> (u16, Value) {
         self.served.api(request, Some(&self.key), body)
     }
 
     /// Begins a job.
-    pub fn begin(&self, request: &str, body: Value) -> u64 {
+    pub(crate) fn begin(&self, request: &str, body: Value) -> u64 {
         let (status, job) = self.ask(request, Some(body));
         assert_eq!(status, 202, "{job}");
         job["number"].as_u64().expect("a number")
     }
 
-    pub fn recover(&self) {
+    pub(crate) fn recover(&self) {
         let job = self.begin("POST /api/recover", json!({ "defaults": true }));
         let done = self.over(job);
         assert_eq!(done["stage"], "finished", "{done}");
     }
 
     /// Waits for the end of the job and returns it. Renews the lease meanwhile.
-    pub fn over(&self, job: u64) -> Value {
+    pub(crate) fn over(&self, job: u64) -> Value {
         over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
     }
 }
 
 /// Waits for the end of the job and returns it.
-pub fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
+pub(crate) fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
     let mut patience = Patience::begin();
     loop {
         let (status, job) = served.api(&format!("GET /api/jobs/{job}"), None, None);
@@ -57,7 +57,7 @@ pub fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
 }
 
 /// Waits for an event of this kind after a number, and returns the event with its number.
-pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
+pub(crate) fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
     let (mut patience, mut last) = (Patience::begin(), after);
     loop {
         let (_, found) = served.api(&format!("GET /api/events?after={last}&wait_s=2"), None, None);
@@ -75,7 +75,7 @@ pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
 
 /// Checks that the request is refused to a viewer, to an operator without the lease, and to an operator who waits for
 /// the lease.
-pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value) {
+pub(crate) fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value) {
     let ask =
         |token: &String, key: Option<&str>| served.api_as(Some(token), request, key, Some(body.clone()));
     let (operator, viewer) = (&served.tokens.operator, &served.tokens.viewer);
@@ -91,7 +91,7 @@ pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value)
 }
 
 /// Returns the lines of the command log that contain this command; at least one must exist.
-pub fn logged(served: &Served, what: &str) -> Vec<Value> {
+pub(crate) fn logged(served: &Served, what: &str) -> Vec<Value> {
     let text = text_with(&served.log, &[what]);
     let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
     lines.filter(|line| line["command"].as_str().is_some_and(|command| command.contains(what))).collect()

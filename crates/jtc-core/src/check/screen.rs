@@ -49,7 +49,7 @@ pub(super) struct Screen {
 }
 
 impl Screen {
-    pub fn new(bounds: &[JointBounds; JOINTS], step: f64) -> Self {
+    pub(super) fn new(bounds: &[JointBounds; JOINTS], step: f64) -> Self {
         let each = |value: fn(&JointBounds, f64) -> f64| {
             core::array::from_fn(|j| bounds.get(j).map_or(f32::NAN, |b| value(b, step) as f32))
         };
@@ -68,7 +68,7 @@ impl Screen {
     }
 
     /// Returns `true` if point `b`, and the interval from point `a` to it, are certainly within every bound.
-    pub fn passes(&self, a: &Steps, b: &Steps) -> bool {
+    pub(super) fn passes(&self, a: &Steps, b: &Steps) -> bool {
         let (kv, ka) = (self.per_velocity, self.per_acceleration);
         let mut good = true;
         for j in 0..JOINTS {
@@ -94,7 +94,7 @@ impl Screen {
     }
 
     /// Returns the velocities (rad/s) of the control points around `point`: `(lowest, highest)` of joint `j`.
-    pub fn velocities(&self, point: &Steps) -> [(f32, f32); JOINTS] {
+    pub(super) fn velocities(&self, point: &Steps) -> [(f32, f32); JOINTS] {
         core::array::from_fn(|j| {
             let rise = point.acceleration[j].abs() * self.rise;
             (point.velocity[j] - rise, point.velocity[j] + rise)

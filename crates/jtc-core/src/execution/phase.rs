@@ -57,15 +57,15 @@ impl BitCodec for Phase {
 
 impl Phase {
     /// Start of an execution, before any wait.
-    pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
+    pub(crate) const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
 
     /// Creates an approach from the held position that takes `length_ms`.
-    pub fn approach(from: [f64; JOINTS], length_ms: f64) -> Self {
+    pub(crate) fn approach(from: [f64; JOINTS], length_ms: f64) -> Self {
         Self::Approaching { from, length_ms, clock: PathClock::start(1.0), leave: None }
     }
 
     /// Returns the control mode.
-    pub fn mode(&self) -> ControlMode {
+    pub(crate) fn mode(&self) -> ControlMode {
         match self {
             Self::Waiting { .. } => ControlMode::Hold,
             Self::Approaching { .. } => ControlMode::Approach,
@@ -74,12 +74,12 @@ impl Phase {
     }
 
     /// Returns `true` if joints are still to be enabled.
-    pub fn waits(&self) -> bool {
+    pub(crate) fn waits(&self) -> bool {
         matches!(self, Self::Waiting { .. })
     }
 
     /// Returns `true` if the arm is in motion, and no Pause or Stop has been accepted.
-    pub fn goes_on(&self) -> bool {
+    pub(crate) fn goes_on(&self) -> bool {
         match self {
             Self::Approaching { clock, leave, .. } => leave.is_none() && clock.time > 0.0,
             Self::Running { leave } => leave.is_none(),
@@ -88,7 +88,7 @@ impl Phase {
     }
 
     /// Returns the rate of the time in which the arm moves: the time of the approach or of the path.
-    pub fn rate(&self, path: &PathClock) -> f64 {
+    pub(crate) fn rate(&self, path: &PathClock) -> f64 {
         match self {
             Self::Approaching { clock, .. } => clock.rate,
             _ => path.rate,
@@ -96,7 +96,7 @@ impl Phase {
     }
 
     /// Returns the state that follows an accepted Pause or Stop.
-    pub fn leave(&self) -> Option<TrajectoryState> {
+    pub(crate) fn leave(&self) -> Option<TrajectoryState> {
         match self {
             Self::Approaching { leave, .. } | Self::Running { leave } => *leave,
             Self::Waiting { .. } | Self::AtStart => None,

@@ -22,25 +22,25 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         let lines = [const { Line { len: 0, frame: [0; ANSWER_MAX] } }; HOST_LINES];
         Self { lines, sent: 0, sent_len: 0 }
     }
 
     /// Returns `true` if an answer on this line has not been sent yet.
-    pub fn waits(&self, line: usize) -> bool {
+    pub(crate) fn waits(&self, line: usize) -> bool {
         self.lines.get(line).is_some_and(|line| line.len > 0)
     }
 
     /// Puts an answer on a line, in place of one that has not been sent yet.
-    pub fn put(&mut self, line: usize, answer: &Answer<'_>) {
+    pub(crate) fn put(&mut self, line: usize, answer: &Answer<'_>) {
         if let Some(line) = self.lines.get_mut(line) {
             line.len = answer.emit(&mut line.frame).unwrap_or(0);
         }
     }
 
     /// Returns the line whose answer must be sent now. The lines take turns.
-    pub fn send(&mut self) -> Option<usize> {
+    pub(crate) fn send(&mut self) -> Option<usize> {
         for offset in 1..=HOST_LINES {
             let n = (self.sent + offset) % HOST_LINES;
             if let Some(line) = self.lines.get_mut(n).filter(|line| line.len > 0) {
@@ -52,7 +52,7 @@ impl Answers {
     }
 
     /// Returns the frame that was sent last.
-    pub fn frame(&self) -> &[u8] {
+    pub(crate) fn frame(&self) -> &[u8] {
         self.lines.get(self.sent).and_then(|line| line.frame.get(..self.sent_len)).unwrap_or(&[])
     }
 }

@@ -14,7 +14,7 @@ pub(super) const IMAGE_PER_TICK: usize = 256;
 
 impl Extensions {
     /// Clears the hash, because the arm in use has changed.
-    pub fn forget_hash(&mut self) {
+    pub(crate) fn forget_hash(&mut self) {
         (self.hash, self.hashed) = (None, (0, Hash::new()));
     }
 }

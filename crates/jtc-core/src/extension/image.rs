@@ -26,12 +26,12 @@ impl ImageSource<'_> {
     }
 
     /// Returns the number of bytes of the image.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.name() + NAME_LEN
     }
 
     /// Reads the image from byte `offset` on. Returns the number of bytes that were read.
-    pub fn read(&self, offset: usize, out: &mut [u8]) -> usize {
+    pub(crate) fn read(&self, offset: usize, out: &mut [u8]) -> usize {
         let (settings, name) = (self.settings(), self.name());
         let mut at = offset;
         let mut values = settings::values(self.config, at.saturating_sub(settings) / VALUE_LEN, true);
@@ -71,7 +71,7 @@ impl ImageSource<'_> {
     }
 
     /// Hashes up to `count` bytes from `offset` on. Returns the next offset and the hash.
-    pub fn hash(&self, offset: usize, hash: Hash, count: usize) -> (usize, Hash) {
+    pub(crate) fn hash(&self, offset: usize, hash: Hash, count: usize) -> (usize, Hash) {
         let mut bytes = [0; 256];
         let count = count.min(self.name().saturating_sub(offset));
         let slice = bytes.get_mut(..count).unwrap_or(&mut []);
@@ -80,7 +80,7 @@ impl ImageSource<'_> {
     }
 
     /// Returns `true` if `offset` is past the hashed part, which is everything before the name.
-    pub fn hashed(&self, offset: usize) -> bool {
+    pub(crate) fn hashed(&self, offset: usize) -> bool {
         offset >= self.name()
     }
 }
@@ -117,32 +117,32 @@ pub(crate) struct StoredArm {
 }
 
 impl StoredArm {
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { bytes: [0; IMAGE_MAX], len: 0 }
     }
 
     /// Returns its bytes.
-    pub fn bytes(&self) -> &[u8] {
+    pub(crate) fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
     /// Returns its parts.
-    pub fn arm(&self) -> Option<ArmImage<'_>> {
+    pub(crate) fn arm(&self) -> Option<ArmImage<'_>> {
         ArmImage::parse(self.bytes())
     }
 
     /// Returns `true` if an arm is stored.
-    pub fn is_there(&self) -> bool {
+    pub(crate) fn is_there(&self) -> bool {
         self.len > 0
     }
 
     /// Removes the stored arm.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
 
     /// Stores another image instead. If the image is too long, no arm is stored.
-    pub fn set(&mut self, image: &[u8]) {
+    pub(crate) fn set(&mut self, image: &[u8]) {
         self.len = match self.bytes.get_mut(..image.len()) {
             Some(place) => {
                 place.copy_from_slice(image);
@@ -154,7 +154,7 @@ impl StoredArm {
 
     /// Stores a part of the arm in use. Returns the offset of the next part. Until all parts are stored, [`Self::is_there`] returns
     /// `false`.
-    pub fn write(&mut self, source: &ImageSource<'_>, offset: usize, count: usize) -> usize {
+    pub(crate) fn write(&mut self, source: &ImageSource<'_>, offset: usize, count: usize) -> usize {
         self.len = 0;
         let end = (offset + count).min(IMAGE_MAX);
         let read = self.bytes.get_mut(offset..end).map_or(0, |place| source.read(offset, place));
@@ -162,7 +162,7 @@ impl StoredArm {
     }
 
     /// Marks the image as complete: all `len` bytes are stored.
-    pub fn finish(&mut self, len: usize) {
+    pub(crate) fn finish(&mut self, len: usize) {
         self.len = len.min(IMAGE_MAX);
     }
 }

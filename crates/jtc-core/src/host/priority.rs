@@ -21,14 +21,18 @@ bit_codec!(Priority { stops, pauses, cancelled, stopped });
 
 impl Priority {
     /// Adds the number of urgent commands that were accepted.
-    pub fn accept(&mut self, command: UrgentCommand, count: u8) {
+    pub(crate) fn accept(&mut self, command: UrgentCommand, count: u8) {
         let accepted = self.accepted(command);
         *accepted = accepted.saturating_add(count);
     }
 
     /// Returns the data status of an execution command that an urgent command has overtaken. A Stop or a Pause is reported as accepted in
     /// two cases: it was accepted, or it has cancelled an Execute and the `trajectory` is in the commanded state.
-    pub fn overtaken(&mut self, exec: ExecCommand, trajectory: TrajectoryState) -> Result<(), DataStatus> {
+    pub(crate) fn overtaken(
+        &mut self,
+        exec: ExecCommand,
+        trajectory: TrajectoryState,
+    ) -> Result<(), DataStatus> {
         let Some(command) = UrgentCommand::from_exec(exec) else {
             self.cancelled = true;
             return Err(DataStatus::NotAllowed);

@@ -27,7 +27,7 @@ bit_codec!(LineUpload { plain });
 
 impl LineUpload {
     /// Returns `true` if the record of `command` may contain only data statuses up to 6. For commands of an upload, its segment 0 decides.
-    pub fn in_plain_words(&mut self, command: &Command<'_>, plain: bool) -> bool {
+    pub(crate) fn in_plain_words(&mut self, command: &Command<'_>, plain: bool) -> bool {
         match command {
             Command::Trajectory(segment) if segment.segment == 0 => *self.plain.insert(plain),
             Command::Trajectory(_) | Command::TrajSetExecStatus(ExecCommand::Execute) => {
@@ -39,7 +39,7 @@ impl LineUpload {
 
     /// Records that a trajectory is executed. If another client executes it again, it is not known yet whether that client uses the
     /// extensions.
-    pub fn executed(&mut self) {
+    pub(crate) fn executed(&mut self) {
         self.plain = self.plain.filter(|plain| *plain);
     }
 }

@@ -6,13 +6,13 @@ use crate::parameters::PidGains;
 
 impl HostParameters {
     /// Returns value `i` of the gains, in the order of the wire format.
-    pub fn pid_float(&self, i: usize) -> f64 {
+    pub(crate) fn pid_float(&self, i: usize) -> f64 {
         let PidGains { kp, ki, kd, int_min, int_max } = self.pid.get(i / 5).copied().unwrap_or_default();
         [kp, ki, kd, int_min, int_max].get(i % 5).copied().unwrap_or(0.0)
     }
 
     /// Returns value `i` of the model, in the order of the wire format.
-    pub fn model_float(&self, i: usize) -> f64 {
+    pub(crate) fn model_float(&self, i: usize) -> f64 {
         let of = |origin: &Origin, i: usize| origin.xyz.iter().chain(&origin.rpy).nth(i).copied();
         let number = match i.checked_sub(6 * self.model.joints.len()) {
             None => self.model.joints.get(i / 6).and_then(|origin| of(origin, i % 6)),
@@ -26,7 +26,7 @@ impl HostParameters {
     }
 
     /// Returns value `i` of the friction in use, in the order of the wire format.
-    pub fn friction_float(&self, i: usize) -> f32 {
+    pub(crate) fn friction_float(&self, i: usize) -> f32 {
         if !self.friction_is_table {
             let coefficient = self.polynomial.get(i / 6).and_then(|joint| joint.iter().rev().nth(i % 6));
             return coefficient.map_or(0.0, |c| *c as f32);

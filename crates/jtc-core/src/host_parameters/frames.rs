@@ -10,7 +10,7 @@ use crate::parameters::{PidGains, TableOf};
 
 impl HostParameters {
     /// Takes a model in slices, like [`set_model`](Self::set_model).
-    pub fn take_model(
+    pub(crate) fn take_model(
         &mut self,
         floats: &Floats<'_>,
         progress: SliceProgress,
@@ -24,7 +24,12 @@ impl HostParameters {
     }
 
     /// Takes gains and model of a stored arm. The gains are checked against the model when a host requests them.
-    pub fn load(&mut self, pid: &Floats<'_>, model: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
+    pub(crate) fn load(
+        &mut self,
+        pid: &Floats<'_>,
+        model: &Floats<'_>,
+        config: &Config,
+    ) -> Result<(), DataStatus> {
         let (pid, model) = (read_pid(pid)?, read_model(model)?);
         self.check_pid(&pid, config)?;
         self.put_pid(&pid);
@@ -32,7 +37,7 @@ impl HostParameters {
         self.put_model(&model, None, config)
     }
 
-    pub fn take_polynomial(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
+    pub(crate) fn take_polynomial(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
         // Each joint has 4 or 6 coefficients, the highest index first.
         let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
         let mut polynomial = [[0.0; 6]; JOINTS];
@@ -45,7 +50,7 @@ impl HostParameters {
     }
 
     /// Takes the tables of a frame, in as many ticks as [`take_tables`](Self::take_tables) needs.
-    pub fn take_table(
+    pub(crate) fn take_table(
         &mut self,
         floats: &Floats<'_>,
         progress: SliceProgress,

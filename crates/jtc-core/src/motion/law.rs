@@ -104,7 +104,7 @@ bit_codec!(ControlLaw { pid, torque, taught, transfer, yields, yielded, loads, o
 
 impl ControlLaw {
     /// Clears all torques.
-    pub fn release(&mut self) {
+    pub(crate) fn release(&mut self) {
         let Self { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms } = self;
         (*unwinds_ms, *observed) = (0, 0);
         *pid = Default::default();
@@ -118,25 +118,25 @@ impl ControlLaw {
 
     /// Prepares a change of the control mode among HoldPos, Operate and Teaching. The transfer is bumpless: only the torque of the model
     /// may step (J-44).
-    pub fn change_mode(&mut self) {
+    pub(crate) fn change_mode(&mut self) {
         self.transfer.change_mode();
     }
 
     /// Like [`Self::change_mode`], but no torque may step: the torque that decelerates an arm is part of the model's torque after the
     /// change.
-    pub fn change_whole_torque(&mut self) {
+    pub(crate) fn change_whole_torque(&mut self) {
         self.transfer.change_model();
     }
 
     /// Prepares a change of the model while the arm is held. The transfer is bumpless: no torque may step.
-    pub fn change_model(&mut self) {
+    pub(crate) fn change_model(&mut self) {
         // The integral holds torque that the last model lacked, and must give it back.
         self.payload_comes();
         self.transfer.change_model();
     }
 
     /// Changes the gains. The integral keeps as much of its torque as the new gains allow; the remainder is blended out.
-    pub fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
+    pub(crate) fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
         for j in 0..JOINTS {
             if !self.yields(j) {
                 self.pid[j].keep(&gains[j], self.torque[j].pid.i);
@@ -146,7 +146,7 @@ impl ControlLaw {
     }
 
     /// Returns `true` if these gains can hold the present torque (J-71).
-    pub fn hold_on(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
+    pub(crate) fn hold_on(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
         let holds = |j: usize| {
             let PidTorque { p, i, .. } = self.torque[j].pid;
             config.absent[j] || gains::hold_on(&gains[j], p, i, &config.joints[j])
@@ -160,7 +160,7 @@ impl ControlLaw {
     }
 
     /// Resets the position controllers for a start at rest, without a position error, and clears the loads.
-    pub fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         for pid in &mut self.pid {
             pid.reset(0.0);
         }
@@ -168,7 +168,7 @@ impl ControlLaw {
     }
 
     /// Resets joints whose position hold has ended or has not begun.
-    pub fn latch(&mut self, latched: &Latched) {
+    pub(crate) fn latch(&mut self, latched: &Latched) {
         for j in 0..JOINTS {
             if !latched.held[j] {
                 self.pid[j].reset(0.0);
@@ -185,7 +185,7 @@ impl ControlLaw {
     /// moves, kg·m²; `led`: the joint comes to rest after Teaching.
     // Inlined, so that the compiler knows that the index is in range.
     #[inline(always)]
-    pub fn begin_yield(
+    pub(crate) fn begin_yield(
         &mut self,
         joint: usize,
         (lowers, led): (bool, bool),
@@ -217,44 +217,44 @@ impl ControlLaw {
     }
 
     /// Returns `true` if the joint yields, or lowers a load.
-    pub fn yields(&self, joint: usize) -> bool {
+    pub(crate) fn yields(&self, joint: usize) -> bool {
         self.yields[joint].is_some()
     }
 
     /// Returns `true` if any joint yields, or lowers a load.
-    pub fn any_yields(&self) -> bool {
+    pub(crate) fn any_yields(&self) -> bool {
         self.yields.iter().any(Option::is_some)
     }
 
     /// Returns `true` if a joint yields and has not calmed down yet.
-    pub fn is_yielding(&self) -> bool {
+    pub(crate) fn is_yielding(&self) -> bool {
         self.yields.iter().flatten().any(|yields| !yields.is_calm())
     }
 
     /// Ends the reaction at the host's request. Joints that are calm are held again.
-    pub fn end_yields(&mut self) {
+    pub(crate) fn end_yields(&mut self) {
         self.yields.iter_mut().flatten().for_each(Yield::clear);
     }
 
     /// Moves the spring of a yielding joint along with it. Returns the position to which the spring pulls, rad; `None` if the joint does
     /// not yield.
-    pub fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
+    pub(crate) fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
         self.yields[joint].as_mut().map(|yields| yields.drag(position))
     }
 
     /// Returns the torque that the joint carries and the model lacks, N·m.
-    pub fn load(&self, joint: usize) -> f64 {
+    pub(crate) fn load(&self, joint: usize) -> f64 {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
 
     /// Returns the feedback torque, which corrects the torques of the model and of the load, N·m. The feedback torque opposes a push.
-    pub fn feedback(&self, joint: usize) -> f64 {
+    pub(crate) fn feedback(&self, joint: usize) -> f64 {
         let pid = &self.torque[joint].pid;
         pid.p + pid.d + (pid.i - self.load(joint))
     }
 
     /// Ends the yield of joints that are calm. Returns these joints, which are held at their present positions.
-    pub fn end_of_yields(&mut self, gains: &[PidGains; JOINTS]) -> [bool; JOINTS] {
+    pub(crate) fn end_of_yields(&mut self, gains: &[PidGains; JOINTS]) -> [bool; JOINTS] {
         let mut ended = [false; JOINTS];
         for j in 0..JOINTS {
             let Some(yields) = self.yields[j].as_ref().filter(|yields| yields.is_over()) else { continue };
@@ -275,7 +275,7 @@ impl ControlLaw {
     /// load. A person who leans on the arm will let go.
     ///
     /// If a `contact` may press on the arm, its pressure is not waited for, but a load that was known before must be known again.
-    pub fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
+    pub(crate) fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
         let known = |j: usize| {
             let little = LITTLE * config.joints[j].torque_max;
             self.loads[j].is_known() && (contact || self.feedback(j).abs() <= little)
@@ -285,12 +285,12 @@ impl ControlLaw {
 
     /// Sets the loads as if every joint had found a load of zero.
     #[cfg(test)]
-    pub fn find_loads_for_test(&mut self) {
+    pub(crate) fn find_loads_for_test(&mut self) {
         self.loads.iter_mut().for_each(|load| load.set(0.0));
     }
 
     /// Begins Teaching, which carries the loads that were found (J-25), but no torque that may come from a contact.
-    pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
+    pub(crate) fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
         let mut loads = [0.0; JOINTS];
         for j in 0..JOINTS {
             loads[j] = match &self.yields[j] {
@@ -304,14 +304,14 @@ impl ControlLaw {
 
     /// Records that the payload is added to the model while the arm is held. The missing torque is not a load until the integral has given
     /// back the torque that it had found for the payload (J-60).
-    pub fn payload_comes(&mut self) {
+    pub(crate) fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
         self.forget_loads();
     }
 
     /// Reduces the mass that Teaching had found by `mass` (kg). The payload was configured in Teaching, and the model carries it from this
     /// tick on (J-60).
-    pub fn give_way_to_payload(&mut self, mass: f64) {
+    pub(crate) fn give_way_to_payload(&mut self, mass: f64) {
         if let Some(taught) = &mut self.taught {
             taught.give_way(mass);
         }
@@ -319,7 +319,7 @@ impl ControlLaw {
 
     /// Evaluates the answers of the joints in each tick of Teaching. Returns the speeds that follow from their positions, rad/s. `late`:
     /// delay of this tick, ms.
-    pub fn hear_led_joints(&mut self, nodes: &Nodes, late: u16) -> [f32; JOINTS] {
+    pub(crate) fn hear_led_joints(&mut self, nodes: &Nodes, late: u16) -> [f32; JOINTS] {
         let (q, mut speeds) = (nodes.positions(), [0.0; JOINTS]);
         let Some(taught) = &mut self.taught else { return speeds };
         for j in 0..JOINTS {
@@ -329,7 +329,7 @@ impl ControlLaw {
     }
 
     /// Ends Teaching. The integral takes over the torque that held each joint.
-    pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
+    pub(crate) fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let q = nodes.positions();
         if let Some(taught) = &self.taught {
             for j in 0..JOINTS {
@@ -341,7 +341,7 @@ impl ControlLaw {
     }
 
     /// Shifts the position controllers by the sag of the set positions, rad. A sag is not a motion.
-    pub fn sag(&mut self, sag: &[f64; JOINTS]) {
+    pub(crate) fn sag(&mut self, sag: &[f64; JOINTS]) {
         for (pid, way) in self.pid.iter_mut().zip(sag) {
             pid.shift(*way);
         }
@@ -349,7 +349,7 @@ impl ControlLaw {
 
     /// Runs one tick: computes the torque before any limit. Also returns the joint errors that were found (friction table).
     #[inline(always)]
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         inputs: &LawInputs<'_>,
         set: &SetValues,

@@ -51,7 +51,7 @@ pub(crate) struct Found {
 
 impl Found {
     /// Returns `true` if a reaction is needed.
-    pub fn is_any(&self) -> bool {
+    pub(crate) fn is_any(&self) -> bool {
         (self.errors != 0) | self.overloaded | self.pushed | self.unstable
     }
 }
@@ -69,27 +69,27 @@ pub(crate) struct Limited {
 
 impl Limiter {
     /// Returns the joints whose last torque was above the limit. Their integrals do not change (J-41).
-    pub fn saturated(&self) -> [bool; JOINTS] {
+    pub(super) fn saturated(&self) -> [bool; JOINTS] {
         core::array::from_fn(|j| self.saturation[j].saturated)
     }
 
     /// Clears the counts of a joint.
     #[inline(always)]
-    pub fn forget(&mut self, joint: usize) {
+    pub(super) fn forget(&mut self, joint: usize) {
         self.saturation[joint].forget();
         self.pushed[joint].forget();
         self.turns[joint] = Turns::default();
     }
 
     /// Clears the record of earlier changes from limit to limit.
-    pub fn forget_turns(&mut self) {
+    pub(super) fn forget_turns(&mut self) {
         self.turns = Default::default();
     }
 
     /// Runs one tick: limits the torque that the `law` has computed, and checks torque and set values. While the arm brakes with all
     /// available torque, an overload is not reported; if a motion is commanded, position error and acceleration are not reported either
     /// (J-33). For a joint that yields, only a torque of NaN is reported, because its torque is bounded by construction.
-    pub fn step(
+    pub(super) fn step(
         &mut self,
         inputs: &LawInputs<'_>,
         law: &ControlLaw,

@@ -31,7 +31,7 @@ bit_codec!(PathRamp { inertia });
 
 impl PathRamp {
     /// Begins a ramp of path time. Its bounds depend on the inertia of the arm.
-    pub fn begin(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
+    pub(crate) fn begin(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         self.inertia = dynamics.mass_matrix(nodes.positions());
         for j in 0..JOINTS {
             self.inertia[j][j] += config.joints[j].rotor_inertia;
@@ -39,18 +39,23 @@ impl PathRamp {
     }
 
     /// Returns the inertia that each joint moved at the start of the ramp while the other joints were held, kg·m².
-    pub fn inertia(&self) -> [f64; JOINTS] {
+    pub(crate) fn inertia(&self) -> [f64; JOINTS] {
         core::array::from_fn(|j| self.inertia[j][j])
     }
 
     /// Returns the inertia that joint `j` feels when joint `k` accelerates, kg·m².
-    pub fn coupling(&self, j: usize, k: usize) -> f64 {
+    pub(crate) fn coupling(&self, j: usize, k: usize) -> f64 {
         self.inertia[j][k]
     }
 
     /// Returns the shortest time of a smooth stop of all joints from these velocities (rad/s), ms. The stop uses [`STOP_TORQUE`] of the
     /// torque that the last torques of the `law` leave within the limits.
-    pub fn shortest_stop_ms(&self, law: &ControlLaw, velocity: &[f64; JOINTS], config: &Config) -> f64 {
+    pub(crate) fn shortest_stop_ms(
+        &self,
+        law: &ControlLaw,
+        velocity: &[f64; JOINTS],
+        config: &Config,
+    ) -> f64 {
         let mut longest = 0.0_f64;
         for j in 0..JOINTS {
             let momentum: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * velocity[k]).sum();
@@ -63,7 +68,7 @@ impl PathRamp {
     }
 
     /// Runs one tick of a clock that changes to another rate, along a ramp that the arm can follow. For `at` and `law` see `slope_bounds`.
-    pub fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
+    pub(crate) fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         if !clock.ramping() {
             clock.slope = 0.0;
             return;
@@ -78,7 +83,7 @@ impl PathRamp {
     }
 
     /// Runs one tick of a clock that is held back because joints are at their torque limits (J-75).
-    pub fn hold_back(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
+    pub(crate) fn hold_back(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         clock.hold_back(self.slope_bounds(at, law, clock.rate, clock.slope, config).full);
     }
 

@@ -49,7 +49,7 @@ impl Motion {
     /// Returns the time for the approach from the held position to `to` (rad), ms. The approach takes the time of a ramp, or longer if the
     /// velocity, acceleration or torque limits require it. Returns `None` if the torque limits require over 2 s more than the other limits.
     /// Uses the inertia of a ramp that begins here.
-    pub fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
+    pub(crate) fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
         let config = inputs.config;
         let from = &self.set.point.position;
         let way: [f64; JOINTS] = core::array::from_fn(|j| to[j] - from[j]);
@@ -89,7 +89,7 @@ impl Motion {
 
     /// Returns the velocities and accelerations that the limits of torque and tool speed allow for a jog at the `wanted` velocities
     /// (rad/s). Returns `None` if a torque limit allows no motion. Uses the inertia of a ramp that begins here.
-    pub fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
+    pub(crate) fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
         let config = inputs.config;
         let wanted = &if config.tool_speed_max > 0.0 { self.slowed(wanted, inputs) } else { *wanted };
         let fastest = wanted.iter().fold(0.0, |most: f64, v| most.max(v.abs()));

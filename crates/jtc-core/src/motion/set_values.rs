@@ -39,7 +39,7 @@ bit_codec!(SetValues { point, commanded, holding, absent, found_moving, catch, d
 
 impl SetValues {
     /// Releases all joints: no joint is held, and the set position equals the measured one.
-    pub fn release(&mut self, nodes: &Nodes) {
+    pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog } = self;
         *point = SetPoint::still(*nodes.positions());
         commanded.rest(nodes.positions());
@@ -51,7 +51,7 @@ impl SetValues {
     }
 
     /// Restarts the set values at rest at `position`, for any motion that follows.
-    pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
+    pub(crate) fn begin_at(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
         self.commanded.rest(position);
         // J-63: joints do not stop because their set values restart, even less a joint that had not followed them.
@@ -62,36 +62,36 @@ impl SetValues {
     }
 
     /// Sets the set position to the measured position while a hand leads the arm.
-    pub fn follow_measured(&mut self, nodes: &Nodes) {
+    pub(crate) fn follow_measured(&mut self, nodes: &Nodes) {
         self.point = SetPoint::still(*nodes.positions());
         self.commanded.rest(nodes.positions());
     }
 
     /// Begins the next tick. Returns the joints whose set values were restarted in the last tick. The restart did not change their motion:
     /// the set values continued the measured motion.
-    pub fn next_tick(&mut self) -> [bool; JOINTS] {
+    pub(crate) fn next_tick(&mut self) -> [bool; JOINTS] {
         self.commanded.next_tick();
         core::mem::take(&mut self.found_moving)
     }
 
     /// Returns the positions (rad) that are due in the measurement of this tick (J-62).
-    pub fn due(&self, config: &Config) -> &[f64; JOINTS] {
+    pub(crate) fn due(&self, config: &Config) -> &[f64; JOINTS] {
         self.commanded.position(config.delay_ticks)
     }
 
     /// Sets the joint velocities of the jog, rad/s, and its highest accelerations, rad/s².
-    pub fn jog(&mut self, wanted: &[f64; JOINTS], acceleration: &[f64; JOINTS], config: &Config) {
+    pub(crate) fn jog(&mut self, wanted: &[f64; JOINTS], acceleration: &[f64; JOINTS], config: &Config) {
         let jog = self.jog.get_or_insert_with(Jog::begin);
         jog.command(wanted, acceleration, &self.point.position, config);
     }
 
     /// Begins a tick of a jog. Returns `true` if the jog begins to come to rest in this tick.
-    pub fn jog_ends(&mut self) -> bool {
+    pub(crate) fn jog_ends(&mut self) -> bool {
         self.jog.as_mut().is_some_and(Jog::ends)
     }
 
     /// Runs one tick of a jog. `ramp` advances its clock for the commanded set values.
-    pub fn jog_on(&mut self, config: &Config, ramp: impl FnOnce(&SetPoint, &mut PathClock)) {
+    pub(crate) fn jog_on(&mut self, config: &Config, ramp: impl FnOnce(&SetPoint, &mut PathClock)) {
         let Some(jog) = &mut self.jog else { return };
         jog.step(&mut self.point, config, ramp);
         if jog.rests() {
@@ -100,35 +100,35 @@ impl SetValues {
     }
 
     /// Brings the jogged joints to rest.
-    pub fn end_jog(&mut self) {
+    pub(crate) fn end_jog(&mut self) {
         if let Some(jog) = &mut self.jog {
             jog.end();
         }
     }
 
     /// Ends the jog at once, even if joints still move.
-    pub fn drop_jog(&mut self) {
+    pub(crate) fn drop_jog(&mut self) {
         self.jog = None;
     }
 
     /// Returns `true` if the arm is jogged and has not begun to come to rest.
-    pub fn jogs_on(&self) -> bool {
+    pub(crate) fn jogs_on(&self) -> bool {
         self.jog.as_ref().is_some_and(Jog::goes_on)
     }
 
     /// Returns `true` until a jogged arm has come to rest.
-    pub fn jogging(&self) -> bool {
+    pub(crate) fn jogging(&self) -> bool {
         self.jog.is_some()
     }
 
     /// Returns `true` if a joint is jogged or decelerates.
-    pub fn coming_to_rest(&self) -> bool {
+    pub(crate) fn coming_to_rest(&self) -> bool {
         self.jog.is_some() || self.deceleration.iter().any(Option::is_some)
     }
 
     /// Begins to hold the arm at its measured position. An arm that moves because a hand has led it first comes to rest within `length_ms`.
     /// Such an arm is caught like a falling load.
-    pub fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
+    pub(crate) fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);
         let moving = velocity.iter().any(|&v| moves(v));
@@ -148,7 +148,7 @@ impl SetValues {
 
     /// Returns `true` when the joints that a hand has led have come to rest. From then on, a joint that swings may need to be caught like a
     /// load.
-    pub fn led_to_rest(&mut self, config: &Config) -> bool {
+    pub(crate) fn led_to_rest(&mut self, config: &Config) -> bool {
         self.led = self.deceleration.iter().any(Option::is_some);
         if !self.led {
             self.catch = [Catch::begin(config); JOINTS];
@@ -157,7 +157,7 @@ impl SetValues {
     }
 
     /// Returns `true` while the arm comes to rest after a hand has led it.
-    pub fn is_led(&self) -> bool {
+    pub(crate) fn is_led(&self) -> bool {
         self.led
     }
 
@@ -172,19 +172,19 @@ impl SetValues {
     }
 
     /// Returns the joints that move, according to their set values or their measurements.
-    pub fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
+    pub(crate) fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
         core::array::from_fn(|j| moves(self.point.velocity[j]) || moves(nodes.velocities()[j]))
     }
 
     /// Sets the state as if every joint were enabled and its position latched.
     #[cfg(test)]
-    pub fn hold_for_test(&mut self) {
+    pub(crate) fn hold_for_test(&mut self) {
         self.holding = [true; JOINTS];
     }
 
     /// Moves the set position of a yielding joint to the position to which its spring pulls, rad. This change of the set values is not a
     /// motion.
-    pub fn lead(&mut self, j: usize, position: f64) {
+    pub(crate) fn lead(&mut self, j: usize, position: f64) {
         (self.point.position[j], self.point.velocity[j], self.point.acceleration[j]) = (position, 0.0, 0.0);
         self.commanded.begin(j, position, 0.0, 0);
         self.deceleration[j] = None;
@@ -192,12 +192,12 @@ impl SetValues {
     }
 
     /// Returns `true` if the joint has come to rest, within its torque limit, at any time since it was enabled.
-    pub fn settled(&self, joint: usize) -> bool {
+    pub(crate) fn settled(&self, joint: usize) -> bool {
         self.catch[joint].settled()
     }
 
     /// Returns `true` if every joint that is not absent is enabled and held at rest.
-    pub fn all_holding(&self) -> bool {
+    pub(crate) fn all_holding(&self) -> bool {
         self.jog.is_none()
             && self.deceleration.iter().all(Option::is_none)
             && self.holding.iter().zip(&self.absent).all(|(&holding, &absent)| holding | absent)
@@ -207,7 +207,7 @@ impl SetValues {
     /// Latches the set position of joints that have just been enabled, and brings those of them to rest that move. The set values of joints
     /// that are not enabled follow the measurements, without torque. Returns the joints that were held before, and those that have just
     /// been enabled.
-    pub fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
+    pub(crate) fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
         let (measured, velocity) = (nodes.positions(), nodes.velocities());
         let enabled = core::array::from_fn(|j| nodes.node(j).enabled());
         if self.holding == [true; JOINTS] && enabled == self.holding {
@@ -237,7 +237,7 @@ impl SetValues {
     }
 
     /// Runs one tick of the position hold in HoldPos.
-    pub fn hold(&mut self, config: &Config) {
+    pub(crate) fn hold(&mut self, config: &Config) {
         (self.point.velocity, self.point.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
         for j in 0..JOINTS {
             let Some(deceleration) = &mut self.deceleration[j] else { continue };
@@ -252,7 +252,7 @@ impl SetValues {
 
     /// Runs one tick on the path or of the approach. The full-speed values `at` are scaled by the rate of path time and its slope (1/s)
     /// (J-33).
-    pub fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
+    pub(crate) fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
         self.point.position = at.position;
         for j in 0..JOINTS {
             self.point.velocity[j] = at.velocity[j] * rate;
@@ -262,7 +262,7 @@ impl SetValues {
 
     /// Moves the set position of a joint whose load is being caught towards the joint, by as much as the torque exceeds the limit
     /// (`excess`, N·m) at a position error of `error` (rad). Returns the step, rad.
-    pub fn sag(&mut self, j: usize, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
+    pub(crate) fn sag(&mut self, j: usize, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         let step = self.catch[j].sag(excess, kp, error, limits);
         self.point.position[j] += step;
         self.commanded.shift(j, step);

@@ -20,12 +20,12 @@ bit_codec!(JointTorque { model, pid, friction, load, brake, blend });
 
 impl JointTorque {
     /// Returns the sum of all parts except the model.
-    pub fn correction(&self) -> f64 {
+    pub(crate) fn correction(&self) -> f64 {
         // Two partial sums have a shorter latency than one.
         (self.pid.sum() + self.friction) + (self.load + self.brake + self.blend)
     }
 
-    pub fn sum(&self) -> f64 {
+    pub(crate) fn sum(&self) -> f64 {
         self.model + self.correction()
     }
 }

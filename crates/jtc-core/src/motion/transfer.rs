@@ -62,36 +62,36 @@ impl BitCodec for Continued {
 
 impl Transfer {
     /// Prepares a change of the control mode: only the torque of the model may step.
-    pub fn change_mode(&mut self) {
+    pub(super) fn change_mode(&mut self) {
         self.next = Some(Continued::Correction);
     }
 
     /// Prepares a change of the model: no torque may step.
-    pub fn change_model(&mut self) {
+    pub(super) fn change_model(&mut self) {
         self.next = Some(Continued::Everything);
     }
 
     /// Prepares the yield of a joint from the next tick on: only the torque of the model may step, and excess torque falls within
     /// [`FALL_MS`] (J-68).
     #[inline(always)]
-    pub fn begin_yield(&mut self, joint: usize) {
+    pub(super) fn begin_yield(&mut self, joint: usize) {
         self.next.get_or_insert(Continued::Correction);
         self.yields[joint] = true;
     }
 
     /// Sets the joints that were latched in this tick.
-    pub fn set_just_enabled(&mut self, just_enabled: [bool; JOINTS]) {
+    pub(super) fn set_just_enabled(&mut self, just_enabled: [bool; JOINTS]) {
         self.just_enabled = just_enabled;
     }
 
     /// Prepares the computation of the next torque. Returns the part of the last torque that the next torque must continue, if any.
-    pub fn begin(&mut self, last: &[JointTorque; JOINTS]) -> Before {
+    pub(super) fn begin(&mut self, last: &[JointTorque; JOINTS]) -> Before {
         self.next.take().map(|continued| (continued, core::array::from_fn(|j| continued.of(&last[j]))))
     }
 
     /// Adds the remainder of the steps to `torque`, and clears the torque of joints that are not enabled.
     #[inline(always)]
-    pub fn blend(
+    pub(super) fn blend(
         &mut self,
         before: Before,
         torque: &mut [JointTorque; JOINTS],

@@ -13,7 +13,7 @@ const MOVES_ASIDE: u8 = 19;
 impl Nodes {
     /// Creates the frame of this tick (J-12). `must_move`: this frame must be a Move, because it is the first one after an error or after
     /// the torque was taken away.
-    pub fn frame(
+    pub(crate) fn frame(
         &mut self,
         config: &Config,
         goal: Goal,

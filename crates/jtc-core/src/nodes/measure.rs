@@ -216,7 +216,7 @@ impl Late {
     /// Creates a late answer of this joint that is `ticks` late. The lateness is limited to the ticks for which the commanded motion is
     /// stored.
     #[cold]
-    pub fn new(ticks: u8, joint: usize, commanded: &Commanded, config: &Config) -> Self {
+    pub(super) fn new(ticks: u8, joint: usize, commanded: &Commanded, config: &Config) -> Self {
         let now = config.delay_ticks.max(1);
         let then = (now + ticks).min(Commanded::OLDEST);
         let of = |values: &[f64; JOINTS]| values.get(joint).copied().unwrap_or_default();
@@ -235,20 +235,20 @@ impl Late {
 
 impl Measurement {
     /// Returns the position and velocity that the control law uses.
-    pub fn used(&self) -> Reading {
+    pub(super) fn used(&self) -> Reading {
         self.used
     }
 
     /// Returns the speed of the joint, rad/s: its reported velocity or the rate of its positions, whichever is higher. Reported velocities
     /// alone are not trusted, because their full scale depends on the drive (J-11).
-    pub fn speed(&self) -> f64 {
+    pub(super) fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
     /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported velocity. Its difference from the `due` velocity
     /// (rad/s) is limited to [`YOUNGER`] times the difference of the reported velocity. If the differences have opposite signs, an encoder
     /// has jumped and the joint has not moved: then the `due` velocity is returned.
-    pub fn young_velocity(&self, due: f64) -> f64 {
+    pub(super) fn young_velocity(&self, due: f64) -> f64 {
         // The remainder of a fading offset is subtracted, because it is even older.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
         let most = YOUNGER * reported.abs();
@@ -256,23 +256,23 @@ impl Measurement {
     }
 
     /// Returns the jump of the encoder that is subtracted from each answer, rad.
-    pub fn taken_off(&self) -> f64 {
+    pub(super) fn taken_off(&self) -> f64 {
         self.jumps.taken_off()
     }
 
     /// Returns the disagreement of the two encoders that was found since the drive was configured: a jump and its size (rad), or the factor
     /// of a speed.
-    pub fn misfit(&self) -> Option<(StopKind, f64)> {
+    pub(super) fn misfit(&self) -> Option<(StopKind, f64)> {
         self.jumps.found()
     }
 
     /// Stores that positions change `factor` times as fast as the reported speed.
-    pub fn find_factor(&mut self, factor: f32) {
+    pub(super) fn find_factor(&mut self, factor: f32) {
         self.jumps.find_factor(factor);
     }
 
     /// Returns the two distances of the answer in this tick. Returns `None` without an answer, or if they are not known.
-    pub fn ways(&self, config: &Config) -> Option<Ways> {
+    pub(super) fn ways(&self, config: &Config) -> Option<Ways> {
         let window_ms = config.drive_speed_window_ms;
         let from = self.history.before(self.clock_ms, window_ms).filter(|_| window_ms > 0)?;
         let Answered { position, .. } = self.history.newest();
@@ -280,18 +280,18 @@ impl Measurement {
     }
 
     /// Makes the next answer be used without a correction.
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.known = false;
     }
 
     /// Sets the reference for changes of the commanded velocity, rad/s.
-    pub fn go_on_moving(&mut self, commanded: f64) {
+    pub(super) fn go_on_moving(&mut self, commanded: f64) {
         self.commanded = commanded;
     }
 
     /// Runs one tick. The jump of the encoder has already been subtracted from the answer. `past`: motion that was commanded since the
     /// given number of ticks ago.
-    pub fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
+    pub(super) fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
         self.answer.position += (self.carried + change) * (f64::from(tick.elapsed_ms) * DT);

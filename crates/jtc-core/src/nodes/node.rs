@@ -83,59 +83,59 @@ bit_codec!(Node {
 
 impl Node {
     /// Returns `true` if a usable answer has come since the last tick.
-    pub fn fresh(&self) -> bool {
+    pub(crate) fn fresh(&self) -> bool {
         self.fresh
     }
 
     /// Returns [`Measurement::young_velocity`], rad/s.
-    pub fn young_velocity(&self, due: f64) -> f64 {
+    pub(crate) fn young_velocity(&self, due: f64) -> f64 {
         self.measured.young_velocity(due)
     }
 
     /// Returns `true` if the joint is marked as absent (J-53).
-    pub fn absent(&self) -> bool {
+    pub(crate) fn absent(&self) -> bool {
         self.absent
     }
 
     /// Returns the reported state. For an absent joint this is Start, unless its drive still reports.
-    pub fn state(&self) -> NodeState {
+    pub(crate) fn state(&self) -> NodeState {
         if self.absent { self.unasked.unwrap_or(NodeState::START) } else { self.report.state }
     }
 
-    pub fn enabled(&self) -> bool {
+    pub(crate) fn enabled(&self) -> bool {
         self.valid && self.report.state == NodeState::ENABLED
     }
 
-    pub fn starting(&self) -> bool {
+    pub(crate) fn starting(&self) -> bool {
         self.report.state.is_starting()
     }
 
     /// Returns `true` if the node lost its configuration, or is back in Start or Init (J-20).
-    pub fn fallen_back(&self) -> bool {
+    pub(crate) fn fallen_back(&self) -> bool {
         !self.valid || self.starting()
     }
 
     /// Returns `true` if the node reports an error. A gripper has no warnings.
-    pub fn faulty(&self) -> bool {
+    pub(crate) fn faulty(&self) -> bool {
         // Drives also set this warning before they are configured, for any level of the line.
         let safety_line = self.valid && self.report.warnings & warning::SAFETY_LINE != 0;
         self.in_fault() || (self.seen && safety_line)
     }
 
     /// Returns `true` if the node reports a fault of its own.
-    pub fn in_fault(&self) -> bool {
+    pub(crate) fn in_fault(&self) -> bool {
         let r = &self.report;
         self.seen && (r.state.is_fault() || (r.errors | r.mc_current) != 0)
     }
 
     /// Restarts the node. All information about it is discarded.
-    pub fn restart(&mut self, config: &Config) {
+    pub(crate) fn restart(&mut self, config: &Config) {
         *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
     }
 
     /// Sets the node of an absent joint in every tick (J-53): configured, ready and silent. So the controller requests nothing from the
     /// node, and does not wait for it. A drive that answers is an error, because either the drive or the setting is wrong.
-    pub fn stand_in(&mut self) {
+    pub(crate) fn stand_in(&mut self) {
         let unasked = self.unasked;
         *self = Self {
             absent: true,
@@ -150,13 +150,13 @@ impl Node {
     }
 
     /// Discards the configuration, which must be accepted again. Until then position and velocity are not valid.
-    pub fn lose_configuration(&mut self) {
+    pub(crate) fn lose_configuration(&mut self) {
         (self.configured, self.valid, self.refused) = (false, false, false);
         self.measured = Measurement::default();
     }
 
     /// Returns the state that is requested from the node (J-16).
-    pub fn request(&self, goal: Goal) -> Target {
+    pub(crate) fn request(&self, goal: Goal) -> Target {
         let state = self.report.state;
         if !self.seen {
             // J-53: an absent joint has no torque, even if its drive is connected.
@@ -189,11 +189,11 @@ impl Node {
 
     /// Returns `true` if the node is configured and enabled, and must be neither cleared nor reset. For [`Goal::Enabled`] no change is then
     /// requested from it.
-    pub fn wants_nothing_enabled(&self) -> bool {
+    pub(crate) fn wants_nothing_enabled(&self) -> bool {
         self.seen & self.configured & !self.reset & !self.clear & (self.report.state == NodeState::ENABLED)
     }
 
-    pub fn wants_configuration(&self) -> bool {
+    pub(crate) fn wants_configuration(&self) -> bool {
         self.seen
             && !self.configured
             && !self.clear

@@ -45,7 +45,7 @@ impl SpeedCheck {
     /// Runs one tick. Returns the joint, as a mask, whose speed has another scale. If only one encoder of a joint moves, its node is marked
     /// as misbehaved.
     #[inline(always)]
-    pub fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
+    pub(super) fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
         let turn = self.turn;
         let j = usize::from(turn);
         self.turn = if turn + 1 < PERIOD { turn + 1 } else { 0 };

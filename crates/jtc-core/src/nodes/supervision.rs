@@ -84,7 +84,7 @@ impl Nodes {
     }
 
     /// Returns the CAN flags of this tick that are errors: transmit timeout or bus-off, and the receive timeouts of the joints.
-    pub fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
+    pub(crate) fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
         let transmit = inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max;
         let mut flags = can_flag::TRANSMIT_TIMEOUT * u32::from(transmit);
         for (n, node) in self.joints().iter().enumerate() {
@@ -95,18 +95,18 @@ impl Nodes {
 
     /// Returns `true` if a joint has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared are
     /// ignored.
-    pub fn external_error(&self, powered: bool) -> bool {
+    pub(crate) fn external_error(&self, powered: bool) -> bool {
         self.joints().iter().any(|node| node.misbehaved || ((powered || !node.clear) && node.faulty()))
     }
 
     /// Returns `true` if a joint reports a fault that only a clear of this joint ends, and no clear has been sent. A safety-line warning
     /// ends by itself.
-    pub fn fault_stays(&self) -> bool {
+    pub(crate) fn fault_stays(&self) -> bool {
         self.joints().iter().any(|node| !node.clear && node.in_fault())
     }
 
     /// Returns `true` if a joint is still being cleared, because the cause of its error persists.
-    pub fn clearing(&self) -> bool {
+    pub(crate) fn clearing(&self) -> bool {
         self.joints().iter().any(|node| node.clear)
     }
 }

@@ -16,15 +16,15 @@ pub(super) const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
 
 /// Indices of the words of the head.
 pub(super) mod head {
-    pub const MAGIC: usize = 0;
+    pub(crate) const MAGIC: usize = 0;
     /// Number of the block.
-    pub const SEQUENCE: usize = 1;
+    pub(crate) const SEQUENCE: usize = 1;
     /// Number of bits (low half) and their check.
-    pub const COMMIT: usize = 2;
+    pub(crate) const COMMIT: usize = 2;
     /// Start of the first snapshot (low half; [`super::NONE`] if none exists) and its complement.
-    pub const SNAPSHOT: usize = 3;
+    pub(crate) const SNAPSHOT: usize = 3;
     /// State of the log (low half) and its complement.
-    pub const FLAGS: usize = 4;
+    pub(crate) const FLAGS: usize = 4;
 }
 
 /// No snapshot begins in a block.
@@ -73,7 +73,7 @@ pub(super) struct Whole<'a> {
 
 impl<'a> Whole<'a> {
     /// Parses a block. Returns `None` if the memory does not contain a valid block.
-    pub fn parse(block: &'a Block) -> Option<Self> {
+    pub(super) fn parse(block: &'a Block) -> Option<Self> {
         let (head, words) = block.split_first_chunk::<HEAD>()?;
         let bits = head[head::COMMIT] & 0xFFFF;
         if head[head::MAGIC] != MAGIC || bits > BITS {

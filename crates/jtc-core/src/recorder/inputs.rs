@@ -13,7 +13,7 @@ use crate::nodes::FRAMES_MAX;
 use crate::{JOINTS, NODES};
 
 /// Longest frame of a host whose bytes are recorded.
-pub const HOST_BYTES: usize = 48;
+pub(super) const HOST_BYTES: usize = 48;
 /// Number of bytes of host frames that are recorded: on average per tick, and at most at once.
 const ALLOWANCE: (u16, u16) = (2, 500);
 /// Bytes that are charged for an event in addition to its own bytes. An event takes 15 to 20 bits.
@@ -71,17 +71,17 @@ pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
 
 /// The first word of a tick. In a tick bit 0 is 0; a 1 announces a snapshot.
 pub(super) mod head {
-    pub const STATUS_FREE: u32 = 1 << 1;
+    pub(crate) const STATUS_FREE: u32 = 1 << 1;
     /// The only inputs are answers.
-    pub const QUIET: u32 = 1 << 2;
+    pub(crate) const QUIET: u32 = 1 << 2;
     /// Each expected node has answered, in order. Words with the distances of the joints follow.
-    pub const ORDERED: u32 = 1 << 3;
+    pub(crate) const ORDERED: u32 = 1 << 3;
     /// The distance of a joint is too large for [`super::WAY_BITS`], so the words contain all positions.
-    pub const FAR: u32 = 1 << 4;
+    pub(crate) const FAR: u32 = 1 << 4;
     /// Other values than the motion have changed.
-    pub const CHANGED: u32 = 1 << 5;
+    pub(crate) const CHANGED: u32 = 1 << 5;
     /// First bit of the check of the outputs.
-    pub const CHECK: u32 = 16;
+    pub(crate) const CHECK: u32 = 16;
 }
 
 /// Motion of the joints, from answers that came in order.
@@ -115,7 +115,7 @@ impl Reference {
     /// the same result.
     ///
     /// Drives send new positions in each tick, and the rest of their answers changes seldom. A tick usually takes eight words.
-    pub fn write<P, const N: usize>(
+    pub(super) fn write<P, const N: usize>(
         &mut self,
         inputs: &Inputs<'_>,
         done: usize,

@@ -108,7 +108,7 @@ pub(super) struct Writer<P, const N: usize> {
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     /// Creates a writer, for any content of the memory.
-    pub fn new(pieces: [P; N]) -> Self {
+    pub(super) fn new(pieces: [P; N]) -> Self {
         let ring = Ring { pieces };
         let newest = ring.newest();
         let (state, powered) = newest
@@ -132,38 +132,38 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         writer
     }
 
-    pub fn into_memory(self) -> [P; N] {
+    pub(super) fn into_memory(self) -> [P; N] {
         self.ring.pieces
     }
 
-    pub fn memory(&self) -> &[P; N] {
+    pub(super) fn memory(&self) -> &[P; N] {
         &self.ring.pieces
     }
 
     /// Returns the block with this number.
-    pub fn block(&self, sequence: u32) -> Option<&Block> {
+    pub(super) fn block(&self, sequence: u32) -> Option<&Block> {
         self.ring.block(sequence)
     }
 
     /// Returns `true` if the memory holds no log.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.open.is_none()
     }
 
     /// Discards all blocks.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.ring.wipe();
         (self.open, self.state, self.powered) = (None, LogState::Recording, false);
     }
 
     /// Begins a new block, which starts with a snapshot.
-    pub fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.open_block();
     }
 
     /// Marks the start of a snapshot at the present position. Until the snapshot is committed, the mark points past the committed bits and
     /// is not used.
-    pub fn mark_snapshot(&mut self) {
+    pub(super) fn mark_snapshot(&mut self) {
         if !self.marked {
             self.marked = true;
             let at = self.bits() as u16;
@@ -172,7 +172,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     }
 
     /// Records that the controller has torque.
-    pub fn set_powered(&mut self) {
+    pub(super) fn set_powered(&mut self) {
         self.powered = true;
         self.set_head(head::FLAGS, doubled(flags(self.state, true)));
     }
@@ -208,7 +208,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
 
     /// Commits all bits that have been written.
     #[inline]
-    pub fn commit(&mut self) {
+    pub(super) fn commit(&mut self) {
         let (rest, bits, hash, word) = (self.rest, self.bits(), self.hash, self.word);
         let (open, begun) = (self.open.is_some(), self.begun);
         let Some(block) = self.ring.at_mut(self.place).filter(|_| open) else { return };
@@ -225,13 +225,13 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     }
 
     /// Ends the log for this reason.
-    pub fn freeze(&mut self, state: LogState) {
+    pub(super) fn freeze(&mut self, state: LogState) {
         self.state = state;
         self.set_head(head::FLAGS, doubled(flags(state, self.powered)));
     }
 
     /// Returns the number of the oldest block, and the number after the newest block.
-    pub fn range(&self) -> (u32, u32) {
+    pub(super) fn range(&self) -> (u32, u32) {
         let Some(newest) = self.open else { return (self.next, self.next) };
         let mut oldest = newest;
         for _ in 1..self.ring.len() {
@@ -245,7 +245,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     }
 
     /// Reads bytes of a block from `offset` on, as little-endian words. Returns the number of bytes that were read.
-    pub fn read(&self, sequence: u32, offset: usize, out: &mut [u8]) -> usize {
+    pub(super) fn read(&self, sequence: u32, offset: usize, out: &mut [u8]) -> usize {
         let Some(block) = self.ring.block(sequence).filter(|block| in_place(block, sequence)) else {
             return 0;
         };
@@ -259,7 +259,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     }
 
     /// Fills up the present word, so that the next data begins at a whole word.
-    pub fn align(&mut self) {
+    pub(super) fn align(&mut self) {
         if self.fill != 0 {
             let word = core::mem::take(&mut self.rest);
             self.fill = 0;
@@ -269,7 +269,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
 
     /// Appends whole words to whole words, within one block.
     #[inline]
-    pub fn append<const K: usize>(&mut self, words: [u32; K]) {
+    pub(super) fn append<const K: usize>(&mut self, words: [u32; K]) {
         if self.word + K > BLOCK_WORDS {
             self.next_block();
         }

@@ -16,28 +16,28 @@ pub(super) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// Creates a reader that begins at bit `bit` of the first of `blocks`.
-    pub fn new(blocks: &'a [Block], bit: u32) -> Self {
+    pub(super) fn new(blocks: &'a [Block], bit: u32) -> Self {
         let current = blocks.first().and_then(Whole::parse);
         Self { blocks, block: 0, bit, current, damaged: false }
     }
 
     /// Moves to the next whole word.
-    pub fn align(&mut self) {
+    pub(super) fn align(&mut self) {
         self.bit = self.bit.next_multiple_of(32);
     }
 
     /// Returns the next bit without consuming it.
-    pub fn peek(&self) -> bool {
+    pub(super) fn peek(&self) -> bool {
         self.clone().take(1) != 0
     }
 
     /// Returns the index of the present block in the list.
-    pub fn block(&self) -> usize {
+    pub(super) fn block(&self) -> usize {
         self.block
     }
 
     /// Returns `true` if no bits are left, or the next block does not continue this one.
-    pub fn at_end(&mut self) -> bool {
+    pub(super) fn at_end(&mut self) -> bool {
         self.advance();
         self.current.is_none_or(|whole| self.bit >= whole.bits)
     }

@@ -44,31 +44,31 @@ bit_codec!(Carried { rest, most, left_out, inside });
 
 impl Carried {
     /// Begins Teaching of a joint that has found this `load`, N·m.
-    pub fn begin(load: f64, limits: &JointConfig) -> Self {
+    pub(super) fn begin(load: f64, limits: &JointConfig) -> Self {
         let load = if load.is_finite() { load } else { 0.0 };
         let most = load.abs().max(Load::bounded(f64::MAX, limits));
         Self { rest: load as f32, most: most as f32, ..Self::default() }
     }
 
     /// Attributes this part of the load to a mass, N·m.
-    pub fn explain(&mut self, by_mass: f64) {
+    pub(super) fn explain(&mut self, by_mass: f64) {
         self.rest -= by_mass as f32;
     }
 
     /// Returns the whole load, N·m.
-    pub fn whole(&self, by_mass: f64) -> f64 {
+    pub(super) fn whole(&self, by_mass: f64) -> f64 {
         let most = f64::from(self.most);
         (by_mass + f64::from(self.rest)).max(-most).min(most)
     }
 
     /// Returns the part of the load that acts, N·m.
-    pub fn torque(&self, by_mass: f64) -> f64 {
+    pub(super) fn torque(&self, by_mass: f64) -> f64 {
         self.whole(by_mass) * (1.0 - f64::from(self.left_out)) * (1.0 - f64::from(self.inside))
     }
 
     /// Runs one tick. `balanced`: share of the load that the damping of the joint balances. `depth`: compression of the joint's soft end,
     /// like [`depth`](crate::soft_end::depth), rad.
-    pub fn step(&mut self, by_mass: f64, velocity: f64, balanced: f64, depth: f64) -> f64 {
+    pub(super) fn step(&mut self, by_mass: f64, velocity: f64, balanced: f64, depth: f64) -> f64 {
         let whole = self.whole(by_mass);
         let along = if whole < 0.0 { -velocity } else { velocity };
         let (from, to) = (DRIVES.0 + balanced * DAMPED.0, DRIVES.1 + balanced * DAMPED.1);
@@ -85,7 +85,7 @@ impl Carried {
     }
 
     /// Returns `true` if the mass alone drives the joint. `against`: torque of damping and friction against the motion, N·m.
-    pub fn is_driven(&self, by_mass: f64, velocity: f64, against: f64) -> bool {
+    pub(super) fn is_driven(&self, by_mass: f64, velocity: f64, against: f64) -> bool {
         let acts = self.torque(by_mass);
         let mostly_mass = by_mass * acts > 0.0 && by_mass.abs() > f64::from(self.rest).abs();
         let along = velocity * acts > MOVES * acts.abs();
@@ -93,13 +93,13 @@ impl Carried {
     }
 
     /// Returns `true` if the joint sinks because a torque is missing. `gone`: torque of the mass that the joint no longer carries, N·m.
-    pub fn sinks(&self, gone: f64, velocity: f64, against: f64) -> bool {
+    pub(super) fn sinks(&self, gone: f64, velocity: f64, against: f64) -> bool {
         let missed = gone.abs() > MISSED * f64::from(self.most);
         missed && velocity * gone < -MOVES * gone.abs() && explains(gone, against)
     }
 
     /// Multiplies the torque that is not explained by a mass by `left`.
-    pub fn fade(&mut self, left: f64) {
+    pub(super) fn fade(&mut self, left: f64) {
         self.rest = (f64::from(self.rest) * left) as f32;
     }
 }

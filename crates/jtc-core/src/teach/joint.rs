@@ -118,14 +118,14 @@ pub(crate) struct Bears {
 
 impl TaughtJoint {
     /// Begins Teaching of a joint at rest at `position` (rad).
-    pub fn begin(position: f64, limits: &JointConfig, range: (f64, f64)) -> Self {
+    pub(super) fn begin(position: f64, limits: &JointConfig, range: (f64, f64)) -> Self {
         let begun = soft_end::depth(position, range).abs() as f32;
         let (anchor, inertia) = (position as f32, rotor(limits) as f32);
         Self { anchor, behind: anchor, grip: 1.0, begun, inertia, ..Self::default() }
     }
 
     /// Sets the least inertia that the joint moves, kg·m². A value that is not finite is ignored.
-    pub fn set_inertia(&mut self, inertia: f64) {
+    pub(super) fn set_inertia(&mut self, inertia: f64) {
         if inertia.is_finite() {
             self.inertia = inertia as f32;
         }
@@ -135,7 +135,7 @@ impl TaughtJoint {
     /// `position`, rad. Without an answer its speed is old, and its springs pull to its old position. Returns the speed that follows from
     /// its positions, rad/s.
     #[inline(always)]
-    pub fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
+    pub(super) fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
         // A late tick has the effect of a missing answer.
         let missed = self.missing.saturating_add(late.min(u8::MAX.into()) as u8);
         if !fresh {
@@ -168,17 +168,17 @@ impl TaughtJoint {
     }
 
     /// Sets the Coulomb friction, and the friction at the present speed, N·m.
-    pub fn set_friction(&mut self, coulomb: f64, moving: f64) {
+    pub(super) fn set_friction(&mut self, coulomb: f64, moving: f64) {
         (self.coulomb, self.rubs) = (coulomb as f32, (moving.abs() as f32).max(coulomb as f32));
     }
 
     /// Returns the torque of damping and friction against the last motion, N·m.
-    pub fn against(&self) -> f64 {
+    pub(super) fn against(&self) -> f64 {
         self.against.into()
     }
 
     #[cfg(test)]
-    pub fn set_against(&mut self, torque: f64) {
+    pub(super) fn set_against(&mut self, torque: f64) {
         self.against = torque as f32;
     }
 
@@ -191,7 +191,7 @@ impl TaughtJoint {
 
     /// Runs one tick of a joint that carries this `load`, N·m. `haste`: excess of the flange speed over the tool speed limit, 0 to 1.
     #[inline(always)]
-    pub fn step(
+    pub(super) fn step(
         &mut self,
         joint: &LedJoint<'_>,
         load: f64,
@@ -263,7 +263,7 @@ impl TaughtJoint {
     }
 
     /// Returns the torque of the spring at `position` (rad), N·m.
-    pub fn dry_spring(&self, position: f64, limits: &JointConfig, config: &Config) -> f64 {
+    pub(super) fn dry_spring(&self, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         let breakaway = self.breakaway(limits, config);
         let way = f64::from(self.anchor) - position;
         f64::from(self.grip) * (breakaway / self.stretch(breakaway) * way).max(-breakaway).min(breakaway)

@@ -30,10 +30,10 @@ pub(super) struct Swing {
 bit_codec!(Swing { peak, half_ms, before, soft, soft_ms });
 
 impl Swing {
-    pub const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };
+    pub(super) const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };
 
     /// Runs one tick at this velocity, rad/s. Returns the acting share of spring, damper and brake.
-    pub fn step(&mut self, velocity: f64) -> f64 {
+    pub(super) fn step(&mut self, velocity: f64) -> f64 {
         let velocity = velocity as f32;
         if velocity * self.peak < 0.0 {
             let speed = self.peak.abs();

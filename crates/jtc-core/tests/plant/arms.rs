@@ -9,7 +9,7 @@ use crate::rig::{Rig, floats, model_body};
 
 /// An arm, with the data that its controller gets.
 #[derive(Clone)]
-pub struct ArmFile {
+pub(crate) struct ArmFile {
     pub name: &'static str,
     pub config: Config,
     pub model: ArmModel,
@@ -23,22 +23,22 @@ const UR5: &str = include_str!("ur5.toml");
 const Z1: &str = include_str!("z1.toml");
 
 impl ArmFile {
-    pub fn avena() -> Self {
+    pub(crate) fn avena() -> Self {
         let Parameters { model, pid, friction } = Parameters::avena();
         let Friction::Polynomial(polynomial) = friction else { panic!("a polynomial") };
         Self { name: "avena", config: Config::avena(), model, pid, polynomial }
     }
 
-    pub fn ur5() -> Self {
+    pub(crate) fn ur5() -> Self {
         Self::parse("ur5", UR5)
     }
 
-    pub fn z1() -> Self {
+    pub(crate) fn z1() -> Self {
         Self::parse("z1", Z1)
     }
 
     /// Returns the UR5 with friction in its joints and in its file.
-    pub fn rough_ur5() -> Self {
+    pub(crate) fn rough_ur5() -> Self {
         let friction = [(8.0, 20.0), (8.0, 20.0), (6.0, 15.0), (2.0, 5.0), (2.0, 5.0), (2.0, 5.0)];
         Self {
             name: "rough ur5",
@@ -48,18 +48,18 @@ impl ArmFile {
     }
 
     /// Returns the arm without friction, both in the simulation and in its file.
-    pub fn slick(self) -> Self {
+    pub(crate) fn slick(self) -> Self {
         Self { polynomial: [[0.0; 6]; 6], ..self }
     }
 
     /// Returns shares of its torque limits.
-    pub fn shares(&self, torque: &[f64; 6]) -> [f64; 6] {
+    pub(crate) fn shares(&self, torque: &[f64; 6]) -> [f64; 6] {
         shares_of(torque, &self.config)
     }
 
     /// Returns a pose inside the ranges, rad, and the torque that holds it. With a payload at the flange (kg), this torque is less than
     /// `most` of each limit.
-    pub fn pose(&self, random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
+    pub(crate) fn pose(&self, random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
         let dynamics = Dynamics::new(&loaded(self.model, mass), self.config.gravity);
         loop {
             let pose = core::array::from_fn(|j| {
@@ -74,7 +74,7 @@ impl ArmFile {
     }
 
     /// Returns the friction of its joints at the temperature of the rig, times `factor`. Stiction is 20 % higher than Coulomb friction.
-    pub fn friction(&self, factor: f64) -> [LuGre; 6] {
+    pub(crate) fn friction(&self, factor: f64) -> [LuGre; 6] {
         self.polynomial.map(|c| {
             if c[0] == 0.0 && c[1] == 0.0 {
                 return LuGre::NONE;
@@ -92,7 +92,7 @@ impl ArmFile {
     }
 
     /// Sends its parameters to the controller of a rig.
-    pub fn give(&self, rig: &mut Rig) {
+    pub(crate) fn give(&self, rig: &mut Rig) {
         rig.send(FrameType::FrictionPolynomial, &floats(self.polynomial.iter().flatten().map(|c| *c as f32)));
         let gains = self.pid.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max]);
         rig.send(FrameType::PidParam, &floats(gains.map(|g| g as f32)));

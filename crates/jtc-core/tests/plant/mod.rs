@@ -6,12 +6,12 @@ use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::rig::Rig;
 
-pub mod arms;
+pub(crate) mod arms;
 
-pub use arms::ArmFile;
+pub(crate) use arms::ArmFile;
 
 /// Step of the drives' 16-bit encoder, rad.
-pub const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
+pub(crate) const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
 /// Step of the motor's encoder at the output side of the gear, rad. The drives measure the speed with this encoder.
 const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
 /// Integration steps per millisecond. The bristles are stiff, so there are many.
@@ -24,7 +24,7 @@ const GEAR_DAMPING: f64 = 5e-4;
 
 /// LuGre friction of a joint (Canudas de Wit et al. 1995): bristles that stick, then slip along Stribeck's curve.
 #[derive(Clone, Copy, Debug)]
-pub struct LuGre {
+pub(crate) struct LuGre {
     /// Friction torque while sliding slowly, N·m.
     pub coulomb: f64,
     /// Torque at which the joint breaks away, N·m.
@@ -40,11 +40,11 @@ pub struct LuGre {
 }
 
 impl LuGre {
-    pub const NONE: Self =
+    pub(crate) const NONE: Self =
         Self { coulomb: 0.0, stiction: 0.0, stribeck: 1.0, stiffness: 0.0, damping: 0.0, viscous: 0.0 };
 
     /// Returns the friction of the default arm's joint at the temperature of the rig, with this ratio of stiction to Coulomb friction.
-    pub fn avena(j: usize, stiction: f64) -> Self {
+    pub(crate) fn avena(j: usize, stiction: f64) -> Self {
         let jtc_core::Friction::Polynomial(polynomial) = Parameters::avena().friction else { panic!() };
         let c = polynomial[j];
         let factor = (1.0 + c[4] * (25.0 - c[5])).clamp(0.2, 2.0);
@@ -60,7 +60,7 @@ impl LuGre {
     }
 
     /// Returns the default arm's friction times `factor`. Stiction is 20 % higher than Coulomb friction.
-    pub fn of_avena_times(factor: f64) -> [Self; 6] {
+    pub(crate) fn of_avena_times(factor: f64) -> [Self; 6] {
         core::array::from_fn(|j| {
             let f = Self::avena(j, 1.2);
             let Self { coulomb, stiction, viscous, .. } = f;
@@ -103,23 +103,23 @@ impl Gears {
 }
 
 /// Reproducible pseudo-random numbers.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
     /// Evenly distributed from 0 to 1.
-    pub fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// Evenly distributed from `low` to `high`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.next()
     }
 }
 
 /// Poses of the arm, rad: bent, stretched out (joint 2 cannot hold 4 kg there), and two more.
-pub const POSES: [[f64; 6]; 4] = [
+pub(crate) const POSES: [[f64; 6]; 4] = [
     [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
     [0.0, 1.4, 0.2, 0.0, 0.0, 0.0],
     [-1.0, -0.7, 1.2, -0.5, 1.0, 2.0],
@@ -127,32 +127,32 @@ pub const POSES: [[f64; 6]; 4] = [
 ];
 
 /// Returns the shares of the torque limits of the default arm.
-pub fn shares(torque: &[f64; 6]) -> [f64; 6] {
+pub(crate) fn shares(torque: &[f64; 6]) -> [f64; 6] {
     shares_of(torque, &Config::avena())
 }
 
 /// Returns the shares of the torque limits of the arm of `config`.
-pub fn shares_of(torque: &[f64; 6], config: &Config) -> [f64; 6] {
+pub(crate) fn shares_of(torque: &[f64; 6], config: &Config) -> [f64; 6] {
     core::array::from_fn(|j| torque[j].abs() / config.joints[j].torque_max)
 }
 
 /// Returns the highest share of all joints.
-pub fn highest(shares: &[f64; 6]) -> f64 {
+pub(crate) fn highest(shares: &[f64; 6]) -> f64 {
     shares.iter().fold(0.0, |most, share| share.max(most))
 }
 
 /// Like [`ArmFile::pose`], for the default arm.
-pub fn pose(random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
+pub(crate) fn pose(random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
     ArmFile::avena().pose(random, mass, most)
 }
 
 /// Returns the torque that `model` needs to hold `q`, N·m.
-pub fn standing(model: &ArmModel, q: &[f64; 6]) -> [f64; 6] {
+pub(crate) fn standing(model: &ArmModel, q: &[f64; 6]) -> [f64; 6] {
     Dynamics::new(model, Config::avena().gravity).gravity_torque(q)
 }
 
 /// The simulated arm.
-pub struct Plant {
+pub(crate) struct Plant {
     dynamics: Dynamics,
     pub rotor: [f64; 6],
     pub friction: [LuGre; 6],
@@ -173,7 +173,7 @@ pub struct Plant {
 }
 
 /// Returns `model` with `mass` kg at the flange.
-pub fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
+pub(crate) fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
     let flange = model.joints[6].xyz;
     let link = &mut model.links[6];
     let total = link.mass + mass;
@@ -185,7 +185,7 @@ pub fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
 }
 
 /// Returns `model` with every mass times `factor`.
-pub fn heavier(mut model: ArmModel, factor: f64) -> ArmModel {
+pub(crate) fn heavier(mut model: ArmModel, factor: f64) -> ArmModel {
     for link in &mut model.links {
         link.mass *= factor;
         link.inertia = link.inertia.map(|i| i * factor);
@@ -194,7 +194,7 @@ pub fn heavier(mut model: ArmModel, factor: f64) -> ArmModel {
 }
 
 impl Plant {
-    pub fn new(model: &ArmModel, friction: [LuGre; 6], q: [f64; 6]) -> Self {
+    pub(crate) fn new(model: &ArmModel, friction: [LuGre; 6], q: [f64; 6]) -> Self {
         let config = Config::avena();
         Self {
             dynamics: Dynamics::new(model, config.gravity),
@@ -213,7 +213,7 @@ impl Plant {
     }
 
     /// Creates a plant for another arm, with this true model.
-    pub fn of(arm: &ArmFile, model: &ArmModel, friction: [LuGre; 6], q: [f64; 6]) -> Self {
+    pub(crate) fn of(arm: &ArmFile, model: &ArmModel, friction: [LuGre; 6], q: [f64; 6]) -> Self {
         Self {
             dynamics: Dynamics::new(model, arm.config.gravity),
             rotor: arm.config.joints.map(|j| j.rotor_inertia),
@@ -223,7 +223,7 @@ impl Plant {
 
     /// Returns this arm with elastic gears of `stiffness` N·m/rad, twisted by its load. The drives measure the position of the link and the
     /// speed of the motor. Rotors and friction are on the motor side.
-    pub fn elastic(mut self, stiffness: f64) -> Self {
+    pub(crate) fn elastic(mut self, stiffness: f64) -> Self {
         let load = self.dynamics.gravity_torque(&self.q);
         let q = core::array::from_fn(|j| self.q[j] + load[j] / stiffness);
         self.gears = Some(Gears { stiffness, q, v: [0.0; 6] });
@@ -231,7 +231,7 @@ impl Plant {
     }
 
     /// Returns a rig that holds another arm.
-    pub fn holding_arm(&mut self, arm: &ArmFile) -> Rig {
+    pub(crate) fn holding_arm(&mut self, arm: &ArmFile) -> Rig {
         let mut rig = Rig::with_speeds(arm.config.clone());
         rig.follow = false;
         self.report(&mut rig);
@@ -243,14 +243,14 @@ impl Plant {
 
     /// Advances arm and rig by one millisecond. The controller measures the state of the previous tick, which does not depend on the torque
     /// of this tick.
-    pub fn tick(&mut self, rig: &mut Rig) {
+    pub(crate) fn tick(&mut self, rig: &mut Rig) {
         rig.tick();
         self.step(rig);
         self.report(rig);
     }
 
     /// Like [`Self::tick`], but the drives of the rig report the positions `seen` (rad).
-    pub fn tick_seen_at(&mut self, rig: &mut Rig, seen: &[f64; 6]) {
+    pub(crate) fn tick_seen_at(&mut self, rig: &mut Rig, seen: &[f64; 6]) {
         self.report(rig);
         for (node, q) in rig.nodes.iter_mut().zip(seen) {
             node.report.position = read(*q);
@@ -259,14 +259,14 @@ impl Plant {
         self.step(rig);
     }
 
-    pub fn run(&mut self, rig: &mut Rig, ticks: usize) {
+    pub(crate) fn run(&mut self, rig: &mut Rig, ticks: usize) {
         for _ in 0..ticks {
             self.tick(rig);
         }
     }
 
     /// Returns a rig that holds this arm.
-    pub fn holding(&mut self, config: Config) -> Rig {
+    pub(crate) fn holding(&mut self, config: Config) -> Rig {
         let mut rig = Rig::with_speeds(config);
         rig.follow = false;
         self.report(&mut rig);
@@ -328,7 +328,7 @@ impl Plant {
     }
 
     /// Returns the angles, rad, and speeds, rad/s, of the motors.
-    pub fn motors(&self) -> ([f64; 6], [f64; 6]) {
+    pub(crate) fn motors(&self) -> ([f64; 6], [f64; 6]) {
         self.gears.as_ref().map_or((self.q, self.v), |gears| (gears.q, gears.v))
     }
 
@@ -336,7 +336,7 @@ impl Plant {
         self.gears.as_mut().map_or(&mut self.v[j], |gears| &mut gears.v[j])
     }
 
-    pub fn report(&self, rig: &mut Rig) {
+    pub(crate) fn report(&self, rig: &mut Rig) {
         for j in 0..6 {
             let report = &mut rig.nodes[j].report;
             report.position = read(self.q[j]);

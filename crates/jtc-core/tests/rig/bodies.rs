@@ -3,7 +3,7 @@ use jtc_dynamics::ArmModel;
 use jtc_wire::{FrameType, RawPoint, crc16};
 
 /// A frame with length and CRC.
-pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
+pub(crate) fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     let n = body.len() + 6;
     let mut bytes = vec![0x9B, frame_type as u8, (n >> 8) as u8, n as u8];
     bytes.extend_from_slice(body);
@@ -11,12 +11,18 @@ pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-pub fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+pub(crate) fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_be_bytes).collect()
 }
 
 /// A Trajectory body.
-pub fn segment_body(number: u16, segment: u16, segments: u16, step: u16, points: &[RawPoint]) -> Vec<u8> {
+pub(crate) fn segment_body(
+    number: u16,
+    segment: u16,
+    segments: u16,
+    step: u16,
+    points: &[RawPoint],
+) -> Vec<u8> {
     let mut body: Vec<u8> = [number, segment, segments, step].iter().flat_map(|x| x.to_be_bytes()).collect();
     for p in points {
         for v in p.position.iter().chain(&p.velocity).chain(&p.acceleration) {
@@ -27,7 +33,7 @@ pub fn segment_body(number: u16, segment: u16, segments: u16, step: u16, points:
 }
 
 /// An ArmModel body.
-pub fn model_body(model: &ArmModel) -> Vec<u8> {
+pub(crate) fn model_body(model: &ArmModel) -> Vec<u8> {
     let joints = model.joints.iter().flat_map(|j| j.xyz.into_iter().chain(j.rpy));
     let links = model.links.iter().flat_map(|l| {
         let origin = l.origin.xyz.into_iter().chain(l.origin.rpy);

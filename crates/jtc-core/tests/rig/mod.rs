@@ -15,13 +15,13 @@ mod bodies;
 mod node;
 mod paths;
 
-pub use bodies::{floats, frame, model_body, segment_body};
-pub use node::Node;
-pub use paths::{pieces, point, put, rad, raw, rest};
+pub(crate) use bodies::{floats, frame, model_body, segment_body};
+pub(crate) use node::Node;
+pub(crate) use paths::{pieces, point, put, rad, raw, rest};
 
-pub const SCALE: Scale = Scale { velocity: 2.0 };
+pub(crate) const SCALE: Scale = Scale { velocity: 2.0 };
 
-pub struct Rig {
+pub(crate) struct Rig {
     pub controller: Controller<Vec<RawPoint>>,
     pub nodes: [Node; 7],
     pub pump: bool,
@@ -80,12 +80,12 @@ impl Sent {
 
 impl Rig {
     /// Creates a rig whose joints have no speed unless a test sets one. Speeds are not compared with positions (J-35).
-    pub fn new(config: Config) -> Self {
+    pub(crate) fn new(config: Config) -> Self {
         Self::with_speeds(Config { drive_speed_window_ms: 0, ..config })
     }
 
     /// Creates a rig for joints whose speeds agree with their positions.
-    pub fn with_speeds(config: Config) -> Self {
+    pub(crate) fn with_speeds(config: Config) -> Self {
         let last = Outputs {
             bus: None,
             safety_output: false,
@@ -120,16 +120,16 @@ impl Rig {
     }
 
     /// Returns a rig in HoldPos with every joint enabled and the default parameters.
-    pub fn holding() -> Self {
+    pub(crate) fn holding() -> Self {
         Self::holding_with(Config::avena())
     }
 
-    pub fn holding_with(config: Config) -> Self {
+    pub(crate) fn holding_with(config: Config) -> Self {
         Self::held_at(config, [0.0; 6])
     }
 
     /// Returns a held rig in this pose, rad.
-    pub fn held_at(config: Config, pose: [f64; 6]) -> Self {
+    pub(crate) fn held_at(config: Config, pose: [f64; 6]) -> Self {
         let mut rig = Self::new(config);
         rig.follow = false;
         for (node, position) in rig.nodes.iter_mut().zip(pose) {
@@ -145,7 +145,7 @@ impl Rig {
     }
 
     /// Returns a rig in HoldPos whose joint 3 is not enabled yet, because its drive takes long to enable.
-    pub fn with_a_slow_drive(config: Config) -> Self {
+    pub(crate) fn with_a_slow_drive(config: Config) -> Self {
         let mut rig = Self::new(config);
         rig.nodes[2].slow_enable = true;
         rig.defaults();
@@ -153,27 +153,27 @@ impl Rig {
         rig
     }
 
-    pub fn defaults(&mut self) {
+    pub(crate) fn defaults(&mut self) {
         use FrameType::*;
         for t in [FrictionPolynomialUseDefault, PidParamUseDefault, ArmModelUseDefault] {
             self.send(t, &[]);
         }
     }
 
-    pub fn state(&self) -> ControllerState {
+    pub(crate) fn state(&self) -> ControllerState {
         self.controller.telemetry().state
     }
 
-    pub fn trajectory(&self) -> TrajectoryState {
+    pub(crate) fn trajectory(&self) -> TrajectoryState {
         self.controller.telemetry().trajectory
     }
 
-    pub fn errors(&self) -> u16 {
+    pub(crate) fn errors(&self) -> u16 {
         self.controller.telemetry().errors
     }
 
     /// Returns the current status as a host would receive it.
-    pub fn status(&mut self) -> Status {
+    pub(crate) fn status(&mut self) -> Status {
         let before = self.statuses.len();
         while self.statuses.len() == before {
             self.tick();
@@ -181,21 +181,21 @@ impl Rig {
         *self.statuses.last().unwrap()
     }
 
-    pub fn send(&mut self, frame_type: FrameType, body: &[u8]) {
+    pub(crate) fn send(&mut self, frame_type: FrameType, body: &[u8]) {
         self.send_on(0, frame_type, body);
     }
 
     /// Sends a frame on this line.
-    pub fn send_on(&mut self, line: usize, frame_type: FrameType, body: &[u8]) {
+    pub(crate) fn send_on(&mut self, line: usize, frame_type: FrameType, body: &[u8]) {
         let what = What::Frame(frame_type, frame(frame_type, body));
         self.host.push_back(Sent { line, overtaken: false, plain: self.plain, what });
     }
 
-    pub fn send_bad(&mut self, response: Response) {
+    pub(crate) fn send_bad(&mut self, response: Response) {
         self.host.push_back(Sent { line: 0, overtaken: false, plain: self.plain, what: What::Bad(response) });
     }
 
-    pub fn send_noise(&mut self, response: Response) {
+    pub(crate) fn send_noise(&mut self, response: Response) {
         self.host.push_back(Sent {
             line: 0,
             overtaken: false,
@@ -205,7 +205,7 @@ impl Rig {
     }
 
     /// Adds a Stop or Pause that arrives on a line. The command takes effect in the next tick, and its frame waits after the others.
-    pub fn urgent(&mut self, line: usize, command: UrgentCommand) {
+    pub(crate) fn urgent(&mut self, line: usize, command: UrgentCommand) {
         self.urgent[line].push(command);
         self.send_on(line, FrameType::TrajSetExecStatus, &[ExecCommand::from(command) as u8]);
         for sent in &mut self.host {
@@ -214,17 +214,17 @@ impl Rig {
     }
 
     /// Returns the number of events that are not done.
-    pub fn waiting(&self) -> usize {
+    pub(crate) fn waiting(&self) -> usize {
         self.host.len()
     }
 
     /// Returns the records so far, oldest first, except those of extensions.
-    pub fn records(&self) -> Vec<Response> {
+    pub(crate) fn records(&self) -> Vec<Response> {
         self.statuses.iter().filter_map(Status::response).filter(|record| record.frame_type < 0x40).collect()
     }
 
     /// Sends a frame, runs until it is done, and returns the data status of its record.
-    pub fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
+    pub(crate) fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
         self.send(frame_type, body);
         for _ in 0..1000 {
             self.tick();
@@ -240,7 +240,7 @@ impl Rig {
     }
 
     /// Returns the answer to GetInfo.
-    pub fn info(&mut self) -> Info {
+    pub(crate) fn info(&mut self) -> Info {
         self.send(FrameType::GetInfo, &[]);
         for _ in 0..1000 {
             self.tick();
@@ -254,29 +254,29 @@ impl Rig {
         panic!("no Info");
     }
 
-    pub fn exec(&mut self, command: ExecCommand) -> DataStatus {
+    pub(crate) fn exec(&mut self, command: ExecCommand) -> DataStatus {
         self.ask(FrameType::TrajSetExecStatus, &[command as u8])
     }
 
-    pub fn clear(&mut self, jtc: bool, nodes: u8) -> DataStatus {
+    pub(crate) fn clear(&mut self, jtc: bool, nodes: u8) -> DataStatus {
         self.ask(FrameType::ClearCurrentErrors, &[u8::from(jtc), nodes, 0, 0])
     }
 
-    pub fn run(&mut self, ticks: usize) {
+    pub(crate) fn run(&mut self, ticks: usize) {
         for _ in 0..ticks {
             self.tick();
         }
     }
 
     /// Presses the emergency stop for `ticks` ticks.
-    pub fn press_stop(&mut self, ticks: usize) {
+    pub(crate) fn press_stop(&mut self, ticks: usize) {
         self.safety_input = false;
         self.run(ticks);
         self.safety_input = true;
     }
 
     /// Moves a joint to `to`, as fast as possible without making its position implausible (J-35).
-    pub fn push(&mut self, joint: usize, to: f64) {
+    pub(crate) fn push(&mut self, joint: usize, to: f64) {
         self.follow = false;
         while self.nodes[joint].report.position != to {
             let way = to - self.nodes[joint].report.position;
@@ -287,7 +287,7 @@ impl Rig {
     }
 
     /// Runs until `done`, at most `ticks`. Returns the number of ticks.
-    pub fn until(&mut self, ticks: usize, mut done: impl FnMut(&Self) -> bool) -> usize {
+    pub(crate) fn until(&mut self, ticks: usize, mut done: impl FnMut(&Self) -> bool) -> usize {
         for t in 0..ticks {
             if done(self) {
                 return t;
@@ -298,11 +298,11 @@ impl Rig {
     }
 
     /// Drops the answers of a node that the controller has not received yet.
-    pub fn drop_answers(&mut self, node: usize) {
+    pub(crate) fn drop_answers(&mut self, node: usize) {
         self.answers.retain(|frame| usize::from(frame.id & 0x0F) != node);
     }
 
-    pub fn tick(&mut self) {
+    pub(crate) fn tick(&mut self) {
         let bus = if self.inject.is_empty() {
             core::mem::take(&mut self.answers)
         } else {

@@ -3,7 +3,7 @@ use jtc_bus::{JointReport, NodeState};
 
 /// A node with its state machine, as it behaves on the bus.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Node {
+pub(crate) struct Node {
     pub report: JointReport,
     /// The node does not answer.
     pub silent: bool,
@@ -24,11 +24,11 @@ pub struct Node {
 }
 
 impl Node {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { report: JointReport { temperature: 25, ..JointReport::default() }, ..Self::default() }
     }
 
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.resets += 1;
         self.booting = 50;
         self.configured = false;
@@ -40,7 +40,7 @@ impl Node {
         };
     }
 
-    pub fn fault(&mut self) {
+    pub(crate) fn fault(&mut self) {
         self.report.state = NodeState::FAULT;
         self.report.errors = 2;
         self.report.mc_current = 4;

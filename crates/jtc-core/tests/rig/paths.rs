@@ -5,7 +5,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use super::{Rig, segment_body};
 
 /// Returns a motion of a joint (0..5) in pieces of constant acceleration (rad/s², number of points 10 ms apart).
-pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
+pub(crate) fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
     let (mut p, mut v) = (0.0f64, 0.0f64);
     let mut points = vec![RawPoint::default()];
     for &(a, n) in list {
@@ -20,37 +20,37 @@ pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
 }
 
 /// Returns a point that moves only one joint: rad, rad/s, rad/s².
-pub fn point(joint: usize, q: f64, v: f64, a: f64) -> RawPoint {
+pub(crate) fn point(joint: usize, q: f64, v: f64, a: f64) -> RawPoint {
     let mut point = RawPoint::default();
     put(&mut point, joint, q, v, a);
     point
 }
 
 /// Sets a joint of a point: rad, rad/s, rad/s².
-pub fn put(point: &mut RawPoint, joint: usize, q: f64, v: f64, a: f64) {
+pub(crate) fn put(point: &mut RawPoint, joint: usize, q: f64, v: f64, a: f64) {
     point.position[joint] = raw(q, 3.141592);
     point.velocity[joint] = raw(v, 6.283185);
     point.acceleration[joint] = raw(a, 12.566370);
 }
 
 /// Returns a value as an integer of the wire format. `scale` is the value of the largest integer.
-pub fn raw(value: f64, scale: f64) -> i16 {
+pub(crate) fn raw(value: f64, scale: f64) -> i16 {
     (value / scale * 32767.0).round() as i16
 }
 
 /// Returns a point at rest: `raw` in every joint.
-pub fn rest(raw: i16) -> RawPoint {
+pub(crate) fn rest(raw: i16) -> RawPoint {
     RawPoint { position: [raw; 6], ..RawPoint::default() }
 }
 
 /// Returns the angle of a raw position, rad.
-pub fn rad(raw: i16) -> f64 {
+pub(crate) fn rad(raw: i16) -> f64 {
     f64::from(raw) * (3.141592 / 32767.0)
 }
 
 impl Rig {
     /// Uploads in segments of at most 100 points.
-    pub fn upload(&mut self, points: &[RawPoint], step: u16) {
+    pub(crate) fn upload(&mut self, points: &[RawPoint], step: u16) {
         let chunks: Vec<_> = points.chunks(100).collect();
         for (i, chunk) in chunks.iter().enumerate() {
             let body = segment_body(7, i as u16, chunks.len() as u16, step, chunk);
@@ -60,13 +60,13 @@ impl Rig {
     }
 
     /// Uploads points 10 ms apart and executes them.
-    pub fn execute(&mut self, points: &[RawPoint]) {
+    pub(crate) fn execute(&mut self, points: &[RawPoint]) {
         self.upload(points, 10);
         assert_eq!(self.exec(ExecCommand::Execute), DataStatus::NoError);
     }
 
     /// Uploads points 10 ms apart, executes them, and runs until path time is at `point` ms.
-    pub fn move_along(&mut self, points: &[RawPoint], point: u32) {
+    pub(crate) fn move_along(&mut self, points: &[RawPoint], point: u32) {
         self.execute(points);
         self.until(4_000, |rig| rig.controller.telemetry().point >= point);
     }

@@ -3,12 +3,12 @@
 //! line has 30 numbers (q, qd, qdd, torque and rotor inertia of six joints).
 use jtc_dynamics::{ArmModel, JointVec, Link, Origin, Payload};
 
-pub enum Line {
+pub(crate) enum Line {
     Model(Box<ArmModel>, [f64; 3], Payload),
     State(Box<[JointVec; 5]>),
 }
 
-pub fn parse(line: &str) -> Result<Line, Box<dyn std::error::Error>> {
+pub(crate) fn parse(line: &str) -> Result<Line, Box<dyn std::error::Error>> {
     let mut words = line.split_whitespace();
     let kind = words.next().unwrap_or_default();
     let numbers = words.map(str::parse).collect::<Result<Vec<f64>, _>>()?;

@@ -3,7 +3,7 @@ use jtc_dynamics::{ArmModel, JointVec, Link, Origin};
 use proptest::prelude::*;
 
 /// Returns the arm of `arms/avena.toml`.
-pub fn avena() -> ArmModel {
+pub(crate) fn avena() -> ArmModel {
     let file: toml::Table = include_str!("../../../../arms/avena.toml").parse().expect("arms/avena.toml");
     let number =
         |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64)).expect("a number");
@@ -46,13 +46,13 @@ fn link() -> impl Strategy<Value = Link> {
 }
 
 /// A random physical arm.
-pub fn model() -> impl Strategy<Value = ArmModel> {
+pub(crate) fn model() -> impl Strategy<Value = ArmModel> {
     (prop::array::uniform7(origin(0.8)), prop::array::uniform7(link()))
         .prop_map(|(joints, links)| ArmModel { joints, links })
         .prop_filter("inertia of a body", |m| m.check().is_ok())
 }
 
 /// Six random numbers within ±`scale`.
-pub fn vector(scale: f64) -> impl Strategy<Value = JointVec> {
+pub(crate) fn vector(scale: f64) -> impl Strategy<Value = JointVec> {
     prop::array::uniform6(-scale..scale)
 }

@@ -54,7 +54,7 @@ impl StableInertia {
     ///
     /// θ is the frequency in rad per tick. The loop is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), and H is the control law with
     /// its delay and half a tick of hold. At a limit of stability H is real and the loop is −1, which gives the inertia J.
-    pub fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
+    pub(super) fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
         let turned = |theta: f64| {
             let half = 0.5 * gains.ki * DT;
             let d = gains.kd / (WINDOW * DT);

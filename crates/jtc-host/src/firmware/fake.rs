@@ -19,7 +19,7 @@ const PROGRAM: usize = 0x1000;
 
 /// Returns an image of a board with a content that depends on `seed`. If the board has a second core, the image contains a
 /// program for it.
-pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
+pub(super) fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     let mut bytes = vec![0; PROGRAM];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
     bytes[4..8].copy_from_slice(&0x0800_0601u32.to_le_bytes());
@@ -45,7 +45,7 @@ pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
 }
 
 /// Returns the flash report of a device with this image. The CRC is computed bit by bit, from its definition.
-pub fn program_of(image: &[u8]) -> Program {
+pub(super) fn program_of(image: &[u8]) -> Program {
     let bytes = &image[..PROGRAM];
     let mut register = u32::MAX;
     for byte in bytes {
@@ -58,7 +58,7 @@ pub fn program_of(image: &[u8]) -> Program {
 }
 
 /// Creates a folder with images of these boards and their catalogue.
-pub fn catalogue(folder: &Path, boards: &[&str]) {
+pub(super) fn catalogue(folder: &Path, boards: &[&str]) {
     use sha2::{Digest, Sha256};
     let images: Vec<_> = boards
         .iter()
@@ -77,7 +77,7 @@ pub fn catalogue(folder: &Path, boards: &[&str]) {
 
 /// Processor of a board, with the content of its flash.
 #[derive(Clone)]
-pub struct Board(Arc<Mutex<Flashed>>);
+pub(super) struct Board(Arc<Mutex<Flashed>>);
 
 struct Flashed {
     /// `true` while the ST-LINK holds the processor.
@@ -92,7 +92,7 @@ struct Flashed {
 
 impl Board {
     /// Creates a board that has run this image for an hour. The arm is configured and has no torque.
-    pub fn running(board: &str, program: Option<Program>) -> Self {
+    pub(super) fn running(board: &str, program: Option<Program>) -> Self {
         let mut status = Status { state: jtc_wire::ControllerState::Init.into(), ..Status::default() };
         status.joints.iter_mut().for_each(|joint| joint.state = jtc_wire::NodeState::READY);
         Self(Arc::new(Mutex::new(Flashed {
@@ -106,12 +106,12 @@ impl Board {
     }
 
     /// Changes the status that the board sends from then on.
-    pub fn set_status(&self, change: impl FnOnce(&mut Status)) {
+    pub(super) fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.0.lock().unwrap().status);
     }
 
     /// Holds the processor, so that the board sends no data, or releases it.
-    pub fn hold(&self, held: bool) {
+    pub(super) fn hold(&self, held: bool) {
         self.0.lock().unwrap().held = held;
     }
 
@@ -146,7 +146,7 @@ impl Board {
     }
 
     /// Returns a serial line to the board.
-    pub fn port(&self) -> Box<dyn Port> {
+    pub(super) fn port(&self) -> Box<dyn Port> {
         let board = self.clone();
         let mut next = Duration::ZERO;
         Box::new(ScriptedPort::new(None, move |now, bytes| {
@@ -167,7 +167,7 @@ impl Board {
     }
 
     /// Returns a function that opens a line to the board.
-    pub fn opener(&self) -> impl FnMut() -> Result<Box<dyn Port>, PortError> {
+    pub(super) fn opener(&self) -> impl FnMut() -> Result<Box<dyn Port>, PortError> {
         let board = self.clone();
         move || Ok(board.port())
     }
@@ -175,7 +175,7 @@ impl Board {
 
 /// Reaction of an ST-LINK to a file.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Behaviour {
+pub(super) enum Behaviour {
     /// Writes the file into the flash. The drive vanishes and comes back.
     Takes,
     /// Like `Takes`, but a part of the flash stays empty. This happens if the bytes arrive in another order.
@@ -189,7 +189,7 @@ pub enum Behaviour {
 }
 
 /// Drive of a board, and a thread that acts as its ST-LINK.
-pub struct StLink {
+pub(super) struct StLink {
     /// Temporary folder, removed together with the drive.
     _folder: tempfile::TempDir,
     pub path: PathBuf,
@@ -199,7 +199,7 @@ pub struct StLink {
 
 impl StLink {
     /// Creates a drive with this label for this board.
-    pub fn new(label: &str, board: &Board, behaviour: Behaviour) -> Self {
+    pub(super) fn new(label: &str, board: &Board, behaviour: Behaviour) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(label);
         appear(&path);
@@ -229,7 +229,7 @@ impl StLink {
     }
 
     /// Returns the drive in the form in which a program finds it.
-    pub fn drive(&self) -> Drive {
+    pub(super) fn drive(&self) -> Drive {
         Drive::at(&self.path).unwrap()
     }
 }

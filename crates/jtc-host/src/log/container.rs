@@ -13,13 +13,13 @@ const MAGIC: &[u8; 8] = b"JTCLOG\0\x01";
 
 /// Kinds of the parts.
 mod part {
-    pub const STATE: u8 = 1;
-    pub const BLOCKS: u8 = 2;
-    pub const ARM: u8 = 3;
-    pub const FIRST_POINT: u8 = 4;
-    pub const POINTS: u8 = 5;
-    pub const POINTS_HASH: u8 = 6;
-    pub const DEVICE: u8 = 7;
+    pub(super) const STATE: u8 = 1;
+    pub(super) const BLOCKS: u8 = 2;
+    pub(super) const ARM: u8 = 3;
+    pub(super) const FIRST_POINT: u8 = 4;
+    pub(super) const POINTS: u8 = 5;
+    pub(super) const POINTS_HASH: u8 = 6;
+    pub(super) const DEVICE: u8 = 7;
 }
 
 /// Reason why no log can be read from a file.

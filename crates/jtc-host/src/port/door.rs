@@ -27,7 +27,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// An open door. The door must be closed before the port, because the next program that opens the port creates a door at
 /// the same path.
-pub struct Door {
+pub(super) struct Door {
     path: PathBuf,
     /// Device and inode of the socket. Both show if another program has since created a socket at the same path.
     file: (u64, u64),
@@ -38,7 +38,7 @@ pub struct Door {
 impl Door {
     /// Opens the door of this program's port. Returns `None` if no socket can be created. The port then works without a
     /// door.
-    pub fn open(line: &Arc<Line>) -> Option<Self> {
+    pub(super) fn open(line: &Arc<Line>) -> Option<Self> {
         let name = socket_name(&line.path)?;
         let (path, listener, file) = runtime::candidates().into_iter().find_map(|folder| {
             let path = runtime::create_at(folder).ok()??.join(&name);

@@ -47,7 +47,7 @@ const KEPT: usize = 1 << 16;
 
 /// The outcome of another program's Stop or Pause.
 #[derive(Clone, Copy, Debug)]
-pub struct HaltOutcome {
+pub(super) struct HaltOutcome {
     /// `true` if the controller accepted the command.
     pub accepted: bool,
     /// `true` if the arm moved when the command arrived.
@@ -57,7 +57,7 @@ pub struct HaltOutcome {
 }
 
 /// The line of one port.
-pub struct Line {
+pub(super) struct Line {
     pub path: String,
     pub baud: u32,
     pub start: Instant,
@@ -126,7 +126,7 @@ struct Seen {
 pub(super) struct Counted<'a>(&'a AtomicUsize);
 
 impl<'a> Counted<'a> {
-    pub fn new(counter: &'a AtomicUsize) -> Self {
+    pub(super) fn new(counter: &'a AtomicUsize) -> Self {
         counter.fetch_add(1, Ordering::SeqCst);
         Self(counter)
     }
@@ -148,7 +148,11 @@ fn nothing_yet(e: &io::Error) -> bool {
 
 impl Line {
     /// Creates the line of an open port.
-    pub fn new(path: &str, baud: u32, port: Box<dyn serialport::SerialPort>) -> Result<Self, PortError> {
+    pub(super) fn new(
+        path: &str,
+        baud: u32,
+        port: Box<dyn serialport::SerialPort>,
+    ) -> Result<Self, PortError> {
         let start = Instant::now();
         let reading = port.try_clone().map_err(|e| PortError::io(path, e.into()))?;
         Ok(Self {
@@ -181,7 +185,7 @@ impl Line {
     }
 
     /// Reads for the owner of the port.
-    pub fn read(&self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
+    pub(super) fn read(&self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
         let mut input = lock(&self.input);
         if input.pending.is_empty() {
             self.receive(&mut input, timeout)?;
@@ -194,7 +198,7 @@ impl Line {
     }
 
     /// Writes a frame, or a piece of a frame, for the owner of the port.
-    pub fn write_all(&self, bytes: &[u8]) -> Result<(), PortError> {
+    pub(super) fn write_all(&self, bytes: &[u8]) -> Result<(), PortError> {
         for (i, piece) in bytes.chunks(CHUNK).enumerate() {
             self.let_urgent_pass();
             let mut output = lock(&self.output);
@@ -209,7 +213,7 @@ impl Line {
     }
 
     /// Returns the number of Stops and Pauses of other programs so far, without waiting.
-    pub fn halts(&self) -> Halts {
+    pub(super) fn halts(&self) -> Halts {
         // `halts` is incremented before `stops`, so every Stop counted here is also included in `halts`.
         let stops = self.stops.load(Ordering::SeqCst);
         Halts { all: self.halts.load(Ordering::SeqCst), stops }
@@ -217,12 +221,12 @@ impl Line {
 
     /// Permits the frames of a motion that was requested after `after` halts. The frames stay blocked if there were further
     /// halts since, or if the last halt is less than 3 s old.
-    pub fn ask_to_move(&self, after: u64) {
+    pub(super) fn ask_to_move(&self, after: u64) {
         self.open_gate(after, |_| true);
     }
 
     /// Like `ask_to_move`, for resuming a paused motion. After a Stop a motion cannot be resumed.
-    pub fn ask_to_resume(&self, after: u64) {
+    pub(super) fn ask_to_resume(&self, after: u64) {
         self.open_gate(after, |halt| halt == Halt::Pause);
     }
 
@@ -235,20 +239,20 @@ impl Line {
     }
 
     /// Marks the port as closing and ends all waits.
-    pub fn close(&self) {
+    pub(super) fn close(&self) {
         self.closing.store(true, Ordering::SeqCst);
         self.news.notify_all();
     }
 
     /// Returns `true` if the owner is closing the port.
-    pub fn is_closing(&self) -> bool {
+    pub(super) fn is_closing(&self) -> bool {
         self.closing.load(Ordering::SeqCst)
     }
 
     /// Writes another program's Stop or Pause, and repeats it until the controller has received it. Returns `None` if it is
     /// not confirmed. An owner that closes the port waits for this call, because the Stop may be the reason why it closes
     /// the port.
-    pub fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
+    pub(super) fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         match self.write_halt(halt, by) {
             // A Pause after a Stop is not written, because a stopped motion cannot be paused.
             Err(PortError::Halted { .. }) => {
@@ -300,7 +304,7 @@ impl Line {
     }
 
     /// Waits until the arm is at rest, but at most 5 s. Returns the last status and the standstill state.
-    pub fn wait_for_rest(&self, halt: Halt) -> Option<(Status, Standstill)> {
+    pub(super) fn wait_for_rest(&self, halt: Halt) -> Option<(Status, Standstill)> {
         let (end, mut standstill, mut count) = (Instant::now() + REST, Standstill::after(halt), None);
         let mut written_at = Instant::now();
         while Instant::now() < end && !self.is_closing() {

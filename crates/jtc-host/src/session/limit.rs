@@ -14,17 +14,17 @@ pub(super) struct Limit {
 
 impl Limit {
     /// Creates a limit of this length.
-    pub fn new(time: Duration) -> Self {
+    pub(super) fn new(time: Duration) -> Self {
         Self { left: time }
     }
 
     /// Returns the length of the next wait. `None` if no time is left.
-    pub fn next_wait(&self) -> Option<Duration> {
+    pub(super) fn next_wait(&self) -> Option<Duration> {
         (!self.left.is_zero()).then(|| self.left.min(STEP))
     }
 
     /// Subtracts a wait that was planned to last `planned` and lasted `took`.
-    pub fn waited(&mut self, planned: Duration, took: Duration) {
+    pub(super) fn waited(&mut self, planned: Duration, took: Duration) {
         self.left = self.left.saturating_sub(took.min(planned));
     }
 }

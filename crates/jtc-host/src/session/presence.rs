@@ -41,22 +41,22 @@ pub(super) struct Presence {
 
 impl Presence {
     /// Records that the session commands a motion or teaching.
-    pub fn command(&mut self, now: Duration) {
+    pub(super) fn command(&mut self, now: Duration) {
         self.commanded = Some(now);
     }
 
     /// Sets or clears the wait for teaching.
-    pub fn wait_for_teaching(&mut self, waits: bool) {
+    pub(super) fn wait_for_teaching(&mut self, waits: bool) {
         self.waits = waits;
     }
 
     /// Records that the controller has accepted an extension request.
-    pub fn accepted(&mut self) {
+    pub(super) fn accepted(&mut self) {
         self.answered = true;
     }
 
     /// Evaluates a status.
-    pub fn take_status(&mut self, status: &Status, now: Duration) {
+    pub(super) fn take_status(&mut self, status: &Status, now: Duration) {
         self.moves = status.state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
         if !self.moves && !self.waits {
             self.commanded.take_if(|at| now.saturating_sub(*at) > SHOWS);
@@ -81,7 +81,7 @@ impl Presence {
     }
 
     /// Evaluates an answer. If it answers a GetInfo, returns the time at which that GetInfo was sent.
-    pub fn take_answer(&mut self, answer: &Answer<'_>) -> Option<Duration> {
+    pub(super) fn take_answer(&mut self, answer: &Answer<'_>) -> Option<Duration> {
         match answer {
             Answer::Info(_) => {
                 self.unanswered = self.unanswered.checked_sub(1)?;

@@ -17,11 +17,11 @@ mod answers {
     use jtc_host::port::test::ScriptedPort;
     use jtc_wire::{Response, Status};
 
-    pub type Written = Rc<RefCell<Vec<u8>>>;
+    pub(super) type Written = Rc<RefCell<Vec<u8>>>;
 
     /// The controller answers each frame with `status` and the frame's record, and sends a status every 40 ms. From `end`
     /// on it sends nothing.
-    pub fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
+    pub(super) fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
         let written = Written::default();
         let taken = Rc::clone(&written);
         let mut next = Duration::ZERO;

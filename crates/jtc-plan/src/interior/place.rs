@@ -56,13 +56,13 @@ impl Place {
     }
 
     /// Adapts the place to rest: only jerk along the path remains.
-    pub fn at_rest(&mut self) {
+    pub(super) fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }
 
     /// Returns this place's part of the time and of the sum of the logarithms of the margins to the limits; `None`
     /// outside the limits.
-    pub fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
+    pub(super) fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
         let c = &c[self.at..self.at + 3];
         let b = dot(&self.b, c);
         if b.is_nan() || b <= 0.0 {
@@ -103,7 +103,7 @@ impl Place {
 
     /// Adds this place's part to the derivatives of the time plus `barrier` times the barriers, with respect to the
     /// coefficients.
-    pub fn add_to(
+    pub(super) fn add_to(
         &self,
         gradient: &mut [f64],
         hessian: &mut [[f64; 3]],

@@ -37,7 +37,7 @@ const SHARE: f64 = 0.995;
 
 impl<'a> Problem<'a> {
     /// Creates the problem; `slower` contains the time factor of each cell.
-    pub fn new(plan: &'a Plan, slower: &[f64]) -> Option<Self> {
+    pub(super) fn new(plan: &'a Plan, slower: &[f64]) -> Option<Self> {
         let cells = plan.cells;
         let count = cells.len();
         if count < 5 {

@@ -8,7 +8,7 @@ const PARTS_MAX: f64 = 4.0;
 
 impl Problem<'_> {
     /// Returns the time law of a spline.
-    pub fn law(&self, c: &[f64]) -> Law {
+    pub(super) fn law(&self, c: &[f64]) -> Law {
         let cells = self.plan.cells;
         let spans = self.knots.len() - 1;
         // Parameter, speed, acceleration at the knots.

@@ -61,7 +61,7 @@ pub(crate) struct Axes {
 }
 
 impl Chain {
-    pub fn new(model: &ArmModel) -> Self {
+    pub(super) fn new(model: &ArmModel) -> Self {
         let dynamics = Dynamics::new(model, [0.0; 3]);
         let zero = axes(&dynamics, &[0.0; JOINTS]);
         let lengths = model.joints[1..].iter().map(|joint| Vector3::from(joint.xyz).norm());
@@ -69,17 +69,17 @@ impl Chain {
         Self { dynamics, length: if length > 0.0 { length } else { 1.0 }, zero }
     }
 
-    pub fn at(&self, q: &JointVec) -> Axes {
+    pub(super) fn at(&self, q: &JointVec) -> Axes {
         axes(&self.dynamics, q)
     }
 
-    pub fn flange(&self, q: &JointVec) -> Pose {
+    pub(super) fn flange(&self, q: &JointVec) -> Pose {
         self.dynamics.forward_kinematics(q)[JOINTS]
     }
 
     /// Returns the residual from `axes` to `goal`: translation divided by [`Chain::length`], then rotation vector
     /// (rad), in the base frame.
-    pub fn residual(&self, goal: &Frame, axes: &Axes) -> Vector6<f64> {
+    pub(super) fn residual(&self, goal: &Frame, axes: &Axes) -> Vector6<f64> {
         let shift = (goal.position - axes.flange.position) / self.length;
         let turn = logarithm(&(goal.rotation * axes.flange.rotation.transpose()));
         Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
@@ -87,7 +87,7 @@ impl Chain {
 
     /// Returns the geometric Jacobian of the flange with translations divided by [`Chain::length`], so that its
     /// singular values are comparable.
-    pub fn scaled_jacobian(&self, axes: &Axes) -> Matrix6<f64> {
+    pub(super) fn scaled_jacobian(&self, axes: &Axes) -> Matrix6<f64> {
         let mut jacobian = axes.jacobian();
         jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / self.length);
         jacobian
@@ -105,7 +105,7 @@ fn axes(dynamics: &Dynamics, q: &JointVec) -> Axes {
 
 impl Axes {
     /// Returns the geometric Jacobian of the flange: translation (m/rad), then rotation (rad/rad), in the base frame.
-    pub fn jacobian(&self) -> Matrix6<f64> {
+    pub(super) fn jacobian(&self) -> Matrix6<f64> {
         let mut jacobian = Matrix6::zeros();
         for j in 0..JOINTS {
             let shift = self.axis[j].cross(&(self.flange.position - self.point[j]));
@@ -116,7 +116,7 @@ impl Axes {
     }
 
     /// Returns the rate of change of the Jacobian while the joints move with the velocity `qd`.
-    pub fn jacobian_rate(&self, qd: &Vector6<f64>) -> Matrix6<f64> {
+    pub(super) fn jacobian_rate(&self, qd: &Vector6<f64>) -> Matrix6<f64> {
         let mut rate = Matrix6::zeros();
         let flange = self.jacobian().fixed_rows::<3>(0) * qd;
         let mut spin = Vector3::zeros();

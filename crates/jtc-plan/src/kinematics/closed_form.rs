@@ -46,7 +46,7 @@ pub(crate) enum Shoulder {
 
 impl Geometry {
     /// Returns the geometry of an arm, allowing deviations up to `tolerance`.
-    pub fn of(zero: &Axes, tolerance: f64) -> Option<Self> {
+    pub(super) fn of(zero: &Axes, tolerance: f64) -> Option<Self> {
         let parallel = |a: usize, b: usize| zero.axis[a].cross(&zero.axis[b]).norm() < tolerance;
         if let Some(centre) = meeting(zero, 3, 4, tolerance)
             && across(&zero.axis[5], &(centre - zero.point[5])).norm() < tolerance
@@ -72,7 +72,7 @@ impl Geometry {
     /// Returns joint positions that bring the flange to `goal`, up to rounding and the deviations from the ideal
     /// geometry. There are at most eight; some of them may not reach the goal. A joint that the goal leaves free stays
     /// at `hint`.
-    pub fn solve(&self, zero: &Axes, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
+    pub(super) fn solve(&self, zero: &Axes, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let rotation = goal.rotation * zero.flange.rotation.transpose();
         let motion = Motion { rotation, shift: goal.position - rotation * zero.flange.position };
         let mut found = Vec::new();

@@ -87,7 +87,7 @@ struct Circle {
 }
 
 impl Drawn {
-    pub fn new(number: usize, from: &Frame, leg: &Leg) -> Result<Self, PoseError> {
+    pub(super) fn new(number: usize, from: &Frame, leg: &Leg) -> Result<Self, PoseError> {
         let (Leg::Line { to } | Leg::Arc { to, .. }) = leg;
         let to = checked(to)?;
         let turn = logarithm(&(to.rotation * from.rotation.transpose()));
@@ -113,7 +113,7 @@ impl Drawn {
     }
 
     /// Returns the distance from the beginning at which an arc passes its `via` point, m.
-    pub fn via(&self) -> Option<f64> {
+    pub(super) fn via(&self) -> Option<f64> {
         match &self.way {
             Way::Line(_) => None,
             Way::Arc(circle, rate) => Some((circle.via / rate).min(self.length)),
@@ -121,7 +121,7 @@ impl Drawn {
     }
 
     /// Returns the point at the distance `u` (m) from the beginning.
-    pub fn at(&self, u: f64) -> Place {
+    pub(super) fn at(&self, u: f64) -> Place {
         let rotation = exponential(&(self.spin * u)) * self.from.rotation;
         let (position, velocity, acceleration) = match &self.way {
             Way::Line(direction) => (self.from.position + direction * u, *direction, Vector3::zeros()),

@@ -28,7 +28,7 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
-    pub fn new(start: &Frame, legs: &[Leg], blend: f64) -> Result<Self, PoseError> {
+    pub(super) fn new(start: &Frame, legs: &[Leg], blend: f64) -> Result<Self, PoseError> {
         if !(blend >= 0.0 && blend.is_finite()) {
             return Err(PoseError::Blend { radius: blend });
         }
@@ -49,7 +49,7 @@ impl Trace {
         Ok(Self { legs: drawn, begins, blends, given: legs.len() })
     }
 
-    pub fn end(&self) -> f64 {
+    pub(super) fn end(&self) -> f64 {
         self.begins[self.legs.len()]
     }
 
@@ -60,12 +60,12 @@ impl Trace {
     }
 
     /// Returns the number of the leg at `s`, counted from 1, the distance along it, and its length, m.
-    pub fn whereabouts(&self, s: f64) -> (usize, f64, f64) {
+    pub(super) fn whereabouts(&self, s: f64) -> (usize, f64, f64) {
         let k = self.leg(s);
         (self.legs[k].number, s - self.begins[k], self.legs[k].length)
     }
 
-    pub fn at(&self, s: f64) -> Place {
+    pub(super) fn at(&self, s: f64) -> Place {
         let k = self.leg(s);
         let (leg, u) = (&self.legs[k], s - self.begins[k]);
         let left = leg.length - u;
@@ -79,13 +79,13 @@ impl Trace {
     }
 
     /// Returns the places of required stops.
-    pub fn stops(&self) -> Vec<f64> {
+    pub(super) fn stops(&self) -> Vec<f64> {
         let inner = self.blends.iter().zip(&self.begins[1..self.legs.len()]);
         inner.filter(|(blend, _)| **blend == 0.0).map(|(_, &s)| s).collect()
     }
 
     /// Returns the parameters at which the path changes its form, without the ends.
-    pub fn breaks(&self) -> Vec<f64> {
+    pub(super) fn breaks(&self) -> Vec<f64> {
         let corners = self.blends.iter().zip(&self.begins[1..self.legs.len()]);
         let mut all: Vec<f64> = corners.flat_map(|(&r, &s)| [s - r, s, s + r]).collect();
         all.dedup();
@@ -93,14 +93,14 @@ impl Trace {
     }
 
     /// Returns the parameter at which leg `number`, an arc, passes its `via` point.
-    pub fn via(&self, number: usize) -> Option<f64> {
+    pub(super) fn via(&self, number: usize) -> Option<f64> {
         let k = self.legs.iter().position(|leg| leg.number == number)?;
         Some(self.begins[k] + self.legs[k].via()?)
     }
 
     /// Returns the parameter nearest to each waypoint, including the ends. A leg without motion has the same parameter
     /// at both ends.
-    pub fn waypoints(&self) -> Vec<f64> {
+    pub(super) fn waypoints(&self) -> Vec<f64> {
         let passed = |n: usize| self.legs.partition_point(|leg| leg.number <= n);
         (0..=self.given).map(|n| self.begins[passed(n)]).collect()
     }

@@ -13,7 +13,7 @@ const H: f64 = 5e-4;
 const ROUNDING: f64 = 1e-6;
 
 /// An arm with limits, and waypoints.
-pub struct Case {
+pub(crate) struct Case {
     pub config: Config,
     pub model: ArmModel,
     pub friction: Option<Friction>,
@@ -30,7 +30,7 @@ fn between(rng: &mut fastrand::Rng, low: f64, high: f64) -> f64 {
 
 impl Case {
     /// The arm of arms/avena.toml with random masses, limits, payload and waypoints.
-    pub fn random(seed: u64) -> Self {
+    pub(crate) fn random(seed: u64) -> Self {
         let rng = &mut fastrand::Rng::with_seed(seed);
         let parameters = Parameters::avena();
         let mut config = Config::avena();
@@ -68,17 +68,17 @@ impl Case {
         Self { config, model, friction, temperature, limits, with_torque, waypoints, blend }
     }
 
-    pub fn arm(&self) -> Option<ArmDynamics<'_>> {
+    pub(crate) fn arm(&self) -> Option<ArmDynamics<'_>> {
         let arm = ArmDynamics::new(&self.config, &self.model, self.friction.as_ref());
         self.with_torque.then(|| arm.at_temperature(self.temperature))
     }
 
-    pub fn given(&self) -> Vec<Waypoint> {
+    pub(crate) fn given(&self) -> Vec<Waypoint> {
         self.waypoints.iter().copied().map(Waypoint::from).collect()
     }
 
     /// Joint torques for these differences, without and with friction.
-    pub fn torque(&self, dynamics: &Dynamics, q: &JointVec, v: &JointVec, a: &JointVec) -> JointVec {
+    pub(crate) fn torque(&self, dynamics: &Dynamics, q: &JointVec, v: &JointVec, a: &JointVec) -> JointVec {
         let mut torque = dynamics.inverse(q, v, a);
         for j in 0..JOINTS {
             torque[j] += self.config.joints[j].rotor_inertia * a[j];
@@ -89,7 +89,7 @@ impl Case {
 
     /// Returns all errors of a motion through the waypoints, and the highest used shares of the velocity, acceleration,
     /// jerk and torque limits. With `on_legs`, also checks that the motion stays on the legs.
-    pub fn judge(&self, motion: &Motion, on_legs: bool) -> (String, [f64; 4]) {
+    pub(crate) fn judge(&self, motion: &Motion, on_legs: bool) -> (String, [f64; 4]) {
         let mut wrong = String::new();
         self.ends(motion, &mut wrong);
         let used = self.differences(motion, &mut wrong);

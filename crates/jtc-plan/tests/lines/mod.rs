@@ -5,26 +5,26 @@ use jtc_dynamics::{JOINTS, Pose};
 use jtc_plan::kinematics::{Orientation, PoseError};
 
 /// A point or a direction.
-pub type Vec3 = [f64; 3];
+pub(crate) type Vec3 = [f64; 3];
 
-pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
+pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-pub fn dot(a: Vec3, b: Vec3) -> f64 {
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum()
 }
 
-pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-pub fn norm(a: Vec3) -> f64 {
+pub(crate) fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
 /// `pose` moved by `shift` (m) and turned about its own z, y and x by `turn` (rad).
-pub fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
+pub(crate) fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
     let by = Orientation::Rpy(turn).at([0.0; 3]).unwrap().rotation;
     let product = |i: usize, k: usize| (0..3).map(|j| pose.rotation[i][j] * by[j][k]).sum::<f64>();
     let rotation: [Vec3; 3] = std::array::from_fn(|i| std::array::from_fn(|k| product(i, k)));
@@ -32,10 +32,10 @@ pub fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
 }
 
 /// A range of two turns for each joint.
-pub const WIDE: [(f64, f64); JOINTS] = [(-2.0 * PI, 2.0 * PI); JOINTS];
+pub(crate) const WIDE: [(f64, f64); JOINTS] = [(-2.0 * PI, 2.0 * PI); JOINTS];
 
 /// Returns the leg, the distance along it, and the error on the leg.
-pub fn on_leg(error: PoseError) -> (usize, f64, PoseError) {
+pub(crate) fn on_leg(error: PoseError) -> (usize, f64, PoseError) {
     match error {
         PoseError::Leg { leg, distance, source, .. } => (leg, distance, *source),
         other => panic!("{other}"),

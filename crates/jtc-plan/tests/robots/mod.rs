@@ -5,18 +5,18 @@ use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin, Pose};
 
 /// The default arm: three parallel axes.
-pub fn avena() -> ArmModel {
+pub(super) fn avena() -> ArmModel {
     Parameters::avena().model
 }
 
 /// Position limits of the default arm, rad.
-pub fn avena_limits() -> [(f64, f64); JOINTS] {
+pub(super) fn avena_limits() -> [(f64, f64); JOINTS] {
     let config = Config::avena();
     std::array::from_fn(|joint| config.position_range(joint))
 }
 
 /// An arm from classic Denavit-Hartenberg parameters: d (m), a (m) and α (rad) for each joint.
-pub fn by_dh(parameters: [[f64; 3]; JOINTS]) -> ArmModel {
+pub(super) fn by_dh(parameters: [[f64; 3]; JOINTS]) -> ArmModel {
     let mut model = ArmModel::default();
     for (joint, [d, a, alpha]) in model.joints[1..].iter_mut().zip(parameters) {
         *joint = Origin { xyz: [a, 0.0, d], rpy: [alpha, 0.0, 0.0] };
@@ -25,7 +25,7 @@ pub fn by_dh(parameters: [[f64; 3]; JOINTS]) -> ArmModel {
 }
 
 /// Universal Robots UR5: three parallel axes.
-pub fn ur5() -> ArmModel {
+pub(super) fn ur5() -> ArmModel {
     by_dh([
         [0.089159, 0.0, FRAC_PI_2],
         [0.0, -0.425, 0.0],
@@ -37,7 +37,7 @@ pub fn ur5() -> ArmModel {
 }
 
 /// Unimation PUMA 560 (Corke and Armstrong-Hélouvry 1994): spherical wrist, axes 1 and 2 meet.
-pub fn puma560() -> ArmModel {
+pub(super) fn puma560() -> ArmModel {
     by_dh([
         [0.0, 0.0, FRAC_PI_2],
         [0.0, 0.4318, 0.0],
@@ -49,7 +49,7 @@ pub fn puma560() -> ArmModel {
 }
 
 /// KUKA KR 5 arc: spherical wrist, axes 1 and 2 do not meet.
-pub fn kr5() -> ArmModel {
+pub(super) fn kr5() -> ArmModel {
     by_dh([
         [0.4, 0.18, -FRAC_PI_2],
         [0.0, 0.6, 0.0],
@@ -61,7 +61,7 @@ pub fn kr5() -> ArmModel {
 }
 
 /// Kinova Jaco 2 with six joints and a curved wrist (j2s6s200), which has no closed form.
-pub fn jaco2() -> ArmModel {
+pub(super) fn jaco2() -> ArmModel {
     // The curved link offsets both of its axes by sin(a)/sin(2a) = 1/√3 of a link; a = 30° is half of the angle between
     // them.
     let part = 0.0741 / 3f64.sqrt();
@@ -76,7 +76,7 @@ pub fn jaco2() -> ArmModel {
 }
 
 /// An arm without a particular geometry.
-pub fn crooked() -> ArmModel {
+pub(super) fn crooked() -> ArmModel {
     let joints = [
         ([0.02, 0.01, 0.12], [0.1, 0.2, 0.3]),
         ([0.06, 0.02, 0.1], [1.3, 0.2, 0.1]),
@@ -91,7 +91,7 @@ pub fn crooked() -> ArmModel {
 
 /// Arms for the geometries that the other arms do not have: a spherical wrist after axes 2 and 3 that meet, or after
 /// axes 1 and 2 that are parallel. The parameters are invented.
-pub fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
+pub(super) fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
     let half = FRAC_PI_2;
     let wrist = [[0.4, 0.0, -half], [0.0, 0.0, half], [0.1, 0.0, 0.0]];
     let with = |arm: [[f64; 3]; 3]| by_dh([arm[0], arm[1], arm[2], wrist[0], wrist[1], wrist[2]]);
@@ -102,7 +102,7 @@ pub fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
 }
 
 /// Returns all arms with their names.
-pub fn named() -> [(&'static str, ArmModel); 6] {
+pub(super) fn named() -> [(&'static str, ArmModel); 6] {
     [
         ("avena", avena()),
         ("UR5", ur5()),
@@ -114,7 +114,7 @@ pub fn named() -> [(&'static str, ArmModel); 6] {
 }
 
 /// Returns all arms.
-pub fn all() -> Vec<ArmModel> {
+pub(super) fn all() -> Vec<ArmModel> {
     named().into_iter().map(|(_, model)| model).collect()
 }
 
@@ -125,7 +125,7 @@ fn product(a: &Mat3, b: &Mat3) -> Mat3 {
 }
 
 /// Returns the distance of two poses, m and rad.
-pub fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
+pub(super) fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let shift = (0..3).map(|i| (a.position[i] - b.position[i]).powi(2)).sum::<f64>().sqrt();
     // The chord between two rotations is 2·√2·sin of half the angle.
     let chord = a.rotation.as_flattened().iter().zip(b.rotation.as_flattened()).map(|(a, b)| (a - b).powi(2));
@@ -133,7 +133,7 @@ pub fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
 }
 
 /// Returns the pose of the flange by forward kinematics as specified in J-40, independent of the project's code.
-pub fn pose(model: &ArmModel, q: &JointVec) -> Pose {
+pub(super) fn pose(model: &ArmModel, q: &JointVec) -> Pose {
     let about = |axis: usize, angle: f64| {
         let (s, c) = angle.sin_cos();
         match axis {

@@ -99,7 +99,7 @@ impl Contact {
     /// Creates the state of a wall; `dynamics` computes the flange of the arm at `q`. If the wall would begin inside
     /// the arm, it begins at the surface of the arm instead, and moves to its configured position as the arm leaves.
     /// This way a new wall cannot throw the arm.
-    pub fn new(wall: Wall, parts: &SimArm, dynamics: &Dynamics, q: &JointVec) -> Self {
+    pub(super) fn new(wall: Wall, parts: &SimArm, dynamics: &Dynamics, q: &JointVec) -> Self {
         let (surface, stiffness, damping) = match wall {
             Wall::Plane { position, normal, stiffness, damping } => {
                 let length = dot(&normal, &normal).sqrt();
@@ -118,7 +118,7 @@ impl Contact {
         contact
     }
 
-    pub fn wall(&self) -> &Wall {
+    pub(super) fn wall(&self) -> &Wall {
         &self.wall
     }
 
@@ -138,7 +138,14 @@ impl Contact {
     }
 
     /// Adds the torques of the wall's force (N·m) to `sum`; `damped` is the share of the damping that is applied.
-    pub fn push(&self, dynamics: &Dynamics, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
+    pub(super) fn push(
+        &self,
+        dynamics: &Dynamics,
+        q: &JointVec,
+        qd: &JointVec,
+        damped: f64,
+        sum: &mut JointVec,
+    ) {
         let touch = self.touch(dynamics, q);
         if touch.depth > 0.0 {
             let force = self.stiffness * touch.depth - damped * self.damping * touch.speed(qd);
@@ -151,7 +158,7 @@ impl Contact {
     /// Returns the contributions of the wall to the squared highest natural frequency (1/s²) and to the fastest decay
     /// (1/s), if the arm may touch the wall within `dt`; otherwise 0. `mobility` returns the joint accelerations caused
     /// by torques.
-    pub fn rates(
+    pub(super) fn rates(
         &self,
         dynamics: &Dynamics,
         q: &JointVec,
@@ -169,7 +176,7 @@ impl Contact {
     }
 
     /// Moves a surface that is not at its configured position along with the arm.
-    pub fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
+    pub(super) fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
         if self.recess > 0.0 {
             self.recess = (self.recess + self.touch(dynamics, q).depth).clamp(0.0, self.recess);
         }

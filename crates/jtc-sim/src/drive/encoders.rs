@@ -21,7 +21,7 @@ pub(super) struct Encoders {
 impl Encoders {
     /// Returns the speed of a joint after another millisecond, in which it moved to `q` (rad), rad/s. It is computed
     /// from the motor's encoder, which is much finer than the joint's.
-    pub fn speed(&mut self, q: f64) -> f64 {
+    pub(super) fn speed(&mut self, q: f64) -> f64 {
         let motor = floor(q * MOTOR_COUNTS_PER_RAD);
         let oldest = core::mem::replace(&mut self.history[self.oldest], motor);
         self.oldest = (self.oldest + 1) % SPEED_WINDOW;
@@ -30,7 +30,7 @@ impl Encoders {
 
     /// Returns the position of a joint at `q` (rad) as the absolute encoder measures it, rad. The number of whole turns
     /// is lost.
-    pub fn position(&self, q: f64) -> f64 {
+    pub(super) fn position(&self, q: f64) -> f64 {
         let turns = q / core::f64::consts::TAU;
         let count = floor(turns * ENCODER_COUNTS + 0.5) as i16;
         f64::from(count) * (HALF_TURN / 32_768.0)

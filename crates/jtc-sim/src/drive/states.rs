@@ -24,27 +24,27 @@ pub(super) struct States {
 
 impl States {
     /// Creates the state after a reset.
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self { state: NodeState::START, age: 0, pending: NodeState::START, aligned: false, rest: 0 }
     }
 
-    pub fn state(&self) -> NodeState {
+    pub(super) fn state(&self) -> NodeState {
         self.state
     }
 
     /// Stores a request with any byte; [`accept`](Self::accept) decides what the byte means.
-    pub fn request(&mut self, state: NodeState) {
+    pub(super) fn request(&mut self, state: NodeState) {
         self.pending = state;
     }
 
     /// Begins a tick.
-    pub fn begin_tick(&mut self) {
+    pub(super) fn begin_tick(&mut self) {
         self.age = self.age.saturating_add(1);
     }
 
     /// Returns `true` if another error changes nothing, because the drive already reacts to an error or has just
     /// started.
-    pub fn reacting(&self) -> bool {
+    pub(super) fn reacting(&self) -> bool {
         matches!(
             self.state,
             NodeState::FAULT_REACTION
@@ -56,7 +56,7 @@ impl States {
     }
 
     /// Begins the pending transition, if the current state has one.
-    pub fn accept(&mut self, config: &DriveConfig) {
+    pub(super) fn accept(&mut self, config: &DriveConfig) {
         let next = match (self.pending, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
             (NodeState::INIT, NodeState::READY) => READY_TO_INIT,
@@ -76,7 +76,7 @@ impl States {
         self.enter(next, config);
     }
 
-    pub fn enter(&mut self, state: NodeState, config: &DriveConfig) {
+    pub(super) fn enter(&mut self, state: NodeState, config: &DriveConfig) {
         if self.state == NodeState::ENABLED && state != NodeState::ENABLED {
             self.rest = config.rest_ms;
         }
@@ -85,7 +85,7 @@ impl States {
     }
 
     /// Continues a transition. Its end clears a pending request. Returns `true` if the errors are acknowledged.
-    pub fn proceed(&mut self, config: &DriveConfig) -> bool {
+    pub(super) fn proceed(&mut self, config: &DriveConfig) -> bool {
         self.rest = self.rest.saturating_sub(1);
         let start_time = if self.aligned { config.enable_ms } else { config.first_enable_ms };
         let mut acknowledged = false;

@@ -9,7 +9,7 @@ use crate::frame::FRAME_MIN;
 use crate::words::{self, Bits};
 
 /// Minimum length of an [`Info`]. Later versions are longer.
-pub const INFO_LEN: usize = 136;
+pub(crate) const INFO_LEN: usize = 136;
 /// Length of an [`Info`] that this version writes.
 pub const INFO_WRITTEN: usize = 168;
 /// Name of the board of a simulator, whose drives are simulated (J-52).
@@ -21,29 +21,29 @@ const SHORT_TEXT: usize = 16;
 mod field {
     use core::ops::Range;
 
-    pub const VERSION: usize = 0;
-    pub const MISSING: usize = 1;
-    pub const NODES: usize = 2;
-    pub const BOOT_CAUSE: usize = 3;
-    pub const BOOTS: Range<usize> = 4..8;
-    pub const UPTIME: Range<usize> = 8..16;
-    pub const LOST: Range<usize> = 16..20;
-    pub const HASH: Range<usize> = 20..28;
-    pub const CAPABILITIES: Range<usize> = 28..32;
-    pub const STORED: usize = 32;
-    pub const STORE: usize = 33;
-    pub const SEQUENCE: Range<usize> = 34..38;
-    pub const LOG: usize = 38;
+    pub(super) const VERSION: usize = 0;
+    pub(super) const MISSING: usize = 1;
+    pub(super) const NODES: usize = 2;
+    pub(super) const BOOT_CAUSE: usize = 3;
+    pub(super) const BOOTS: Range<usize> = 4..8;
+    pub(super) const UPTIME: Range<usize> = 8..16;
+    pub(super) const LOST: Range<usize> = 16..20;
+    pub(super) const HASH: Range<usize> = 20..28;
+    pub(super) const CAPABILITIES: Range<usize> = 28..32;
+    pub(super) const STORED: usize = 32;
+    pub(super) const STORE: usize = 33;
+    pub(super) const SEQUENCE: Range<usize> = 34..38;
+    pub(super) const LOG: usize = 38;
     // Byte 39 is zero.
-    pub const NAME: Range<usize> = 40..72;
-    pub const FIRMWARE: Range<usize> = 72..88;
-    pub const REVISION: Range<usize> = 88..104;
-    pub const BOARD: Range<usize> = 104..136;
+    pub(super) const NAME: Range<usize> = 40..72;
+    pub(super) const FIRMWARE: Range<usize> = 72..88;
+    pub(super) const REVISION: Range<usize> = 88..104;
+    pub(super) const BOARD: Range<usize> = 104..136;
     // Added later (J-67).
-    pub const PROGRAM_BYTES: Range<usize> = 136..140;
-    pub const PROGRAM_CRC: Range<usize> = 140..144;
+    pub(super) const PROGRAM_BYTES: Range<usize> = 136..140;
+    pub(super) const PROGRAM_CRC: Range<usize> = 140..144;
     // Added later (J-69).
-    pub const REACTIONS: Range<usize> = 144..168;
+    pub(super) const REACTIONS: Range<usize> = 144..168;
 }
 
 /// Capabilities of a device beyond version 1 of the extensions, one bit each.

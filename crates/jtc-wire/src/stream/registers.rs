@@ -18,12 +18,12 @@ pub(super) struct Registers {
 }
 
 impl Registers {
-    pub const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self { base: 0, last: 0, phase: GRID, count: 0, kept: [0; REGISTERS] }
     }
 
     /// Computes the registers for `bytes`, which are at `end..` of the buffer.
-    pub fn absorb(&mut self, mut end: usize, mut bytes: &[u8]) {
+    pub(super) fn absorb(&mut self, mut end: usize, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let next = self.phase + self.count * GRID;
             let (piece, rest) = bytes.split_at((next - end).min(bytes.len()));
@@ -37,7 +37,7 @@ impl Registers {
         }
     }
 
-    pub fn at(&self, at: usize, buffer: &[u8]) -> u16 {
+    pub(super) fn at(&self, at: usize, buffer: &[u8]) -> u16 {
         if at < self.phase {
             crc16_update(self.base, &buffer[..at])
         } else {
@@ -47,7 +47,7 @@ impl Registers {
     }
 
     /// Removes the bytes before `by`.
-    pub fn shift(&mut self, by: usize, buffer: &[u8]) {
+    pub(super) fn shift(&mut self, by: usize, buffer: &[u8]) {
         self.base = self.at(by, buffer);
         if by >= self.phase {
             let gone = (by - self.phase) / GRID + 1;

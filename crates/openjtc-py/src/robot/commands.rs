@@ -20,7 +20,7 @@ const STANDSTILL: Duration = Duration::from_secs(5);
 const TAUGHT_NO_MORE: Duration = Duration::from_secs(1);
 
 /// Returns the error for a caller whose action was ended by a Stop.
-pub fn stopped(what: &str) -> Failure {
+pub(super) fn stopped(what: &str) -> Failure {
     Failure::fault(
         "stopped",
         format!("{what}: the arm was stopped"),
@@ -31,7 +31,7 @@ pub fn stopped(what: &str) -> Failure {
 impl WorkerState {
     /// Stops the arm and waits for standstill. An arm that is already at rest is not an error. Also ends teaching, even if another
     /// program has switched it on, because the caller wants the arm to be held.
-    pub fn stop(&mut self) -> Result<(), Failure> {
+    pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
         // The Stop is sent before any query, because it may reach the controller even on a line that returns no bytes.
         let stopped = match self.session.stop() {
@@ -59,12 +59,12 @@ impl WorkerState {
     }
 
     /// Like [`Self::stop`], but only for motion and teaching of this connection.
-    pub fn rest(&mut self) -> Result<(), Failure> {
+    pub(crate) fn rest(&mut self) -> Result<(), Failure> {
         if self.shared.moves() { self.stop() } else { self.hold() }
     }
 
     /// Ends the teaching of this connection.
-    pub fn hold(&mut self) -> Result<(), Failure> {
+    pub(crate) fn hold(&mut self) -> Result<(), Failure> {
         if self.teaching {
             self.session.teach(false)?;
             self.teaching = false;
@@ -73,7 +73,7 @@ impl WorkerState {
     }
 
     /// Sends a last Stop after a panic, without waiting for an answer.
-    pub fn abandon(&mut self) {
+    pub(crate) fn abandon(&mut self) {
         let port = self.session.port_mut();
         let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
         let due = [self.shared.moves(), self.teaching];
@@ -84,7 +84,7 @@ impl WorkerState {
     }
 
     /// Notes the end of the motion of this connection, if the last status shows it.
-    pub fn look(&mut self) {
+    pub(crate) fn look(&mut self) {
         if !self.shared.moves() || !self.session.port().is_shown() {
             return;
         }
@@ -95,7 +95,7 @@ impl WorkerState {
     }
 
     /// Jogs at these velocities (rad/s) for this time, then waits for rest. Returns the position at rest (rad).
-    pub fn jog(
+    pub(crate) fn jog(
         &mut self,
         velocity: &[f64; JOINTS],
         time: Duration,
@@ -126,7 +126,7 @@ impl WorkerState {
     }
 
     /// Starts teaching: the arm can be led by hand.
-    pub fn teach(&mut self, asked: &Asked) -> Result<(), Failure> {
+    pub(crate) fn teach(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.same_arm()?;
         self.session.ask_to_move()?;
         let before = self.teaching;
@@ -143,7 +143,7 @@ impl WorkerState {
     }
 
     /// Records the positions of the hand-led arm for this time, or until a Stop.
-    pub fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
+    pub(crate) fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
         let start = self.session.now();
         let mut last = start;
         while !asked.is_halted() && self.session.now() - start < time {

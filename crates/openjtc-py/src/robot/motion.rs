@@ -17,7 +17,7 @@ use jtc_host::{
 };
 use jtc_wire::{Status, TrajectoryState};
 
-pub use jtc_host::run::Course;
+pub(crate) use jtc_host::run::Course;
 
 use super::port::AnyPort;
 use super::recording::Recording;
@@ -28,7 +28,7 @@ use super::worker_state::{WorkerState, observe};
 use crate::error::Failure;
 
 /// Order for a run: the course and its options.
-pub struct Order {
+pub(crate) struct Order {
     pub course: Course,
     /// Name in recordings.
     pub name: String,
@@ -49,7 +49,7 @@ pub struct Order {
 }
 
 /// Result of a run.
-pub struct Ran {
+pub(crate) struct Ran {
     /// `true` if Execute was sent to the controller.
     moved: bool,
     /// "finished" or "stopped"; "fault" if there is a failure.
@@ -74,7 +74,7 @@ impl Order {
 impl WorkerState {
     /// Executes an order. An error before the arm moves is returned as an error. An error during or after the motion is part of the
     /// result.
-    pub fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {
+    pub(crate) fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {
         let recording = order.record.as_ref();
         let mut recording =
             recording.map(|(path, overwrite)| Recording::open(path, *overwrite)).transpose()?;

@@ -25,7 +25,7 @@ type Over = Result<Came, Py<PyAny>>;
 
 /// A motion that was started.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct Motion {
+pub(super) struct Motion {
     link: Py<Link>,
     came: Mutex<Receiver<Result<Ran, Failure>>>,
     over: Mutex<Option<Over>>,
@@ -34,7 +34,7 @@ pub struct Motion {
 
 impl Motion {
     /// Passes the motion to the connection's thread. `asked`: number of Stops at the time of the request.
-    pub fn begin(link: &Bound<'_, Link>, order: Order, asked: u64) -> Result<Self, Failure> {
+    pub(super) fn begin(link: &Bound<'_, Link>, order: Order, asked: u64) -> Result<Self, Failure> {
         let worker = &link.get().worker;
         let progress = Arc::clone(&order.progress);
         *lock(&progress) = Progress { phase: "waiting", ..Progress::default() };

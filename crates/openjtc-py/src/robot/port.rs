@@ -24,7 +24,7 @@ const RECORD: Duration = Duration::from_millis(200);
 const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
 /// Underlying line.
-pub enum Line {
+pub(crate) enum Line {
     /// A simulator. This variant is separate, so that disturbances of its arm can be applied during any job.
     Simulated(Box<SimPort>),
     /// A serial port or an agent.
@@ -47,7 +47,7 @@ macro_rules! each_line {
 }
 
 /// Line with its gate.
-pub struct AnyPort {
+pub(crate) struct AnyPort {
     line: Line,
     shared: Arc<Shared>,
     /// Number of Stops at the time when the current request was made.
@@ -66,7 +66,7 @@ pub struct AnyPort {
 
 impl AnyPort {
     /// Makes a line whose gate follows the requests in `shared`.
-    pub fn new(line: Line, shared: Arc<Shared>) -> Self {
+    pub(crate) fn new(line: Line, shared: Arc<Shared>) -> Self {
         Self {
             line,
             shared,
@@ -80,29 +80,29 @@ impl AnyPort {
     }
 
     /// Returns `true` if the arm is simulated.
-    pub fn is_simulated(&self) -> bool {
+    pub(crate) fn is_simulated(&self) -> bool {
         matches!(self.line, Line::Simulated(_))
     }
 
     /// Begins a request that was made after `at` Stops.
-    pub fn begin(&mut self, at: u64) {
+    pub(crate) fn begin(&mut self, at: u64) {
         self.at = at;
     }
 
     /// Marks all Stops as handled. The caller itself writes the frame.
-    pub fn take_over(&mut self) {
+    pub(crate) fn take_over(&mut self) {
         self.done = self.shared.stops();
     }
 
     /// Returns the remaining time within which the record of the last Stop may still arrive. The record must not be taken for the answer
     /// to a later frame.
-    pub fn unsettled(&self) -> Option<Duration> {
+    pub(crate) fn unsettled(&self) -> Option<Duration> {
         let left = (self.stopped? + RECORD).saturating_sub(self.now());
         (!left.is_zero()).then_some(left)
     }
 
     /// Returns `true` if the statuses already show the last started motion.
-    pub fn is_shown(&self) -> bool {
+    pub(crate) fn is_shown(&self) -> bool {
         let (time, statuses) = BEGUN;
         self.now() >= self.begun.0 + time && self.shared.seen() >= self.begun.1 + statuses
     }

@@ -38,7 +38,7 @@ fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
 
 /// Converts a status to plain values. Values that a joint does not report are NaN. `stop` is the present held stop, if the controller
 /// has reported it.
-pub fn status<'py>(
+pub(super) fn status<'py>(
     py: Python<'py>,
     status: &Status,
     stop: Option<(StopCause, u32)>,
@@ -298,6 +298,6 @@ impl Link {
 }
 
 /// Returns the samples of each tick, with the first failure.
-pub fn samples(account: &Account) -> Samples {
+pub(crate) fn samples(account: &Account) -> Samples {
     Samples::of_log(account.info.clone(), account.replayed.samples(), account.failure.clone())
 }

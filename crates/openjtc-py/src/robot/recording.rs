@@ -10,7 +10,7 @@ use super::motion::Ran;
 use crate::error::Failure;
 
 /// Recording of one run.
-pub struct Recording {
+pub(super) struct Recording {
     path: PathBuf,
     /// Temporary file that replaces `path` only at the end, so that an existing file stays until the new one is complete.
     aside: Option<PathBuf>,
@@ -20,7 +20,7 @@ pub struct Recording {
 
 impl Recording {
     /// Opens the file before the arm moves. `overwrite`: replaces an existing file.
-    pub fn open(path: &PathBuf, overwrite: bool) -> Result<Self, Failure> {
+    pub(super) fn open(path: &PathBuf, overwrite: bool) -> Result<Self, Failure> {
         Format::of(path).map_err(|error| Failure::of(&error))?;
         let mut options = OpenOptions::new();
         options.write(true);
@@ -48,7 +48,7 @@ impl Recording {
     }
 
     /// Returns the sink for the samples of a motion.
-    pub fn sink(&mut self, info: &RecordingInfo) -> Result<Option<SampleSink>, Failure> {
+    pub(super) fn sink(&mut self, info: &RecordingInfo) -> Result<Option<SampleSink>, Failure> {
         if let Some(file) = self.file.take() {
             let live = LiveRecorder::begin(file, &self.path, info, |_| {});
             self.live = Some(live.map_err(|error| Failure::of(&error))?);
@@ -58,7 +58,7 @@ impl Recording {
 
     /// Completes the file if the run moved the arm along its trajectory. Otherwise removes the file. A file error becomes a note of the
     /// finished run.
-    pub fn end(self, ran: Result<Ran, Failure>) -> Result<Ran, Failure> {
+    pub(super) fn end(self, ran: Result<Ran, Failure>) -> Result<Ran, Failure> {
         let Self { path, aside, file, live } = self;
         let written = aside.as_ref().unwrap_or(&path);
         match (ran, live) {

@@ -16,17 +16,17 @@ use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Disturbance of a simulated arm.
-pub type Touch = Box<dyn FnOnce(&mut World) + Send>;
+pub(super) type Touch = Box<dyn FnOnce(&mut World) + Send>;
 
 /// Request to a running motion, with the channel for its result.
-pub struct Wish {
+pub(crate) struct Wish {
     pub flow: Flow,
     pub done: Sender<Result<(), Failure>>,
 }
 
 /// Progress of a motion.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Progress {
+pub(crate) struct Progress {
     /// Phase: "waiting", "approach", "upload", "motion"; empty after the end.
     pub phase: &'static str,
     /// Completed part of the path in s, or number of uploaded segments.
@@ -37,7 +37,7 @@ pub struct Progress {
 
 /// State that the thread of a connection shares with the waiting callers.
 #[derive(Default)]
-pub struct Shared {
+pub(crate) struct Shared {
     /// Requests to the thread, and the number of Stops.
     pub queue: Queue<WorkerState, ()>,
     /// Number of Stops that also stop the arm if another program moves it.
@@ -65,65 +65,65 @@ pub struct Shared {
 
 impl Shared {
     /// Cancels all earlier requests. The port stops the motion of this connection.
-    pub fn halt(&self) {
+    pub(crate) fn halt(&self) {
         self.queue.count_stop();
         self.queue.refuse_late();
     }
 
     /// Announces a Stop that also stops the arm if another program moves it. The Stop itself must follow.
-    pub fn will_stop_all(&self) {
+    pub(crate) fn will_stop_all(&self) {
         self.stops_of_all.fetch_add(1, Ordering::SeqCst);
     }
 
     /// Returns the number of Stops, and the number of those that also stop the arm if another program moves it.
-    pub fn stops(&self) -> (u64, u64) {
+    pub(crate) fn stops(&self) -> (u64, u64) {
         let all = self.queue.stops();
         (all, self.stops_of_all.load(Ordering::SeqCst))
     }
 
     /// Returns `true` if the thread must end.
-    pub fn has_ended(&self) -> bool {
+    pub(crate) fn has_ended(&self) -> bool {
         self.ended.load(Ordering::SeqCst)
     }
 
     /// Lets the thread end after its current request.
-    pub fn end(&self) {
+    pub(crate) fn end(&self) {
         self.ended.store(true, Ordering::SeqCst);
     }
 
-    pub fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         self.moves.load(Ordering::SeqCst)
     }
 
-    pub fn set_moves(&self, moves: bool) {
+    pub(crate) fn set_moves(&self, moves: bool) {
         self.moves.store(moves, Ordering::SeqCst);
     }
 
     /// Returns `true` while a requested run is not over; the thread then answers no queries.
-    pub fn is_running(&self) -> bool {
+    pub(crate) fn is_running(&self) -> bool {
         self.pending.load(Ordering::SeqCst) > 0
     }
 
-    pub fn is_gone(&self) -> bool {
+    pub(crate) fn is_gone(&self) -> bool {
         self.gone.load(Ordering::SeqCst)
     }
 
-    pub fn set_gone(&self) {
+    pub(crate) fn set_gone(&self) {
         self.gone.store(true, Ordering::SeqCst);
     }
 
-    pub fn seen(&self) -> u64 {
+    pub(crate) fn seen(&self) -> u64 {
         self.seen.load(Ordering::SeqCst)
     }
 
     /// Publishes a new status.
-    pub fn publish(&self, status: &Status) {
+    pub(crate) fn publish(&self, status: &Status) {
         *lock(&self.status) = Some(*status);
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
     /// Passes a request to the current run. Without a run, the result channel is dropped.
-    pub fn wish(&self, wish: Wish) {
+    pub(crate) fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {
             lock(&self.wishes).clear();
@@ -132,11 +132,11 @@ impl Shared {
 }
 
 /// Guard of a requested run, which exists until the run is over or abandoned.
-pub struct Pending(Arc<Shared>);
+pub(super) struct Pending(Arc<Shared>);
 
 impl Pending {
     /// Counts the run as pending.
-    pub fn begin(shared: &Arc<Shared>) -> Self {
+    pub(super) fn begin(shared: &Arc<Shared>) -> Self {
         shared.pending.fetch_add(1, Ordering::SeqCst);
         Self(Arc::clone(shared))
     }
@@ -153,29 +153,29 @@ impl Drop for Pending {
 
 /// A request's own view of the Stops.
 #[derive(Clone)]
-pub struct Asked {
+pub(crate) struct Asked {
     shared: Arc<Shared>,
     at: u64,
 }
 
 impl Asked {
     /// Returns the view for a request that is made now.
-    pub fn now(shared: &Arc<Shared>) -> Self {
+    pub(crate) fn now(shared: &Arc<Shared>) -> Self {
         Self::after(shared, shared.queue.stops())
     }
 
     /// Returns the view for a request that was made after `at` Stops.
-    pub fn after(shared: &Arc<Shared>, at: u64) -> Self {
+    pub(crate) fn after(shared: &Arc<Shared>, at: u64) -> Self {
         Self { shared: Arc::clone(shared), at }
     }
 
     /// Returns the number of Stops at the time of the request.
-    pub fn at(&self) -> u64 {
+    pub(crate) fn at(&self) -> u64 {
         self.at
     }
 
     /// Returns `true` if there was a Stop since the request.
-    pub fn is_halted(&self) -> bool {
+    pub(crate) fn is_halted(&self) -> bool {
         self.shared.queue.stops() != self.at
     }
 }

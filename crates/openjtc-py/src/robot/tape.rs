@@ -7,7 +7,7 @@ use jtc_host::recording::SampleSink;
 
 /// Recorded samples of a motion.
 #[derive(Default)]
-pub struct Tape {
+pub(crate) struct Tape {
     on: Cell<bool>,
     zero: Cell<Option<f64>>,
     samples: RefCell<Vec<Sample>>,
@@ -16,7 +16,7 @@ pub struct Tape {
 
 impl Tape {
     /// Starts recording. If there is a sink, the samples are also passed to it. Earlier samples are kept.
-    pub fn record(&self, sink: Option<SampleSink>) {
+    pub(crate) fn record(&self, sink: Option<SampleSink>) {
         self.on.set(true);
         self.zero.set(None);
         *self.sink.borrow_mut() = sink;
@@ -24,7 +24,7 @@ impl Tape {
 
     /// Records a sample and shifts its time, so that the recording begins at 0. A further motion continues 1 ms after the last
     /// sample.
-    pub fn push(&self, sample: &Sample) {
+    pub(crate) fn push(&self, sample: &Sample) {
         if !self.on.get() {
             return;
         }
@@ -42,18 +42,18 @@ impl Tape {
     }
 
     /// Appends a sample without changing its time and without passing it to the sink.
-    pub fn keep(&self, sample: &Sample) {
+    pub(crate) fn keep(&self, sample: &Sample) {
         self.samples.borrow_mut().push(*sample);
     }
 
     /// Stops recording.
-    pub fn pause(&self) {
+    pub(crate) fn pause(&self) {
         self.on.set(false);
         self.sink.borrow_mut().take();
     }
 
     /// Stops recording and returns the samples.
-    pub fn take(&self) -> Vec<Sample> {
+    pub(crate) fn take(&self) -> Vec<Sample> {
         self.pause();
         self.samples.take()
     }

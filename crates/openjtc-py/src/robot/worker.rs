@@ -24,12 +24,12 @@ const LOOK: Duration = Duration::from_millis(50);
 const STANDSTILL: Duration = Duration::from_secs(15);
 
 /// Locks a mutex, even after a panic, because the protected data is consistent after each statement.
-pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Result of a wait.
-pub enum Waited<T> {
+pub(super) enum Waited<T> {
     Came(T),
     /// No result can arrive any more.
     Gone,
@@ -38,7 +38,7 @@ pub enum Waited<T> {
 }
 
 /// The connection's thread.
-pub struct Worker {
+pub(super) struct Worker {
     simulated: bool,
     /// Process that opened the connection. A forked child does not have the thread.
     process: u32,
@@ -49,14 +49,14 @@ pub struct Worker {
 }
 
 /// Returns the error for a closed connection.
-pub fn closed() -> Failure {
+pub(super) fn closed() -> Failure {
     Failure::new(ErrorKind::NoLink, "closed", "the connection is closed")
         .next("connect again: `openjtc.connect(…)`")
 }
 
 impl Worker {
     /// Starts the thread and connects in it.
-    pub fn begin(py: Python<'_>, target: Target) -> PyResult<Self> {
+    pub(super) fn begin(py: Python<'_>, target: Target) -> PyResult<Self> {
         let shared = Arc::<Shared>::default();
         let simulated = matches!(target.way, Way::Simulated(_));
         let (opened, is_open) = channel::<Result<String, Failure>>();
@@ -83,7 +83,7 @@ impl Worker {
 
     /// Puts a request that was made after `at` Stops, and returns the channel for its result. A later Stop refuses the request if it has
     /// not begun.
-    pub fn ask<T: Send + 'static>(
+    pub(super) fn ask<T: Send + 'static>(
         &self,
         at: u64,
         job: impl FnOnce(&mut WorkerState, &Asked) -> Result<T, Failure> + Send + 'static,
@@ -145,20 +145,20 @@ impl Worker {
     }
 
     /// Returns the number of Stops so far. The next Stop refuses every earlier request.
-    pub fn now(&self) -> Result<u64, Failure> {
+    pub(super) fn now(&self) -> Result<u64, Failure> {
         self.is_here()?;
         Ok(self.shared.queue.stops())
     }
 
     /// Cancels all earlier requests and stops the motion of this connection, without waiting.
-    pub fn halt(&self) {
+    pub(super) fn halt(&self) {
         if !self.is_foreign() {
             self.shared.halt();
         }
     }
 
     /// Stops the arm, even if another program moves it, and waits for standstill. Cancels all earlier requests.
-    pub fn stop(&self, py: Python<'_>) -> PyResult<()> {
+    pub(super) fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.is_here()?;
         self.shared.will_stop_all();
         let came = self.overtake(WorkerState::stop)?;
@@ -166,13 +166,13 @@ impl Worker {
     }
 
     /// Stops the motion and the teaching of this connection, and waits for standstill. Cancels all earlier requests.
-    pub fn end_motion(&self, py: Python<'_>) -> PyResult<()> {
+    pub(super) fn end_motion(&self, py: Python<'_>) -> PyResult<()> {
         let came = self.overtake(WorkerState::rest)?;
         Ok(self.wait(py, came)??)
     }
 
     /// Puts a request and waits for its result.
-    pub fn call<T: Send + 'static>(
+    pub(super) fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
         job: impl FnOnce(&mut WorkerState, &Asked) -> Result<T, Failure> + Send + 'static,
@@ -182,7 +182,7 @@ impl Worker {
     }
 
     /// Like [`Self::call`], for requests that a Stop does not cancel.
-    pub fn call_always<T: Send + 'static>(
+    pub(super) fn call_always<T: Send + 'static>(
         &self,
         py: Python<'_>,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
@@ -192,7 +192,7 @@ impl Worker {
     }
 
     /// Waits without the interpreter's lock. Ctrl-C stops the arm, and the exception is raised after standstill.
-    pub fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
+    pub(super) fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
         match self.wait_for(py, &Mutex::new(came), None)? {
             Waited::Came(result) => {
                 // Handles a Ctrl-C that came together with the result, because Python itself would not stop the arm.
@@ -204,7 +204,7 @@ impl Worker {
     }
 
     /// Like [`Self::wait`], for at most this time. Several threads may wait for the same result; exactly one receives it.
-    pub fn wait_for<T: Send>(
+    pub(super) fn wait_for<T: Send>(
         &self,
         py: Python<'_>,
         came: &Mutex<Receiver<T>>,
@@ -236,18 +236,18 @@ impl Worker {
     }
 
     /// Waits for `time` while another thread works.
-    pub fn pass(&self, py: Python<'_>, time: Duration) -> PyResult<()> {
+    pub(super) fn pass(&self, py: Python<'_>, time: Duration) -> PyResult<()> {
         py.detach(|| std::thread::sleep(time));
         self.look_for_signals(py)
     }
 
     /// Checks for Ctrl-C and other signals whose handlers raise an exception. The arm is at rest before the exception is raised.
-    pub fn look_for_signals(&self, py: Python<'_>) -> PyResult<()> {
+    pub(super) fn look_for_signals(&self, py: Python<'_>) -> PyResult<()> {
         py.check_signals().inspect_err(|_| self.rest(py))
     }
 
     /// Stops the motion of this connection and waits for standstill. A signal ends the wait. Cancels all earlier requests.
-    pub fn rest(&self, py: Python<'_>) {
+    pub(super) fn rest(&self, py: Python<'_>) {
         let Ok(came) = self.overtake(WorkerState::rest).map(Mutex::new) else { return };
         let end = Instant::now() + STANDSTILL;
         while Instant::now() < end {
@@ -259,7 +259,7 @@ impl Worker {
     }
 
     /// Applies a disturbance to the simulated arm, during any job.
-    pub fn touch(&self, touch: impl FnOnce(&mut World) + Send + 'static) -> Result<(), Failure> {
+    pub(super) fn touch(&self, touch: impl FnOnce(&mut World) + Send + 'static) -> Result<(), Failure> {
         if self.is_closed() {
             return Err(closed());
         }
@@ -272,7 +272,7 @@ impl Worker {
     }
 
     /// Takes no further requests and waits until the thread has ended the connection. A signal ends the wait.
-    pub fn end(&self, py: Python<'_>) -> PyResult<()> {
+    pub(super) fn end(&self, py: Python<'_>) -> PyResult<()> {
         if self.is_foreign() {
             return Ok(());
         }
@@ -289,12 +289,12 @@ impl Worker {
     }
 
     /// Returns `true` if another process owns the connection.
-    pub fn is_foreign(&self) -> bool {
+    pub(super) fn is_foreign(&self) -> bool {
         self.process != std::process::id()
     }
 
     /// Returns `true` if the connection takes no more requests.
-    pub fn is_closed(&self) -> bool {
+    pub(super) fn is_closed(&self) -> bool {
         self.is_foreign() || self.shared.is_gone() || self.shared.has_ended()
     }
 }

@@ -26,7 +26,7 @@ const IDLE: Duration = Duration::from_millis(10);
 const BEHIND: Duration = Duration::from_millis(100);
 
 /// A simulated controller with its arm.
-pub struct Simulated {
+pub(crate) struct Simulated {
     pub seed: u64,
     /// Speed, times real time. `None`: as fast as possible, and time passes only while a caller waits.
     pub speed: Option<f64>,
@@ -36,7 +36,7 @@ pub struct Simulated {
 }
 
 /// Kind of connection.
-pub enum Way {
+pub(crate) enum Way {
     Simulated(Box<Simulated>),
     /// A serial port and its rate, or the agent that owns it.
     Serial {
@@ -50,7 +50,7 @@ pub enum Way {
 }
 
 /// Target and credentials of a connection.
-pub struct Target {
+pub(crate) struct Target {
     pub way: Way,
     /// Arm that the caller gave.
     pub arm: Option<Arc<Arm>>,
@@ -61,7 +61,7 @@ pub struct Target {
 }
 
 /// State of the worker.
-pub struct WorkerState {
+pub(crate) struct WorkerState {
     pub session: Session<AnyPort>,
     /// Arm that the caller gave, or else the built-in arm. For a controller with extensions, the controller's own arm
     /// is used.
@@ -78,7 +78,7 @@ pub struct WorkerState {
 
 impl WorkerState {
     /// Connects. A simulator receives its parameters and holds its arm.
-    pub fn open(target: Target, shared: Arc<Shared>, asked: &Asked) -> Result<Self, Failure> {
+    pub(crate) fn open(target: Target, shared: Arc<Shared>, asked: &Asked) -> Result<Self, Failure> {
         let arm = target.arm.clone().unwrap_or_else(|| Arc::new(Arm::avena()));
         let (tape, pace) = (Rc::<Tape>::default(), Rc::<Cell<Option<f64>>>::default());
         let (port, speed, stored) = match target.way {
@@ -119,13 +119,13 @@ impl WorkerState {
     }
 
     /// Returns the name of the port.
-    pub fn port_name(&self) -> String {
+    pub(crate) fn port_name(&self) -> String {
         self.session.port().name()
     }
 
     /// Begins a job. Frames that move the arm are sent until the next Stop. A late answer to an earlier Stop is not taken for an
     /// answer to this job.
-    pub fn begin(&mut self, asked: &Asked) -> Result<(), Failure> {
+    pub(crate) fn begin(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.session.port_mut().begin(asked.at());
         if let Some(time) = self.session.port().unsettled() {
             self.session.pass(time)?;
@@ -134,12 +134,12 @@ impl WorkerState {
     }
 
     /// Returns `true` if time passes by itself, so that statuses arrive without a job.
-    pub fn time_passes(&self) -> bool {
+    pub(crate) fn time_passes(&self) -> bool {
         self.time_passes
     }
 
     /// Reads statuses while no job waits. The next job reports a lost line.
-    pub fn idle(&mut self) {
+    pub(crate) fn idle(&mut self) {
         match self.session.poll(IDLE) {
             Ok(_) => {}
             Err(_) => std::thread::sleep(IDLE),
@@ -148,7 +148,7 @@ impl WorkerState {
 
     /// Returns the controller's arm. If the controller cannot report it, returns the arm of the caller, or the built-in
     /// arm.
-    pub fn device_arm(&mut self) -> Result<Arm, Failure> {
+    pub(crate) fn device_arm(&mut self) -> Result<Arm, Failure> {
         let mut arm = match self.session.info()? {
             None => return Ok((*self.arm).clone()),
             Some(info) if self.arm.hash().ok().flatten() == Some(info.hash) => return Ok((*self.arm).clone()),
@@ -160,7 +160,7 @@ impl WorkerState {
     }
 
     /// Like [`Self::device_arm`], for motions: returns an error if the caller's arm differs from the controller's.
-    pub fn arm_to_move(&mut self) -> Result<Arm, Failure> {
+    pub(crate) fn arm_to_move(&mut self) -> Result<Arm, Failure> {
         let arm = self.device_arm()?;
         let differences = if self.named { self.arm.differences(&arm) } else { Vec::new() };
         let Some(first) = differences.first() else { return Ok(arm) };
@@ -178,7 +178,7 @@ impl WorkerState {
     }
 
     /// Returns an error if the caller's arm differs from the controller's.
-    pub fn same_arm(&mut self) -> Result<(), Failure> {
+    pub(crate) fn same_arm(&mut self) -> Result<(), Failure> {
         if self.named { self.arm_to_move().map(drop) } else { Ok(()) }
     }
 }
@@ -255,7 +255,7 @@ fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failu
 }
 
 /// Publishes every status of the session from now on, in all procedures.
-pub fn observe(session: &mut Session<AnyPort>, shared: &Arc<Shared>) {
+pub(crate) fn observe(session: &mut Session<AnyPort>, shared: &Arc<Shared>) {
     let shared = Arc::clone(shared);
     session.observe(move |_, status| shared.publish(status));
 }

@@ -12,7 +12,7 @@ use crate::error::Failure;
 
 /// Alarms that are not reported yet: boards that were lost or have left their control loops, and other failures.
 #[derive(Default)]
-pub struct Alarms(Mutex<Waiting>);
+pub(super) struct Alarms(Mutex<Waiting>);
 
 #[derive(Default)]
 struct Waiting {
@@ -26,7 +26,7 @@ struct Waiting {
 impl Alarms {
     /// Notes a change of a board. `runs`: this session has started the control loop of the board. `master`: this session has started an
     /// application.
-    pub fn changed(&self, change: Change, board: u8, (runs, master): (bool, bool)) {
+    pub(super) fn changed(&self, change: Change, board: u8, (runs, master): (bool, bool)) {
         let mut waiting = lock(&self.0);
         match change {
             Change::Lost if master => waiting.lost.push(board),
@@ -37,7 +37,7 @@ impl Alarms {
     }
 
     /// Notes that another board has the same number as a running board, so that a command moves both boards.
-    pub fn number_shared(&self, board: u8, found: &[u16]) {
+    pub(super) fn number_shared(&self, board: u8, found: &[u16]) {
         let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
         let mut own = Failure::from(SessionError::from(Error::from(error)));
         // A conflict that is found while the board runs is a fault, not a refusal.
@@ -46,13 +46,13 @@ impl Alarms {
     }
 
     /// Adds a failure that is reported unchanged.
-    pub fn add(&self, failure: Failure) {
+    pub(super) fn add(&self, failure: Failure) {
         lock(&self.0).others.push_back(failure);
     }
 
     /// Reports lost boards, and boards that have left their control loops, once. Later calls report the other failures
     /// one after the other.
-    pub fn check(&self) -> Result<(), Failure> {
+    pub(super) fn check(&self) -> Result<(), Failure> {
         let (lost, rebooted, left) = {
             let mut waiting = lock(&self.0);
             let Waiting { lost, rebooted, left, .. } = &mut *waiting;

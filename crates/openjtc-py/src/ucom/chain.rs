@@ -34,7 +34,7 @@ type Day = (u16, u8, u8);
 
 /// A chain of boards on a bus.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct Chain {
+pub(super) struct Chain {
     pub owner: Owner,
     url: String,
     profile: ucom::Profile,

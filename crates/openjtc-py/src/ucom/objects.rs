@@ -9,7 +9,7 @@ use ucom_host::master::{BoardSeen, Master, state_name};
 use ucom_host::session::{Known, name_of};
 
 /// Converts a board with its answer to PC_INFO.
-pub fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: Option<&Inventory>) -> Value {
+pub(super) fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: Option<&Inventory>) -> Value {
     let application = info.has_application();
     let status: Vec<&str> =
         Status::NAMES.iter().filter(|(_, bit)| info.status.has(*bit)).map(|(name, _)| *name).collect();
@@ -26,24 +26,24 @@ pub fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: Option<&
 }
 
 /// Like [`info`], with its description.
-pub fn board(seen: &BoardSeen, profile: &Profile, inventory: Option<&Inventory>) -> Value {
+pub(super) fn board(seen: &BoardSeen, profile: &Profile, inventory: Option<&Inventory>) -> Value {
     let mut value = info(seen.number, &seen.info, profile, inventory);
     value["description"] = json!(seen.description.as_deref().unwrap_or_default());
     value
 }
 
 /// Converts several boards.
-pub fn boards(seen: &[BoardSeen], profile: &Profile, inventory: Option<&Inventory>) -> Value {
+pub(super) fn boards(seen: &[BoardSeen], profile: &Profile, inventory: Option<&Inventory>) -> Value {
     seen.iter().map(|one| board(one, profile, inventory)).collect()
 }
 
 /// Returns findings in words. Commands in them are written as a user types them.
-pub fn texts(findings: &[impl ToString]) -> Vec<String> {
+pub(super) fn texts(findings: &[impl ToString]) -> Vec<String> {
     findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
 }
 
 /// Converts all kinds of signals of a board.
-pub fn signals(known: &Known) -> Value {
+pub(super) fn signals(known: &Known) -> Value {
     let of = |kind: Kind| -> Value {
         let pairs = known.names.names(kind).iter().zip(known.signals.all(kind)).enumerate();
         pairs.map(|(index, (text, one))| signal(index, text, one)).collect()
@@ -80,7 +80,7 @@ fn signal(index: usize, text: &str, signal: &Signal) -> Value {
 }
 
 /// Converts words of a buffer to pairs of name and value, in the order of the buffer. null: the value is not known.
-pub fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
+pub(super) fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     let pair = |(index, key): (usize, String)| {
         let word = words.get(index).copied().flatten();
         let signal = known.signals.get(kind, index);
@@ -90,13 +90,13 @@ pub fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
 }
 
 /// Like [`named`], for outputs whose words are all known.
-pub fn outputs(known: &Known, words: &[u16]) -> Value {
+pub(super) fn outputs(known: &Known, words: &[u16]) -> Value {
     named(known, Kind::So, &words.iter().copied().map(Some).collect::<Vec<_>>())
 }
 
 /// Returns the inputs that were set last, or else the initial inputs of the board, and the parameters that this session
 /// has written.
-pub fn settings(known: &Known, master: &Master) -> (Value, Value) {
+pub(super) fn settings(known: &Known, master: &Master) -> (Value, Value) {
     let parameter = |value: &ParValue| match value {
         ParValue::Assumed(word) => Some(*word),
         ParValue::Unknown => None,

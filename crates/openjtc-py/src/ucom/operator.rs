@@ -19,7 +19,7 @@ struct Local {
 }
 
 /// Operator of the session.
-pub struct Hand {
+pub(super) struct Hand {
     shared: Arc<Shared>,
     held: Rc<RefCell<Held>>,
     local: RefCell<Local>,
@@ -27,12 +27,12 @@ pub struct Hand {
 
 impl Hand {
     /// Makes the operator of a session.
-    pub fn new(shared: Arc<Shared>, held: Rc<RefCell<Held>>) -> Self {
+    pub(super) fn new(shared: Arc<Shared>, held: Rc<RefCell<Held>>) -> Self {
         Self { shared, held, local: RefCell::default() }
     }
 
     /// Reports a change of a running board: an event, and an alarm if the board was lost or left its loop by itself.
-    pub fn noticed(shared: &Shared, held: &Held, notice: &Notice, text: Option<&String>) {
+    pub(super) fn noticed(shared: &Shared, held: &Held, notice: &Notice, text: Option<&String>) {
         let Notice { board, change, time_s, .. } = *notice;
         let text = notice.text().or_else(|| text.cloned());
         let text = text.unwrap_or_else(|| format!("board {board}: {}", change.name()));

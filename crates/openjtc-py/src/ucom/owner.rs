@@ -16,7 +16,7 @@ use crate::error::Failure;
 use crate::json;
 
 /// Interval of the checks for signals (Ctrl-C) while Python waits.
-pub const LOOK: Duration = Duration::from_millis(50);
+pub(super) const LOOK: Duration = Duration::from_millis(50);
 
 /// Message to a waiting call.
 enum Message<T> {
@@ -28,7 +28,7 @@ enum Message<T> {
 type Answers<T> = Mutex<mpsc::Receiver<Message<T>>>;
 
 /// Handle of the thread that owns a session.
-pub struct Owner {
+pub(super) struct Owner {
     pub shared: Arc<Shared>,
     thread: Mutex<Option<JoinHandle<()>>>,
     process: Process,
@@ -36,7 +36,7 @@ pub struct Owner {
 
 impl Owner {
     /// Starts the thread on an open bus.
-    pub fn new(config: Config, link: Link) -> Self {
+    pub(super) fn new(config: Config, link: Link) -> Self {
         let shared = Arc::new(Shared::default());
         let own = shared.clone();
         let thread = std::thread::spawn(move || {
@@ -60,7 +60,7 @@ impl Owner {
 
     /// Sends a request and waits for its result without the GIL. Ctrl-C cancels the request, and stops everything that this session has
     /// started.
-    pub fn call<T: Send + 'static>(
+    pub(super) fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
         act: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
@@ -70,7 +70,7 @@ impl Owner {
     }
 
     /// Like [`Self::call`], for a request that was made after the Stop with this number: see [`Self::now`].
-    pub fn call_after<T: Send + 'static>(
+    pub(super) fn call_after<T: Send + 'static>(
         &self,
         py: Python<'_>,
         after: u64,
@@ -81,14 +81,14 @@ impl Owner {
 
     /// Returns the number of the last Stop. A method that reads files before its request takes the number first, so that a Stop in that
     /// time is not overlooked.
-    pub fn now(&self) -> Result<u64, Failure> {
+    pub(super) fn now(&self) -> Result<u64, Failure> {
         // In a forked process the lock of the queue may be held for ever.
         self.is_here()?;
         Ok(self.shared.queue.stops())
     }
 
     /// Like [`Self::call_after`]; `progress` is called with each report.
-    pub fn call_with<T: Send + 'static>(
+    pub(super) fn call_with<T: Send + 'static>(
         &self,
         py: Python<'_>,
         (kind, after): (Kind, u64),
@@ -129,7 +129,7 @@ impl Owner {
 
     /// After a Ctrl-C, stops everything that this session has started, and waits for the end of the stop. Another Ctrl-C
     /// only ends the wait.
-    pub fn interrupted(&self, py: Python<'_>) {
+    pub(super) fn interrupted(&self, py: Python<'_>) {
         if !self.process.is_this() {
             return;
         }
@@ -145,7 +145,7 @@ impl Owner {
     }
 
     /// Stops boards at once, in the middle of any request, then runs `act`.
-    pub fn stop<T: Send + 'static>(
+    pub(super) fn stop<T: Send + 'static>(
         &self,
         py: Python<'_>,
         halt: Halt,
@@ -221,7 +221,7 @@ impl Owner {
     }
 
     /// Stops everything that this session has started, and releases the bus. Returns the boards whose stop is not certain.
-    pub fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+    pub(super) fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         if !self.process.is_this() {
             // A forked process does not have the thread, and the boards belong to its parent.
             return Ok(Vec::new());

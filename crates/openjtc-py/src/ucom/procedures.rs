@@ -23,7 +23,7 @@ use crate::error::Failure;
 const LISTEN: Duration = Duration::from_millis(1500);
 
 /// Returns the profile in a file, or the default profile. `on_lost` replaces the reaction to a lost board.
-pub fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Failure> {
+pub(super) fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Failure> {
     let mut profile = match path {
         None => Profile::default(),
         Some(path) => {
@@ -54,7 +54,7 @@ fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &'stati
 }
 
 /// Queries all boards, without changing anything.
-pub fn scan(state: &mut WorkerState) -> Result<Value, Failure> {
+pub(super) fn scan(state: &mut WorkerState) -> Result<Value, Failure> {
     let report = match state.driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
         other => return Err(SessionError::from(other).into()),
@@ -73,7 +73,7 @@ pub fn scan(state: &mut WorkerState) -> Result<Value, Failure> {
 
 /// Resets and numbers the whole chain. `listed` is the present content of the inventory file. Returns the new inventory to the caller, who
 /// writes it, because a slow disk would delay the heartbeats here.
-pub fn init(
+pub(super) fn init(
     state: &mut WorkerState,
     listed: Option<Inventory>,
     (renew, force, check): (bool, bool, bool),
@@ -110,7 +110,7 @@ pub fn init(
 }
 
 /// Reads the reports of boards about themselves.
-pub fn info(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
+pub(super) fn info(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
     let mut all = Vec::new();
     for board in state.driver.numbers(boards)? {
         all.push(state.driver.seen(board)?);
@@ -120,7 +120,7 @@ pub fn info(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> 
 }
 
 /// Converts boards with their status.
-pub fn numbered(state: &WorkerState, all: &[Numbered]) -> Value {
+pub(super) fn numbered(state: &WorkerState, all: &[Numbered]) -> Value {
     let profile = state.driver.master.profile();
     all.iter().map(|(n, info)| objects::info(*n, info, &profile, state.inventory.as_ref())).collect()
 }
@@ -137,7 +137,7 @@ fn bits(names: &[String]) -> Result<Status, Failure> {
 }
 
 /// Sets and clears status bits, then returns the status.
-pub fn status(
+pub(super) fn status(
     state: &mut WorkerState,
     boards: &Boards,
     (set, clear): (&[String], &[String]),
@@ -175,7 +175,7 @@ pub fn status(
 }
 
 /// Resets boards into the exloader with programming enabled (PC_XRESET).
-pub fn xreset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
+pub(super) fn xreset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let all = state.driver.change_each(&numbers, |board| Request::XReset { board, force })?;
     numbers.iter().for_each(|board| state.forget(*board));
@@ -184,7 +184,7 @@ pub fn xreset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<V
 
 /// Resets boards (PC_RESET), all at once or one by one. Returns the low bytes of the flash numbers of the boards that
 /// have reported.
-pub fn reset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
+pub(super) fn reset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
     let targets: Vec<Option<u8>> = match boards {
         Boards::All => vec![None],
         Boards::None => Vec::new(),
@@ -212,7 +212,7 @@ pub fn reset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Ve
 }
 
 /// Restores the number of one board.
-pub fn repair(
+pub(super) fn repair(
     state: &mut WorkerState,
     board: u8,
     flash_number: Option<u16>,
@@ -233,7 +233,7 @@ pub fn repair(
 }
 
 /// Listens, sends queries if they cannot do harm, and reports the findings.
-pub fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
+pub(super) fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
     let seen = state.driver.examine(LISTEN)?;
     let profile = state.driver.master.profile();
     Ok(json!({
@@ -244,13 +244,13 @@ pub fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
 }
 
 /// Reads the image of a board's application, with the same bytes that were sent to the board.
-pub fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
+pub(super) fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
     let image = Image::read(path, &ImageOptions::default()).map_err(|e| Failure::usage(e.to_string()))?;
     Ok(image.into_bytes().into())
 }
 
 /// Measures how boards interpret the protocol.
-pub fn probe(state: &mut WorkerState, options: ProbeOptions) -> Result<Value, Failure> {
+pub(super) fn probe(state: &mut WorkerState, options: ProbeOptions) -> Result<Value, Failure> {
     let init = options.init;
     let outcome = state.driver.run(Request::Probe(options));
     if init {
@@ -273,7 +273,7 @@ pub fn probe(state: &mut WorkerState, options: ProbeOptions) -> Result<Value, Fa
 }
 
 /// Tests boards against the protocol.
-pub fn conformance(
+pub(super) fn conformance(
     state: &mut WorkerState,
     boards: &Boards,
     (init, run, force): (bool, bool, bool),

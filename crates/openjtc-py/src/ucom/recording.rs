@@ -23,7 +23,7 @@ struct Taken(u64, u64, CanFrame);
 
 /// Destination of frames during a recording.
 #[derive(Clone, Default)]
-pub struct Sink(Arc<Mutex<Option<Sender<Taken>>>>);
+pub(super) struct Sink(Arc<Mutex<Option<Sender<Taken>>>>);
 
 impl Sink {
     fn is_taken(&self) -> bool {
@@ -36,7 +36,7 @@ impl Sink {
 }
 
 /// Wrapper of a bus that copies frames to a recording. Its waits are short.
-pub struct Tap {
+pub(super) struct Tap {
     bus: Prompt,
     sink: Sink,
     start: Instant,
@@ -47,7 +47,7 @@ pub struct Tap {
 
 impl Tap {
     /// Wraps an open bus.
-    pub fn new(bus: Box<dyn CanBus + Send>, sink: Sink) -> Self {
+    pub(super) fn new(bus: Box<dyn CanBus + Send>, sink: Sink) -> Self {
         Self { bus: Prompt(bus), sink, start: Instant::now(), began_at: host_kit::unix_time() }
     }
 
@@ -91,7 +91,7 @@ type Written = Result<(u64, u64), RecordingError>;
 
 /// A recording that is being written.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct ChainRecording {
+pub(super) struct ChainRecording {
     sink: Sink,
     writer: Mutex<Option<JoinHandle<Written>>>,
     process: Process,
@@ -99,7 +99,7 @@ pub struct ChainRecording {
 
 impl ChainRecording {
     /// Begins a recording. The file ending selects its format.
-    pub fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
+    pub(super) fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
         if let Some(other) = ending.filter(|e| !known.contains(&e.as_str())) {

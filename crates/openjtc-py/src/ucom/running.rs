@@ -11,7 +11,7 @@ use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Starts applications, without any movement.
-pub fn start(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
+pub(super) fn start(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let all = state.starting(&numbers, |state| {
         state.driver.change_each(&numbers, |board| Request::Start { board, force })
@@ -22,7 +22,7 @@ pub fn start(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Va
 }
 
 /// Boards to run, with their values and options.
-pub struct Run {
+pub(super) struct Run {
     pub boards: Boards,
     pub active: bool,
     pub inputs: Vec<Assignment>,
@@ -33,7 +33,7 @@ pub struct Run {
 }
 
 /// Starts applications and control loops, with their values.
-pub fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failure> {
+pub(super) fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
@@ -98,7 +98,7 @@ fn begin(
 
 /// Enables the outputs of running boards, or makes them safe. The command for safe outputs is sent to each board, even if
 /// another board fails.
-pub fn outputs(state: &mut WorkerState, boards: &Boards, active: bool) -> Result<(), Failure> {
+pub(super) fn outputs(state: &mut WorkerState, boards: &Boards, active: bool) -> Result<(), Failure> {
     let numbers = match boards {
         Boards::All => state.held.borrow().running().iter().copied().collect(),
         boards => state.driver.numbers(boards)?,
@@ -129,7 +129,7 @@ fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failur
 }
 
 /// Stops each selected board; `all` means boards that answer and boards that this session has started.
-pub fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
+pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
     let was_master = state.driver.master.is_master();
     let wanted = match boards {
         Boards::All => {

@@ -19,7 +19,7 @@ const SILENCE: Duration = Duration::from_secs(3);
 
 /// Reader of the outputs of boards, one set after the other.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct ChainSamples {
+pub(super) struct ChainSamples {
     pub chain: Py<Chain>,
     pub listener: Arc<Listener>,
 }

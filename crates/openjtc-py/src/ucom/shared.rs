@@ -21,10 +21,10 @@ const EVENTS_MAX: usize = 4096;
 const SAMPLES_MAX: usize = 65_536;
 
 /// Kind of events with the result of an update for a board.
-pub const UPDATED: &str = "updated";
+pub(super) const UPDATED: &str = "updated";
 
 /// Control loops that must end before any other frame is sent.
-pub enum Halt {
+pub(super) enum Halt {
     All,
     Boards(Vec<u8>),
     /// Control loops of the boards that this session has started.
@@ -32,13 +32,13 @@ pub enum Halt {
 }
 
 /// All outputs of a board at one time.
-pub struct Sample {
+pub(super) struct Sample {
     pub known: Arc<Known>,
     pub snapshot: Snapshot,
 }
 
 /// Reader of samples.
-pub struct Listener {
+pub(super) struct Listener {
     /// Boards whose samples are read.
     pub boards: BTreeSet<u8>,
     /// Waiting samples, and number of dropped samples.
@@ -47,26 +47,26 @@ pub struct Listener {
 }
 
 impl Listener {
-    pub fn new(boards: BTreeSet<u8>) -> Self {
+    pub(super) fn new(boards: BTreeSet<u8>) -> Self {
         Self { boards, waiting: Mutex::default(), arrived: Condvar::new() }
     }
 
     /// Returns the next sample; waits at most `patience`.
-    pub fn next(&self, patience: Duration) -> Option<Sample> {
+    pub(super) fn next(&self, patience: Duration) -> Option<Sample> {
         let waiting = lock(&self.waiting);
         let waited = self.arrived.wait_timeout_while(waiting, patience, |(samples, _)| samples.is_empty());
         waited.unwrap_or_else(PoisonError::into_inner).0.0.pop_front()
     }
 
     /// Returns the number of samples that were dropped because the reader was too slow.
-    pub fn dropped(&self) -> u64 {
+    pub(super) fn dropped(&self) -> u64 {
         lock(&self.waiting).1
     }
 }
 
 /// State that the thread shares with its callers.
 #[derive(Default)]
-pub struct Shared {
+pub(super) struct Shared {
     /// Requests to the thread, each with its number.
     pub queue: Queue<WorkerState, u64>,
     /// Reason why the queue is closed.
@@ -86,12 +86,12 @@ pub struct Shared {
 }
 
 /// Locks a mutex, even after a panic of a thread, because the data is never left half changed.
-pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Makes a failure of the session itself.
-pub fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &'static str) -> Failure {
+pub(super) fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &'static str) -> Failure {
     Failure::new(kind, code, message).next(next)
 }
 
@@ -100,78 +100,78 @@ fn stopped() -> Failure {
 }
 
 /// Process that created an object. A forked child has the memory of its parent, but none of its threads.
-pub struct Process(u32);
+pub(super) struct Process(u32);
 
 impl Process {
     /// Returns the present process.
-    pub fn this() -> Self {
+    pub(super) fn this() -> Self {
         Self(std::process::id())
     }
 
     /// Returns `true` in the process that created the object.
-    pub fn is_this(&self) -> bool {
+    pub(super) fn is_this(&self) -> bool {
         self.0 == std::process::id()
     }
 }
 
 /// Returns the failure for a fault of the chain's thread.
-pub fn fault() -> Failure {
+pub(super) fn fault() -> Failure {
     failure(ErrorKind::Fault, "fault", "internal error of the chain's thread", "connect again")
 }
 
 impl Shared {
     /// Returns `true` if the running request is cancelled or the session ends.
-    pub fn is_cancelled(&self) -> bool {
+    pub(super) fn is_cancelled(&self) -> bool {
         self.has_ended() || self.queue.is_cancelled()
     }
 
     /// Returns a number for the next request.
-    pub fn next_id(&self) -> u64 {
+    pub(super) fn next_id(&self) -> u64 {
         self.next_id.fetch_add(1, Ordering::Relaxed)
     }
 
     /// Ends the session.
-    pub fn end(&self) {
+    pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
 
     /// Requests that control loops end before any other frame is sent.
-    pub fn halt(&self, halt: Halt) {
+    pub(super) fn halt(&self, halt: Halt) {
         lock(&self.halts).push(halt);
     }
 
     /// Sets the boards that the session has started.
-    pub fn has_started(&self, boards: Vec<u8>) {
+    pub(super) fn has_started(&self, boards: Vec<u8>) {
         *lock(&self.started) = boards;
     }
 
     /// Reports all started boards as not stopped, after a fault of the thread.
-    pub fn all_left(&self) {
+    pub(super) fn all_left(&self) {
         self.left(std::mem::take(&mut *lock(&self.started)));
     }
 
     /// Sets the boards whose stop is not certain at the end of the session.
-    pub fn left(&self, boards: Vec<u8>) {
+    pub(super) fn left(&self, boards: Vec<u8>) {
         *lock(&self.not_stopped) = boards;
     }
 
     /// Takes the boards whose stop is not certain.
-    pub fn take_left(&self) -> Vec<u8> {
+    pub(super) fn take_left(&self) -> Vec<u8> {
         std::mem::take(&mut *lock(&self.not_stopped))
     }
 
     /// Returns `true` after [`Self::end`].
-    pub fn has_ended(&self) -> bool {
+    pub(super) fn has_ended(&self) -> bool {
         self.ended.load(Ordering::Relaxed)
     }
 
     /// Takes the control loops that must end now.
-    pub fn halts(&self) -> Vec<Halt> {
+    pub(super) fn halts(&self) -> Vec<Halt> {
         std::mem::take(&mut *lock(&self.halts))
     }
 
     /// Adds an event.
-    pub fn event(&self, time_s: f64, kind: &str, board: Option<u8>, text: String) {
+    pub(super) fn event(&self, time_s: f64, kind: &str, board: Option<u8>, text: String) {
         let mut events = lock(&self.events);
         events.0 += 1;
         let number = events.0;
@@ -185,38 +185,38 @@ impl Shared {
     }
 
     /// Returns the number of the last event.
-    pub fn last_event(&self) -> u64 {
+    pub(super) fn last_event(&self) -> u64 {
         lock(&self.events).0
     }
 
     /// Returns events with higher numbers, oldest first.
-    pub fn events(&self, after: u64) -> Value {
+    pub(super) fn events(&self, after: u64) -> Value {
         self.asked();
         let events = lock(&self.events);
         events.1.iter().filter(|event| event["number"].as_u64() > Some(after)).cloned().collect()
     }
 
     /// Returns the results of updates since this event.
-    pub fn outcomes(&self, after: u64) -> Vec<String> {
+    pub(super) fn outcomes(&self, after: u64) -> Vec<String> {
         let events = self.events(after);
         let of_updates = events.as_array().into_iter().flatten().filter(|event| event["kind"] == UPDATED);
         of_updates.filter_map(|event| Some(event["text"].as_str()?.to_owned())).collect()
     }
 
     /// Stores the last known state of the bus.
-    pub fn seen(&self, value: Value) {
+    pub(super) fn seen(&self, value: Value) {
         *lock(&self.seen) = value;
     }
 
     /// Returns load and frame counts of the bus.
-    pub fn bus(&self) -> Value {
+    pub(super) fn bus(&self) -> Value {
         self.asked();
         lock(&self.seen).clone()
     }
 
     /// Reports that running boards were stopped because no call came within the deadline. `not_stopped` lists the boards whose stop is
     /// not certain.
-    pub fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
+    pub(super) fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
         let mut text =
             format!("no call was made to the chain for {} s: its boards are stopped", deadline.as_secs_f64());
         if !not_stopped.is_empty() {
@@ -229,23 +229,23 @@ impl Shared {
     }
 
     /// Restarts the deadline. Called at a request, and after the end of a request.
-    pub fn asked(&self) {
+    pub(super) fn asked(&self) {
         *lock(&self.asked_at) = Some(Instant::now());
     }
 
     /// Returns the time since the last request.
-    pub fn silence(&self) -> Duration {
+    pub(super) fn silence(&self) -> Duration {
         lock(&self.asked_at).map_or(Duration::ZERO, |at| at.elapsed())
     }
 
     /// Returns each waiting alarm as an error, once.
-    pub fn check(&self) -> Result<(), Failure> {
+    pub(super) fn check(&self) -> Result<(), Failure> {
         self.asked();
         self.alarms.check()
     }
 
     /// Passes a snapshot to its readers.
-    pub fn sampled(&self, known: &Arc<Known>, snapshot: &Snapshot) {
+    pub(super) fn sampled(&self, known: &Arc<Known>, snapshot: &Snapshot) {
         lock(&self.listeners).retain(|listener| {
             let Some(listener) = listener.upgrade() else { return false };
             if listener.boards.contains(&known.board) {
@@ -262,12 +262,12 @@ impl Shared {
     }
 
     /// Adds a reader of samples.
-    pub fn listen(&self, listener: &Arc<Listener>) {
+    pub(super) fn listen(&self, listener: &Arc<Listener>) {
         lock(&self.listeners).push(Arc::downgrade(listener));
     }
 
     /// Takes the next request and runs it.
-    pub fn take(&self, state: &mut WorkerState) -> bool {
+    pub(super) fn take(&self, state: &mut WorkerState) -> bool {
         let Some(turn) = self.queue.take() else { return false };
         state.quiet();
         turn.run(state);
@@ -277,18 +277,18 @@ impl Shared {
     }
 
     /// Returns the reason why the queue is closed. `None`: the queue is open.
-    pub fn gone(&self) -> Option<Failure> {
+    pub(super) fn gone(&self) -> Option<Failure> {
         lock(&self.closed).clone()
     }
 
     /// Closes the queue.
-    pub fn close(&self, why: Failure) {
+    pub(super) fn close(&self, why: Failure) {
         lock(&self.closed).get_or_insert(why);
         self.queue.close();
     }
 
     /// Returns the failure of a request that was not executed.
-    pub fn refusal(&self, refused: Refused) -> Failure {
+    pub(super) fn refusal(&self, refused: Refused) -> Failure {
         match refused {
             Refused::Stopped | Refused::Cancelled => stopped(),
             Refused::Closed => self.gone().unwrap_or_else(fault),

@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// Options of a simulation.
 #[derive(Default)]
-pub struct Simulation {
+pub(super) struct Simulation {
     pub profile: Profile,
     pub chain: Option<PathBuf>,
     pub boards: Option<u8>,
@@ -28,7 +28,7 @@ pub struct Simulation {
 }
 
 /// Simulated chain that runs in a thread until its last owner is dropped.
-pub struct Simulated {
+pub(super) struct Simulated {
     url: String,
     boards: usize,
     faults: Mutex<Sender<String>>,
@@ -39,7 +39,7 @@ pub struct Simulated {
 
 impl Simulated {
     /// Starts the chain at a free port of this computer.
-    pub fn start(simulation: Simulation) -> Result<Self, Failure> {
+    pub(super) fn start(simulation: Simulation) -> Result<Self, Failure> {
         let Simulation { profile, chain, boards, faults, seed } = simulation;
         let config = match &chain {
             Some(path) => ChainConfig::read(path, &profile).map_err(|e| {
@@ -87,7 +87,7 @@ impl Simulated {
     }
 
     /// Returns the URL of its bus.
-    pub fn url(&self) -> &str {
+    pub(super) fn url(&self) -> &str {
         &self.url
     }
 
@@ -110,7 +110,7 @@ impl Drop for Simulated {
 
 /// A simulated chain.
 #[pyclass(frozen, module = "openjtc._native")]
-pub struct SimulatedChain {
+pub(super) struct SimulatedChain {
     pub inner: Arc<Simulated>,
 }
 

@@ -20,13 +20,13 @@ use super::worker_state::WorkerState;
 use crate::error::Failure;
 
 /// Source of an image.
-pub enum Source {
+pub(super) enum Source {
     File(PathBuf),
     Bytes(Vec<u8>),
 }
 
 /// Options for reading images.
-pub struct Read {
+pub(super) struct Read {
     pub raw: bool,
     pub addresses: Option<String>,
     pub fill_gaps: bool,
@@ -37,7 +37,7 @@ pub struct Read {
 }
 
 /// Update job: boards, image and options.
-pub struct Update {
+pub(super) struct Update {
     pub boards: Boards,
     pub image: UpdateImage,
     pub second: Option<UpdateImage>,
@@ -59,7 +59,7 @@ pub struct Update {
 
 impl Read {
     /// Reads the image, or the images of both cycles if there are two, and the flash date in the format of the profile.
-    pub fn read(
+    pub(super) fn read(
         &self,
         first: &Source,
         second: Option<&Source>,
@@ -189,7 +189,11 @@ fn numbers(state: &mut WorkerState, boards: &Boards) -> Result<Vec<u8>, Failure>
 }
 
 /// Programs the selected boards; `report` receives the progress.
-pub fn update(state: &mut WorkerState, update: Update, report: &dyn Fn(Value)) -> Result<Value, Failure> {
+pub(super) fn update(
+    state: &mut WorkerState,
+    update: Update,
+    report: &dyn Fn(Value),
+) -> Result<Value, Failure> {
     let profile = state.driver.master.profile();
     let numbers = numbers(state, &update.boards)?;
     let targets = targets(state, &update, &numbers)?;

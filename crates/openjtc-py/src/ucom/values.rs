@@ -20,7 +20,7 @@ use crate::error::Failure;
 const OLD_US: u64 = 500_000;
 
 /// Returns the signals of boards.
-pub fn signals(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
+pub(super) fn signals(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let mut all = Vec::new();
     for board in numbers {
@@ -30,7 +30,7 @@ pub fn signals(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failur
 }
 
 /// Sets an input, or a parameter if no input has this name or `buffer` selects it. Returns the sent value in the signal's unit.
-pub fn set(
+pub(super) fn set(
     state: &mut WorkerState,
     board: u8,
     buffer: Option<Buffer>,
@@ -76,7 +76,7 @@ pub fn set(
 }
 
 /// Returns outputs with their age, inputs and parameters of boards. Queries unknown signal names.
-pub fn values(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
+pub(super) fn values(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let numbers = with_names(state, &numbers, *boards == Boards::All)?;
     numbers.into_iter().map(|board| of_board(state, board)).collect()
@@ -84,7 +84,11 @@ pub fn values(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure
 
 /// Returns the boards whose signal names are known, and caches the names. With `all`, skips boards whose applications are not started.
 /// Returns an error if no board is left.
-pub fn with_names(state: &mut WorkerState, boards: &[u8], all: bool) -> Result<BTreeSet<u8>, SessionError> {
+pub(super) fn with_names(
+    state: &mut WorkerState,
+    boards: &[u8],
+    all: bool,
+) -> Result<BTreeSet<u8>, SessionError> {
     let (mut named, mut idle) = (BTreeSet::new(), None);
     for board in boards {
         match state.known(*board) {
@@ -102,7 +106,7 @@ pub fn with_names(state: &mut WorkerState, boards: &[u8], all: bool) -> Result<B
 }
 
 /// Like [`values`], for running boards. Returns an error for outdated outputs.
-pub fn running(state: &mut WorkerState) -> Result<Value, Failure> {
+pub(super) fn running(state: &mut WorkerState) -> Result<Value, Failure> {
     let numbers: Vec<u8> = state.held.borrow().running().iter().copied().collect();
     let all = values(state, &Boards::Some(numbers))?;
     for one in all.as_array().into_iter().flatten().filter(|one| one["stale"] == json!(true)) {
@@ -144,7 +148,7 @@ fn of_board(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
 
 /// Returns a value by its name. This is an output of a board that sends outputs, else an input, else a parameter. Returns an error
 /// for an outdated output.
-pub fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Value, Failure> {
+pub(super) fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Value, Failure> {
     let known = state.known(board)?;
     let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
         .into_iter()
@@ -180,7 +184,7 @@ fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
 }
 
 /// Returns the text of a parameter file: the values written last, and all other names as comments.
-pub fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Result<String, Failure> {
+pub(super) fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Result<String, Failure> {
     let mut saved = Vec::new();
     for board in state.driver.numbers(boards)? {
         let known = state.known(board)?;
@@ -210,7 +214,7 @@ pub fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Result<Strin
 }
 
 /// Checks a whole parameter file against the boards, then writes its parameters. Returns their number.
-pub fn apply_parameters(
+pub(super) fn apply_parameters(
     state: &mut WorkerState,
     file: &ParameterFile,
     dry_run: bool,
@@ -235,7 +239,7 @@ pub fn apply_parameters(
 }
 
 /// Reads the initial inputs that a board requests.
-pub fn initial_inputs(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
+pub(super) fn initial_inputs(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
     let known = state.known(board)?;
     match state.driver.run(Request::InitialInputs { board })? {
         ucom_host::master::Outcome::InitialInputs { values, .. } => {

@@ -22,7 +22,7 @@ const TURN: Duration = Duration::from_millis(25);
 const FIRST_US: u64 = 500_000;
 
 /// Configuration of a session.
-pub struct Config {
+pub(super) struct Config {
     /// Profile of how boards interpret the protocol.
     pub profile: Profile,
     /// Meaning of the words of inputs, outputs and parameters.
@@ -40,7 +40,7 @@ pub struct Config {
 }
 
 /// Session with its inventory and records.
-pub struct WorkerState {
+pub(super) struct WorkerState {
     pub session: Session,
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
@@ -68,7 +68,7 @@ impl DerefMut for WorkerState {
 
 impl WorkerState {
     /// Opens a session on this link.
-    pub fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
+    pub(super) fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
         let Config { profile, signals, cache, inventory, inventory_file, deadline, simulated } = config;
         let held: Rc<RefCell<Held>> = Rc::default();
         let hand = Hand::new(shared.clone(), Rc::clone(&held));
@@ -80,7 +80,7 @@ impl WorkerState {
     }
 
     /// Runs requests until the bus is lost or the session ends.
-    pub fn serve(&mut self) -> Result<(), SessionError> {
+    pub(super) fn serve(&mut self) -> Result<(), SessionError> {
         let shared = self.shared.clone();
         while !shared.has_ended() {
             self.turn()?;
@@ -121,14 +121,14 @@ impl WorkerState {
     }
 
     /// Sends all frames of a request before the caller receives the result.
-    pub fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         // The next turn reports a lost bus.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }
 
     /// Waits at most 0.5 s for the first outputs of boards that were just started, so that their values are known.
-    pub fn first_outputs(&mut self, boards: &[u8]) -> Result<(), SessionError> {
+    pub(super) fn first_outputs(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let end_us = self.driver.now_us() + FIRST_US;
         let missing =
             |state: &Self| boards.iter().any(|board| !state.held.borrow().snapshots.contains_key(board));

@@ -30,7 +30,7 @@ pub(super) struct MotionWatch {
 
 impl MotionWatch {
     /// Checks a tick; `before` is the execution state of the tick before it.
-    pub fn check(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
+    pub(super) fn check(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         self.stop(moment, before)?;
         self.speed(moment)?;
         self.torque(moment)

@@ -33,7 +33,7 @@ pub(super) enum Act {
 
 impl Act {
     /// Acts before the step of tick `tick`, counted from 1.
-    pub fn before(self, operator: &mut Operator, tick: u64) {
+    pub(super) fn before(self, operator: &mut Operator, tick: u64) {
         let world = &mut operator.world;
         let trigger = Trigger::At(world.now_us() / 1000);
         let mut inject = |kind, ms| world.inject(Fault { kind, trigger, duration_ms: Some(ms) });
@@ -82,7 +82,7 @@ pub(super) struct Row {
 
 impl Row {
     /// Returns the text of a cell without a reaction; `None` if a reaction is expected.
-    pub fn quiet(&self, state: ControllerState) -> Option<String> {
+    pub(super) fn quiet(&self, state: ControllerState) -> Option<String> {
         match state {
             ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => {
                 self.held.map(|why| format!("continues: {why}"))

@@ -131,7 +131,7 @@ impl Block {
 }
 
 /// Returns the text of a console block with these steps.
-pub fn written(steps: &[Step]) -> String {
+pub(super) fn written(steps: &[Step]) -> String {
     let mut text = String::new();
     for step in steps {
         for (n, line) in step.command.lines().enumerate() {

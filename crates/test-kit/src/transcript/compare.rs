@@ -5,7 +5,7 @@ const LEFT_OUT: &str = "...";
 
 /// Returns `true` if the printed lines match the page, line by line; `...` stands for any number of lines. With
 /// `varying`, numbers are not compared, except those of joints and boards.
-pub fn same(shown: &[String], printed: &[String], varying: bool) -> bool {
+pub(super) fn same(shown: &[String], printed: &[String], varying: bool) -> bool {
     let prepared = |lines: &[String]| -> Vec<String> {
         let line = |line: &String| if varying { masked(line) } else { line.trim_end().to_owned() };
         let lines: Vec<String> = lines.iter().map(line).collect();

@@ -12,7 +12,7 @@ use crate::patience::Patience;
 const END: &str = "\u{1}end of the command ";
 
 /// A shell, or the program that has replaced it.
-pub struct Terminal {
+pub(super) struct Terminal {
     child: Child,
     stdin: ChildStdin,
     lines: Receiver<String>,
@@ -21,7 +21,7 @@ pub struct Terminal {
 impl Terminal {
     /// Starts a shell in this folder. Commands are searched in `programs` first; variables that begin with an element
     /// of `without` are removed.
-    pub fn new(folder: &Path, programs: &Path, without: &[&str]) -> Self {
+    pub(super) fn new(folder: &Path, programs: &Path, without: &[&str]) -> Self {
         let mut shell = Command::new("bash");
         shell.args(["--norc", "--noprofile"]).current_dir(folder);
         for (name, _) in std::env::vars().filter(|(name, _)| without.iter().any(|w| name.starts_with(w))) {
@@ -60,7 +60,7 @@ impl Terminal {
     ///
     /// # Panics
     /// If the command does not end.
-    pub fn run(&mut self, command: &str) -> (Vec<String>, i32) {
+    pub(super) fn run(&mut self, command: &str) -> (Vec<String>, i32) {
         // The command gets no stdin, or else it would read the line that is typed next. The subshell sets `$?` for
         // the next command.
         let typed = format!("{{ {command}\n}} < /dev/null\n__code=$?; echo \"{END}$__code\"; (exit $__code)");
@@ -80,22 +80,22 @@ impl Terminal {
     }
 
     /// Replaces the shell by a command, which keeps running.
-    pub fn start(&mut self, command: &str) {
+    pub(super) fn start(&mut self, command: &str) {
         self.type_line(&format!("exec {command}"));
     }
 
     /// Types a line.
-    pub fn type_line(&mut self, line: &str) {
+    pub(super) fn type_line(&mut self, line: &str) {
         writeln!(self.stdin, "{line}").expect("it reads what is typed");
     }
 
     /// Returns the next line; `None` if no line comes within this time, or at the end of the output.
-    pub fn line(&mut self, within: Duration) -> Option<String> {
+    pub(super) fn line(&mut self, within: Duration) -> Option<String> {
         self.lines.recv_timeout(within).ok()
     }
 
     /// Returns the lines up to and including the first that is `last`; all lines so far if none is.
-    pub fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
+    pub(super) fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
         let (mut patience, mut printed) = (Patience::begin(), Vec::new());
         while let Some(line) = patience.receive(&self.lines) {
             let ends = last(&line);
@@ -108,7 +108,7 @@ impl Terminal {
     }
 
     /// Sends Ctrl-C to the program that has replaced the shell.
-    pub fn interrupt(&self) {
+    pub(super) fn interrupt(&self) {
         Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().expect("kill");
     }
 }

@@ -35,7 +35,7 @@ pub(super) enum GivenValue {
 /// New value of an input or a parameter.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ValueRequest {
+pub(super) struct ValueRequest {
     /// New value.
     value: GivenValue,
 }
@@ -60,7 +60,7 @@ impl GivenValue {
 /// State of the outputs.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct OutputsRequest {
+pub(super) struct OutputsRequest {
     /// `true`: enable the outputs. The control loop of the board must run.
     active: bool,
 }
@@ -80,7 +80,7 @@ pub(super) enum Level {
 #[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
-pub struct StopRequest {
+pub(super) struct StopRequest {
     /// Extent; default: `application`.
     #[serde(default)]
     #[param(inline)]
@@ -89,7 +89,7 @@ pub struct StopRequest {
 
 /// Boards that reported after a reset.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ResetObject {
+pub(super) struct ResetObject {
     /// Low bytes of the flash numbers of these boards. The boards now have no board numbers: `POST /api/init` assigns new
     /// ones.
     reports: Vec<u8>,

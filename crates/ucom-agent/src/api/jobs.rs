@@ -68,7 +68,7 @@ pub(super) async fn scan(
 /// Expected board at a position of the chain.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ExpectedBoard {
+pub(super) struct ExpectedBoard {
     /// Position of the board in the chain. The board receives this number.
     board: u8,
     /// Flash number of the bootloader, which identifies the board.
@@ -78,7 +78,7 @@ pub struct ExpectedBoard {
 /// Options of the numbering.
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct InitRequest {
+pub(super) struct InitRequest {
     /// Expected boards at their positions; other boards are an error. Empty: any boards.
     #[serde(default)]
     expected: Vec<ExpectedBoard>,
@@ -138,7 +138,7 @@ pub(super) async fn doctor(
 /// Value of an input or a parameter.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct NamedValue {
+pub(super) struct NamedValue {
     /// Number of the board; missing: the value is for each board of the request.
     board: Option<u8>,
     /// Name of the input or parameter.
@@ -150,7 +150,7 @@ pub struct NamedValue {
 /// Boards to run, with their values.
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RunRequest {
+pub(super) struct RunRequest {
     /// Numbers of the boards; empty: all boards that answer.
     #[serde(default)]
     boards: Vec<u8>,

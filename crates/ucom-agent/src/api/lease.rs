@@ -16,7 +16,7 @@ use crate::event::Policy;
 /// Request for the lease.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct LeaseRequest {
+pub(super) struct LeaseRequest {
     /// Name of the client for people: the first 64 characters.
     name: String,
     /// Time without a request of this client after which the lease lapses, s.
@@ -33,7 +33,7 @@ pub struct LeaseRequest {
 
 /// Client that holds the lease or waits for it.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LeaseGrant {
+pub(super) struct LeaseGrant {
     /// Secret key, which this client sends with each request in the header `Lease-Key`.
     key: String,
     /// `true` if the client holds the lease; otherwise it waits until the holder releases it.

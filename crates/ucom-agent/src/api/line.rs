@@ -14,12 +14,12 @@ pub(super) struct Line {
 
 impl Line {
     /// Returns the line of a command that is requested now.
-    pub fn new(gate: &Gate, facts: Value) -> Self {
+    pub(super) fn new(gate: &Gate, facts: Value) -> Self {
         Self { gate: gate.clone(), facts: Mutex::new(Some(facts)) }
     }
 
     /// Logs the result: success, or the reason of the failure.
-    pub fn end<T>(&self, done: &Result<T, Problem>) {
+    pub(super) fn end<T>(&self, done: &Result<T, Problem>) {
         self.write(done.as_ref().err().map(|error| &*error.message));
     }
 

@@ -4,7 +4,7 @@ mod bus;
 mod job;
 mod values;
 
-pub use board::{AnswerObject, BoardObject, FoundObject};
-pub use bus::{LeaseObject, StatusObject};
-pub use job::JobObject;
-pub use values::{ValueObject, ValuesObject};
+pub(super) use board::{AnswerObject, BoardObject, FoundObject};
+pub(super) use bus::{LeaseObject, StatusObject};
+pub(super) use job::JobObject;
+pub(super) use values::{ValueObject, ValuesObject};

@@ -28,7 +28,7 @@ use crate::owner::{Kind, fault};
 /// Board to update.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TargetRequest {
+pub(super) struct TargetRequest {
     /// Number of the board.
     board: u8,
     /// Flash number that the board must have; missing: any flash number.
@@ -60,7 +60,7 @@ pub(super) enum Unit {
 /// Update of boards.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct UpdateRequest {
+pub(super) struct UpdateRequest {
     /// Boards to update.
     #[schema(min_items = 1, max_items = 31)]
     boards: Vec<TargetRequest>,

@@ -47,7 +47,7 @@ pub(super) struct Tag {
 
 impl Tag {
     /// Returns `true` for a request of this client that may move boards.
-    pub fn moves_for(&self, client: ClientId) -> bool {
+    pub(super) fn moves_for(&self, client: ClientId) -> bool {
         self.asked.is_some_and(|asked| asked.moves && asked.client == client)
     }
 }
@@ -100,7 +100,7 @@ impl Shared {
     }
 
     /// Runs a short function in the owner's thread and waits for it: a command, or a question that needs no lease.
-    pub async fn call<T: Send + 'static>(
+    pub(crate) async fn call<T: Send + 'static>(
         self: &Arc<Self>,
         asked: Option<Asked>,
         act: impl FnOnce(&mut Worker) -> Result<T, Problem> + Send + 'static,
@@ -142,7 +142,7 @@ impl Shared {
     }
 
     /// Begins a job.
-    pub fn begin(
+    pub(crate) fn begin(
         self: &Arc<Self>,
         (kind, asked): (Kind, Asked),
         (what, client): (&str, &str),
@@ -179,7 +179,7 @@ impl Shared {
     }
 
     /// Cancels a job. The job still undoes its steps on the boards. Returns `false` if it has ended.
-    pub fn cancel_job(&self, number: u64) -> bool {
+    pub(crate) fn cancel_job(&self, number: u64) -> bool {
         self.queue.cancel(|tag| tag.job == Some(number))
     }
 }

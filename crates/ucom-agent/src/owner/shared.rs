@@ -109,27 +109,27 @@ impl Shared {
     }
 
     /// Returns the time of the agent.
-    pub fn now(&self) -> Duration {
+    pub(crate) fn now(&self) -> Duration {
         self.start.elapsed()
     }
 
     /// Returns the snapshot of the boards.
-    pub fn snapshot(&self) -> Arc<BusSnapshot> {
+    pub(crate) fn snapshot(&self) -> Arc<BusSnapshot> {
         lock(&self.snapshot).clone()
     }
 
     /// Returns a receiver that announces each new snapshot.
-    pub fn changes(&self) -> watch::Receiver<()> {
+    pub(crate) fn changes(&self) -> watch::Receiver<()> {
         self.changed.subscribe()
     }
 
     /// Returns the reason why the bus was lost; `None` while it is available.
-    pub fn lost(&self) -> Option<String> {
+    pub(crate) fn lost(&self) -> Option<String> {
         lock(&self.lost).clone()
     }
 
     /// Stops all boards ahead of all other requests, and checks that they have stopped. Returns the number of the Stop.
-    pub fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
+    pub(crate) fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
         let act = |worker: Result<&mut Worker, Refused>| {
             if let Ok(worker) = worker {
                 worker.see_to_stop();
@@ -149,12 +149,12 @@ impl Shared {
     }
 
     /// Returns the number of requested Stops, which is the number of the last one.
-    pub fn halts(&self) -> u64 {
+    pub(crate) fn halts(&self) -> u64 {
         self.queue.stops()
     }
 
     /// Returns `true` while a request of this client that may move boards is running or waiting.
-    pub fn moves_for(&self, client: ClientId) -> bool {
+    pub(crate) fn moves_for(&self, client: ClientId) -> bool {
         self.queue.has(|tag| tag.moves_for(client))
     }
 
@@ -164,7 +164,7 @@ impl Shared {
     /// # Errors
     ///
     /// The request may move boards, and a newer Stop exists, or another client stopped the boards within the last 3 s.
-    pub fn asked(&self, client: ClientId, after: Option<AskedAfter>) -> Result<Asked, Problem> {
+    pub(crate) fn asked(&self, client: ClientId, after: Option<AskedAfter>) -> Result<Asked, Problem> {
         let halts = lock(&self.halts);
         let count = self.queue.stops();
         if let Some(AskedAfter(after)) = after {
@@ -180,7 +180,7 @@ impl Shared {
 
     /// Returns the leases and the present time. A lease that has lapsed is ended first and its policy applied, before
     /// another client can take it.
-    pub fn leases(&self) -> (MutexGuard<'_, Leases<Policy>>, Duration) {
+    pub(crate) fn leases(&self) -> (MutexGuard<'_, Leases<Policy>>, Duration) {
         let (mut leases, now) = (lock(&self.leases), self.now());
         let lapsed = leases.lapse(now);
         let holder = leases.lease().map(|lease| lease.holder);

@@ -124,7 +124,7 @@ impl Worker {
 
     /// Returns the problem for an error of the session. If a Stop or the agent's end caused the error, returns that
     /// problem instead.
-    pub fn problem(&self, error: &SessionError) -> Problem {
+    pub(crate) fn problem(&self, error: &SessionError) -> Problem {
         if !error.is_cancelled() {
             let kind = match (error.kind(), error) {
                 // The agent and the bus are available; only the board is not.
@@ -141,7 +141,7 @@ impl Worker {
 
     /// Returns names and meanings of a board's values, for requests without the lease. A board that returned no names
     /// is not asked again for 3 s, because commands wait meanwhile.
-    pub fn known_to_viewers(&mut self, board: u8) -> Result<Arc<Known>, Problem> {
+    pub(crate) fn known_to_viewers(&mut self, board: u8) -> Result<Arc<Known>, Problem> {
         if let Some((at, problem)) = self.local.borrow().nameless.get(&board)
             && at.elapsed() < LEFT_ALONE
             && !self.held.borrow().known.contains_key(&board)
@@ -159,7 +159,7 @@ impl Worker {
     }
 
     /// Returns the known values of a board.
-    pub fn values_of(&self, known: &Arc<Known>) -> Values {
+    pub(crate) fn values_of(&self, known: &Arc<Known>) -> Values {
         let (master, board) = (&self.driver.master, known.board);
         let outputs = self.held.borrow().snapshots.get(&board).cloned();
         Values {

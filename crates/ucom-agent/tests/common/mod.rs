@@ -20,7 +20,7 @@ use ucom_agent::{Config, Owner};
 use ucom_sim::{ChainConfig, ChainServer, ChainSim};
 
 /// A simulated chain on a bus that other members can join.
-pub struct Chain {
+pub(crate) struct Chain {
     pub url: String,
     faults: Sender<(String, Sender<()>)>,
     ended: Arc<AtomicBool>,
@@ -28,7 +28,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    pub fn start(boards: usize) -> Self {
+    pub(crate) fn start(boards: usize) -> Self {
         let (faults, lines) = channel::<(String, Sender<()>)>();
         let (ready, url) = channel();
         let ended: Arc<AtomicBool> = Arc::default();
@@ -53,7 +53,7 @@ impl Chain {
     }
 
     /// Begins a fault, and returns when it has begun.
-    pub fn fault(&self, line: &str) {
+    pub(crate) fn fault(&self, line: &str) {
         let (begun, begins) = channel();
         self.faults.send((line.into(), begun)).expect("it goes on");
         // The channel carries no message. This wait ends when the other side drops its sender.
@@ -61,11 +61,11 @@ impl Chain {
     }
 
     /// Joins the bus as a device that only sends and receives frames.
-    pub fn peer(&self) -> Box<dyn CanBus + Send> {
+    pub(crate) fn peer(&self) -> Box<dyn CanBus + Send> {
         can_link::open(&self.url).expect("the bus opens")
     }
 
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             thread.join().expect("it ends");
@@ -80,7 +80,7 @@ impl Drop for Chain {
 }
 
 /// Waits on a bus for a frame with this identifier and these data; returns the time waited.
-pub fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
+pub(crate) fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     let begun = Instant::now();
     let what = format!("{id:03X}#{data:02X?}");
     frame_when(peer, &what, |frame| frame.id().value() == id && frame.data() == data);
@@ -88,14 +88,14 @@ pub fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
 }
 
 /// Waits on a bus for a frame for which `is` returns `true`.
-pub fn frame_when(peer: &mut dyn CanBus, what: &str, is: impl Fn(&CanFrame) -> bool) {
+pub(crate) fn frame_when(peer: &mut dyn CanBus, what: &str, is: impl Fn(&CanFrame) -> bool) {
     let mut patience = Patience::begin();
     let mut next = || patience.wait(what, |time| peer.receive(time)).expect("the bus is there");
     while !next().is_some_and(|frame| is(&frame)) {}
 }
 
 /// An agent that ends together with its test.
-pub struct Served {
+pub(crate) struct Served {
     pub chain: Chain,
     pub tokens: Tokens,
     pub log: PathBuf,
@@ -115,12 +115,12 @@ impl std::ops::Deref for Served {
 
 impl Served {
     /// Starts an agent with a simulated chain of `boards` boards without numbers.
-    pub fn start(boards: usize) -> Self {
+    pub(crate) fn start(boards: usize) -> Self {
         Self::start_as(boards, Config::default())
     }
 
     /// Like `start`, with a configuration of the agent.
-    pub fn start_as(boards: usize, config: Config) -> Self {
+    pub(crate) fn start_as(boards: usize, config: Config) -> Self {
         let chain = Chain::start(boards);
         let dir = tempfile::tempdir().expect("a directory");
         let log_path = dir.path().join("commands.jsonl");
@@ -143,12 +143,12 @@ impl Served {
     }
 
     /// Starts an agent with a numbered chain, and takes the lease. Returns the lease key as well.
-    pub fn numbered(boards: usize) -> (Self, String) {
+    pub(crate) fn numbered(boards: usize) -> (Self, String) {
         Self::numbered_as(boards, Config::default())
     }
 
     /// Like `numbered`, with a configuration of the agent.
-    pub fn numbered_as(boards: usize, config: Config) -> (Self, String) {
+    pub(crate) fn numbered_as(boards: usize, config: Config) -> (Self, String) {
         let served = Self::start_as(boards, config);
         let key = served.lease("anna", 60.0, "continue");
         let job = served.job("POST /api/init", &key, Some(json!({})));
@@ -157,7 +157,7 @@ impl Served {
     }
 
     /// Takes the lease and returns its key.
-    pub fn lease(&self, name: &str, lasts_s: f64, policy: &str) -> String {
+    pub(crate) fn lease(&self, name: &str, lasts_s: f64, policy: &str) -> String {
         let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
         let (status, grant) = self.api("POST /api/lease", None, Some(body));
         assert_eq!((status, grant["held"].as_bool()), (200, Some(true)), "{grant}");
@@ -165,14 +165,14 @@ impl Served {
     }
 
     /// Begins a job and returns its number.
-    pub fn begin(&self, request: &str, key: &str, body: Option<Value>) -> u64 {
+    pub(crate) fn begin(&self, request: &str, key: &str, body: Option<Value>) -> u64 {
         let (status, job) = self.api(request, Some(key), body);
         assert_eq!(status, 202, "{request}: {job}");
         job["number"].as_u64().expect("a number")
     }
 
     /// Waits for the end of a job and returns the job.
-    pub fn over(&self, number: u64) -> Value {
+    pub(crate) fn over(&self, number: u64) -> Value {
         let mut patience = Patience::begin();
         loop {
             let (status, job) = self.api(&format!("GET /api/jobs/{number}"), None, None);
@@ -185,23 +185,23 @@ impl Served {
     }
 
     /// Begins a job, waits for its end and returns the job.
-    pub fn job(&self, request: &str, key: &str, body: Option<Value>) -> Value {
+    pub(crate) fn job(&self, request: &str, key: &str, body: Option<Value>) -> Value {
         self.over(self.begin(request, key, body))
     }
 
     /// Runs the control loops of these boards with enabled outputs.
-    pub fn run(&self, key: &str, boards: &[u8]) {
+    pub(crate) fn run(&self, key: &str, boards: &[u8]) {
         let body = json!({ "boards": boards, "active": true });
         let job = self.job("POST /api/run", key, Some(body));
         assert_eq!(job["stage"], "finished", "{job}");
     }
 
-    pub fn board(&self, number: u8) -> Value {
+    pub(crate) fn board(&self, number: u8) -> Value {
         self.api(&format!("GET /api/boards/{number}"), None, None).1
     }
 
     /// Waits until `is` returns `true` for the board, and returns the board.
-    pub fn board_when(&self, number: u8, what: &str, is: impl Fn(&Value) -> bool) -> Value {
+    pub(crate) fn board_when(&self, number: u8, what: &str, is: impl Fn(&Value) -> bool) -> Value {
         let mut patience = Patience::begin();
         loop {
             let board = self.board(number);
@@ -212,12 +212,12 @@ impl Served {
         }
     }
 
-    pub fn last_event(&self) -> u64 {
+    pub(crate) fn last_event(&self) -> u64 {
         self.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number")
     }
 
     /// Ends the agent.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             thread.join().expect("it ends");

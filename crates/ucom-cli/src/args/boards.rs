@@ -1,9 +1,9 @@
 //! Boards, bits and spans as words of the command line.
 
-pub use ucom_host::session::{Assignment, Boards};
+pub(crate) use ucom_host::session::{Assignment, Boards};
 
 /// The number of one board.
-pub fn one_board(text: &str) -> Result<u8, String> {
+pub(super) fn one_board(text: &str) -> Result<u8, String> {
     match text.parse() {
         Ok(number @ 0..=31) => Ok(number),
         _ if text.parse::<Boards>().is_ok() => {
@@ -14,7 +14,7 @@ pub fn one_board(text: &str) -> Result<u8, String> {
 }
 
 /// A flash number, decimal or with 0x.
-pub fn flash_id(text: &str) -> Result<u16, String> {
+pub(super) fn flash_id(text: &str) -> Result<u16, String> {
     let text = text.trim();
     let number = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
         Some(hex) => u16::from_str_radix(hex, 16),
@@ -24,7 +24,7 @@ pub fn flash_id(text: &str) -> Result<u16, String> {
 }
 
 /// `ASTART,OPINIT` as a mask.
-pub fn bits(text: &str) -> Result<ucom::Status, String> {
+pub(super) fn bits(text: &str) -> Result<ucom::Status, String> {
     let mut all = ucom::Status(0);
     for name in text.split(',').map(str::trim) {
         let bit = ucom::Status::bit(name).ok_or_else(|| {
@@ -37,7 +37,7 @@ pub fn bits(text: &str) -> Result<ucom::Status, String> {
 }
 
 /// `00:40` or `0x00:0x40`: the two bytes of PC_SETSTATUS.
-pub fn raw_status(text: &str) -> Result<(u8, u8), String> {
+pub(super) fn raw_status(text: &str) -> Result<(u8, u8), String> {
     let byte = |text: &str| {
         let digits = text.strip_prefix("0x").or(text.strip_prefix("0X")).unwrap_or(text);
         let hex = digits.chars().all(|c| c.is_ascii_hexdigit());
@@ -48,7 +48,7 @@ pub fn raw_status(text: &str) -> Result<(u8, u8), String> {
 }
 
 /// A span in seconds.
-pub fn seconds(text: &str) -> Result<std::time::Duration, String> {
+pub(super) fn seconds(text: &str) -> Result<std::time::Duration, String> {
     let value = text.parse::<f64>().ok().and_then(|s| std::time::Duration::try_from_secs_f64(s).ok());
     value.ok_or_else(|| format!("\"{text}\" is no number of seconds"))
 }

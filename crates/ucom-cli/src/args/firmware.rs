@@ -10,7 +10,7 @@ use super::{ForceArgs, ValueEnum};
 
 /// Unit of the addresses of records.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-pub enum Addresses {
+pub(crate) enum Addresses {
     /// Count bytes.
     Byte,
     /// Count words of two bytes.
@@ -19,7 +19,7 @@ pub enum Addresses {
 
 /// Options of `ucom update`.
 #[derive(Args, Debug)]
-pub struct UpdateArgs {
+pub(crate) struct UpdateArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
@@ -107,7 +107,7 @@ pub struct UpdateArgs {
 
 /// Options of `ucom repair`.
 #[derive(Args, Debug)]
-pub struct RepairArgs {
+pub(crate) struct RepairArgs {
     /// Board number
     #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub board: u8,

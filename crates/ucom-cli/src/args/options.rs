@@ -11,7 +11,7 @@ use super::{ForceArgs, OverwriteArgs, ValueEnum};
 
 /// Options of `ucom sim`.
 #[derive(Args, Debug)]
-pub struct SimArgs {
+pub(crate) struct SimArgs {
     /// Simulate this number of boards (0 to 31).
     ///
     /// Default: the boards of the chain file
@@ -42,7 +42,7 @@ pub struct SimArgs {
 
 /// Options of `ucom init`.
 #[derive(Args, Debug)]
-pub struct InitArgs {
+pub(crate) struct InitArgs {
     /// Write this inventory; compare with it if it exists
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
@@ -57,7 +57,7 @@ pub struct InitArgs {
 
 /// Option that selects the boards.
 #[derive(Args, Debug)]
-pub struct BoardsArgs {
+pub(crate) struct BoardsArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -65,7 +65,7 @@ pub struct BoardsArgs {
 
 /// Options of `ucom status`.
 #[derive(Args, Debug)]
-pub struct StatusArgs {
+pub(crate) struct StatusArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -86,7 +86,7 @@ pub struct StatusArgs {
 
 /// Options of `ucom reset`.
 #[derive(Args, Debug)]
-pub struct ResetArgs {
+pub(crate) struct ResetArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -96,7 +96,7 @@ pub struct ResetArgs {
 
 /// Options of commands that act on boards.
 #[derive(Args, Debug)]
-pub struct ActArgs {
+pub(crate) struct ActArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
@@ -106,7 +106,7 @@ pub struct ActArgs {
 
 /// Options of `ucom stop`.
 #[derive(Args, Debug)]
-pub struct StopArgs {
+pub(crate) struct StopArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
@@ -117,7 +117,7 @@ pub struct StopArgs {
 
 /// Options of `ucom io`.
 #[derive(Args, Debug)]
-pub struct IoArgs {
+pub(crate) struct IoArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -137,7 +137,7 @@ pub struct IoArgs {
 
 /// Options of the cache of descriptions.
 #[derive(Args, Clone, Debug)]
-pub struct CacheArgs {
+pub(crate) struct CacheArgs {
     /// Ask the board even if its descriptions are known
     #[arg(long, env = "UCOM_FRESH", value_parser = on_off)]
     pub fresh: bool,
@@ -150,7 +150,7 @@ pub struct CacheArgs {
 
 /// Options of `ucom ci`.
 #[derive(Args, Debug)]
-pub struct CiArgs {
+pub(crate) struct CiArgs {
     /// Board number
     #[arg(value_name = "BOARD", value_parser = one_board)]
     pub board: u8,
@@ -172,7 +172,7 @@ pub struct CiArgs {
 
 /// Options of `ucom par`.
 #[derive(Args, Debug)]
-pub struct ParArgs {
+pub(crate) struct ParArgs {
     /// Board number, list, range, or all.
     ///
     /// With --apply, all means all boards of the file, and numbers select some of these boards
@@ -209,7 +209,7 @@ pub struct ParArgs {
 
 /// Options of `ucom so`.
 #[derive(Args, Debug)]
-pub struct SoArgs {
+pub(crate) struct SoArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -225,7 +225,7 @@ pub struct SoArgs {
 
 /// Action when the heartbeats of a board stop.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-pub enum OnLost {
+pub(crate) enum OnLost {
     /// Only report the lost board.
     Report,
     /// Stop control of the lost board.
@@ -236,7 +236,7 @@ pub enum OnLost {
 
 /// Options of `ucom run`.
 #[derive(Args, Debug)]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -279,7 +279,7 @@ pub struct RunArgs {
 
 /// Options of `ucom monitor`.
 #[derive(Args, Debug)]
-pub struct MonitorArgs {
+pub(crate) struct MonitorArgs {
     /// End after this number of views, one per second
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
@@ -290,7 +290,7 @@ pub struct MonitorArgs {
 
 /// Options of `ucom record`.
 #[derive(Args, Debug)]
-pub struct RecordArgs {
+pub(crate) struct RecordArgs {
     /// File to write: .log, .fzi, .mcap, or - for stdout
     pub file: PathBuf,
     /// End after this time, s
@@ -306,7 +306,7 @@ pub struct RecordArgs {
 
 /// Options of `ucom replay`.
 #[derive(Args, Debug)]
-pub struct ReplayArgs {
+pub(crate) struct ReplayArgs {
     /// Recording: .log, .fzi or .mcap
     pub file: PathBuf,
     /// Also send frames that change boards.
@@ -323,7 +323,7 @@ pub struct ReplayArgs {
 
 /// Options of `ucom send`.
 #[derive(Args, Debug)]
-pub struct SendArgs {
+pub(crate) struct SendArgs {
     /// Frames in the format of candump, ID#DATA.
     ///
     /// Examples are 240#, 1C1#0202, 12345678#11 and 123#R
@@ -338,7 +338,7 @@ pub struct SendArgs {
 
 /// Options of `ucom decode`.
 #[derive(Args, Debug)]
-pub struct DecodeArgs {
+pub(crate) struct DecodeArgs {
     /// Recording, or - for stdin.
     ///
     /// On stdin the command reads a candump log or bare frames
@@ -354,7 +354,7 @@ pub struct DecodeArgs {
 
 /// Options of `ucom probe`.
 #[derive(Args, Debug)]
-pub struct ProbeArgs {
+pub(crate) struct ProbeArgs {
     /// Write the profile to this file (default: stdout)
     #[arg(long, env = "UCOM_PROBE_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -381,7 +381,7 @@ pub struct ProbeArgs {
 
 /// Options of `ucom conformance`.
 #[derive(Args, Debug)]
-pub struct ConformanceArgs {
+pub(crate) struct ConformanceArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -420,7 +420,7 @@ pub struct ConformanceArgs {
 
 /// Options of `ucom dbc`.
 #[derive(Args, Debug)]
-pub struct DbcArgs {
+pub(crate) struct DbcArgs {
     /// Board number, list, range, all, or none
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
@@ -438,7 +438,7 @@ pub struct DbcArgs {
 
 /// Options of `ucom explain`.
 #[derive(Args, Debug)]
-pub struct ExplainArgs {
+pub(crate) struct ExplainArgs {
     /// Word as shown on the screen, or the number of an error.
     ///
     /// Without a word, the command lists all words

@@ -11,7 +11,7 @@ use super::CacheArgs;
 
 /// Options of `ucom serve`.
 #[derive(Args, Debug)]
-pub struct ServeArgs {
+pub(crate) struct ServeArgs {
     /// Use a simulated chain instead of a bus
     #[arg(long, env = "UCOM_SIM", value_parser = on_off)]
     pub sim: bool,

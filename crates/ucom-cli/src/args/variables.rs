@@ -3,7 +3,7 @@
 use cli_kit::variables::{Retired, Variables};
 
 /// Variables in effect, and variables of earlier versions.
-pub const VARIABLES: Variables = Variables {
+pub(crate) const VARIABLES: Variables = Variables {
     json: "UCOM_JSON",
     retired: &[
         // These variables made a command reset, number, program, start, move, override a check or overwrite a file.

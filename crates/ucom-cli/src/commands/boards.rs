@@ -11,7 +11,7 @@ use crate::session::shared_numbers;
 use crate::shape::{bits, board_table, board_value, info_value};
 
 /// Shows the information that boards report about themselves.
-pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let mut boards = Vec::new();
@@ -27,7 +27,7 @@ pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
 }
 
 /// Shows status bits, after setting and clearing some of them.
-pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let (set, clear) = (args.set.unwrap_or_default(), args.clear.unwrap_or_default());
     let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
     if both != Status(0) {
@@ -124,7 +124,7 @@ fn lines_of(all: &[Numbered]) -> String {
 }
 
 /// Sends PC_RESET, to all boards at once or one by one.
-pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let force = args.force.force;
     let boards: Vec<Option<u8>> = match &args.boards {
@@ -153,12 +153,12 @@ pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
 }
 
 /// Sends PC_XRESET. Afterwards the board is in the exloader with programming enabled.
-pub fn xreset(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn xreset(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::XReset { board, force })
 }
 
 /// Sends PC_START: starts the application.
-pub fn start(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn start(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::Start { board, force })
 }
 
@@ -177,7 +177,7 @@ fn act(
 }
 
 /// Stops outputs, control and application, as requested. Stopping is always allowed: no other PC can prevent it.
-pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };

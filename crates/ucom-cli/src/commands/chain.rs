@@ -10,7 +10,7 @@ use crate::args::{InitArgs, LinkArgs};
 use crate::shape::{board_table, board_value};
 
 /// Lists the connected boards; changes no board.
-pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let report = match driver.run(Request::Scan)? {
@@ -78,7 +78,7 @@ fn lines(findings: &[impl ToString]) -> String {
 }
 
 /// Resets and numbers the whole chain; writes an inventory.
-pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let known = match args.inventory.exists() {
         true => Some(Inventory::read(&args.inventory).map_err(Failure::usage)?),
         false => None,

@@ -22,7 +22,7 @@ fn date(profile: &Profile) -> u16 {
 }
 
 /// Runs the allowed tests and shows their results.
-pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(crate) fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(wrong) = args.only.iter().find(|o| !test_names().any(|id| id.eq_ignore_ascii_case(o))) {
         let all: Vec<&str> = test_names().collect();
         return Err(Failure::usage(format!("unknown test {wrong}, expected one of {}", all.join(" "))));

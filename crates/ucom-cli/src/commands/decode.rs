@@ -21,7 +21,7 @@ const READ_AHEAD: usize = 64;
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Decodes to the end of the input, or until Ctrl-C. The exit code is 2 if a file contains no frame.
-pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let left = args.count.unwrap_or(u64::MAX);
     if args.live {
         return live(left, link, out);
@@ -125,7 +125,7 @@ fn lines(input: impl BufRead) -> impl Iterator<Item = Result<Record, Failure>> {
 }
 
 /// Parses a line of a log, or a bare frame; `None` for a comment.
-pub fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
+pub(super) fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
     let bare = !line.starts_with('(');
     // A bare frame has no time and no bus name. When both are added, it is a line of a log.
     let full = if bare { format!("(0.0) can0 {line}\n") } else { format!("{line}\n") };

@@ -19,7 +19,7 @@ use crate::shape::board_value;
 const LISTEN: Duration = Duration::from_millis(1500);
 
 /// Checks everything. The exit code is 0 without a problem, 3 without any frame, and 1 otherwise.
-pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     out.note(format!("listening on {}", link.url()?));
     let seen = driver.examine(LISTEN)?;
@@ -42,7 +42,7 @@ fn line(f: &Finding) -> String {
 }
 
 /// Measures the profile of the boards and writes it to a file.
-pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let output = args.out.as_deref().map(|file| open_output(file, args.overwrite.overwrite)).transpose()?;
     let image = match &args.image {
         Some(path) => {

@@ -7,7 +7,7 @@ use ucom_host::explain::{Word, find, words};
 use crate::args::ExplainArgs;
 
 /// Prints the meaning of the words, or the list of all.
-pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let (query, all) = (args.word.join(" "), words());
     let found = if query.is_empty() { all.iter().collect() } else { find(&all, &query) };
     if found.is_empty() {

@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::args::{Cli, Topic};
 
 /// Prints a page, or the program's own help.
-pub fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {
+pub(super) fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {
     let text = match topic {
         Some(Topic::Profile) => ucom_host::profile_help(),
         Some(Topic::Sim) => ucom_sim::help(),

@@ -17,7 +17,7 @@ use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 
 /// Shows all names and the meaning of their words. If the application runs, also shows the initial inputs.
-pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     note_force(args.force, out);
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
     let file =
@@ -141,7 +141,7 @@ fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
 }
 
 /// Shows the initial inputs, or sets some inputs. With `--for` the board moves under supervision.
-pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
     let mut driver = link.session()?;
     let board = args.board;
@@ -254,7 +254,7 @@ fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output
 }
 
 /// Writes a DBC file with the boards' names.
-pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     note_force(args.force, out);
     let file = args.out.as_deref().map(|file| open_output(file, args.overwrite.overwrite)).transpose()?;
     let (profile, signals) = (link.profile()?, link.signal_table()?);

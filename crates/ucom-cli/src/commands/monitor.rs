@@ -15,7 +15,7 @@ use crate::session::shared_numbers;
 use crate::shape::{bits, info_value};
 
 /// Shows the bus until the user presses `q` or Ctrl-C, or the requested number of views has been shown.
-pub fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only, driver.master.profile());
     let left = args.count.unwrap_or(u64::MAX);

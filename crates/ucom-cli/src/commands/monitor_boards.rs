@@ -9,7 +9,7 @@ use ucom::Status;
 use ucom_host::master::{Board, Boards, Life, Statistics};
 
 /// Status bits from the most significant one. Narrow columns show a letter for each, wider ones a word.
-pub const BITS: [(Status, char, &str); 8] = [
+pub(super) const BITS: [(Status, char, &str); 8] = [
     (Status::MSTART, 'M', ""),
     (Status::ASTART, 'A', "autostart"),
     (Status::MCARUN, 'R', ""),
@@ -21,7 +21,7 @@ pub const BITS: [(Status, char, &str); 8] = [
 ];
 
 /// Smallest width at which status bits are words, and flash numbers and programs are shown.
-pub const WIDE: u16 = 130;
+pub(super) const WIDE: u16 = 130;
 const MEDIUM: u16 = 72;
 /// Age in seconds above which the last answer of a board is shown as old.
 const OLD_S: f64 = 5.0;
@@ -78,7 +78,13 @@ fn columns(width: u16) -> Vec<Column> {
 }
 
 /// Returns the rows from `first` on, with as many columns as the width of the view allows.
-pub fn table(boards: &Boards, statistics: &Statistics, now: u64, width: u16, first: usize) -> Table<'static> {
+pub(super) fn table(
+    boards: &Boards,
+    statistics: &Statistics,
+    now: u64,
+    width: u16,
+    first: usize,
+) -> Table<'static> {
     let columns = columns(width);
     let row = |(number, b): (u8, &Board)| {
         Row::new(columns.iter().map(|c| (c.cell)(number, b, statistics, now)).collect::<Vec<_>>())

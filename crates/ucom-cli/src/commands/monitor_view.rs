@@ -19,7 +19,7 @@ const LEAST_ROWS: u16 = 4;
 const EVENT: u16 = 16;
 
 /// Draws the view; sets the visible rows in `scroll`.
-pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
+pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     if too_small(frame, KEYS) {
         return;
     }

@@ -13,7 +13,7 @@ use ucom_host::session::{Driver, Known, nothing_shared};
 use crate::args::{LinkArgs, SoArgs};
 
 /// Waits until the reader of stdout has read all output. Gives up if the reader no longer reads.
-pub fn finish(stdout: &mut Lines, driver: &Driver) {
+pub(super) fn finish(stdout: &mut Lines, driver: &Driver) {
     let unseen = stdout.finish();
     if unseen > 0 && !stdout.gone() {
         driver.note(format!("{unseen} lines were dropped, because the reader was too slow"));
@@ -21,7 +21,7 @@ pub fn finish(stdout: &mut Lines, driver: &Driver) {
 }
 
 /// Shows outputs of boards as they arrive. Sends nothing after the names are known.
-pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
     let signals = link.signal_table()?;

@@ -16,7 +16,7 @@ use ucom_host::session::{
 use crate::args::{Boards, LinkArgs, ParArgs};
 
 /// Shows parameters, writes some, saves or applies a file.
-pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(file) = &args.apply {
         return apply(args, file, link, out);
     }
@@ -47,12 +47,12 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
 }
 
 /// Opens the output file before any frame is sent; an existing file is overwritten only on request.
-pub fn open_output(file: &Path, overwrite: bool) -> Result<OutputFile, Failure> {
+pub(super) fn open_output(file: &Path, overwrite: bool) -> Result<OutputFile, Failure> {
     OutputFile::open(file, overwrite, &[]).map_err(Failure::nothing_sent)
 }
 
 /// Opens an output file; `-` is stdout, and returns `None`.
-pub fn file_or_stdout(file: &Path, overwrite: bool) -> Result<Option<OutputFile>, OutputError> {
+pub(super) fn file_or_stdout(file: &Path, overwrite: bool) -> Result<Option<OutputFile>, OutputError> {
     match file.as_os_str() == "-" {
         true => Ok(None),
         false => OutputFile::open(file, overwrite, &[]).map(Some),
@@ -142,7 +142,7 @@ fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Outp
 }
 
 /// Writes a requested text to a file, or to stdout for `-`.
-pub fn deliver(
+pub(super) fn deliver(
     file: Option<OutputFile>,
     text: &str,
     mut result: Value,

@@ -22,7 +22,7 @@ fn failed(e: RecordingError) -> Failure {
 }
 
 /// Reports an incomplete recording.
-pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
+pub(super) fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     if let Some(why) = &recording.broken_off {
         let (file, whole) = (file.display(), recording.records.len());
         let are = if whole == 1 { "is" } else { "are" };
@@ -34,19 +34,19 @@ pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
 const SILENCE: Duration = Duration::from_millis(1500);
 
 /// Reports once that a bus has sent no frames yet, and what to check. Only users get this note.
-pub struct Silence {
+pub(super) struct Silence {
     since: Instant,
     over: bool,
 }
 
 impl Silence {
     /// Starts to listen. Programs get no note, because they detect silence themselves.
-    pub fn begins(out: &Output) -> Self {
+    pub(super) fn begins(out: &Output) -> Self {
         Self { since: Instant::now(), over: out.is_json() }
     }
 
     /// Checks for silence; called at each poll of the bus. `came` is `true` if a frame has arrived.
-    pub fn look(&mut self, came: bool, out: &Output) {
+    pub(super) fn look(&mut self, came: bool, out: &Output) {
         if !came && self.since.elapsed() < SILENCE {
             return;
         }
@@ -60,7 +60,7 @@ impl Silence {
 }
 
 /// Records until Ctrl-C, for the requested time, or the requested number of frames.
-pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = listen(&CleanupList::default())?;
     let profile = link.profile()?;
     let stdout = args.file.as_os_str() == "-";
@@ -153,7 +153,7 @@ impl Operator for Player<'_> {
 }
 
 /// Sends the frames of a recording at their times.
-pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if !(args.speed.is_finite() && args.speed > 0.0) {
         return Err(Failure::usage(format!(
             "--speed {} is out of range, expected a value above 0",

@@ -11,7 +11,7 @@ use crate::args::{LinkArgs, RepairArgs};
 use crate::shape::{board_table, board_value};
 
 /// Repairs the board. Its flash number must equal the given one, or else the one in the inventory.
-pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let board = args.board;
     let flash_number = match args.flash_id {
         Some(flash) => flash,

@@ -20,7 +20,7 @@ use crate::args::{Boards, LinkArgs, OnLost, RunArgs};
 const REPORT_PERIOD: Duration = Duration::from_secs(1);
 
 /// Starts boards and keeps them running until Ctrl-C.
-pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut profile = link.profile()?;
     if let Some(policy) = args.on_lost {
         profile.on_lost = match policy {

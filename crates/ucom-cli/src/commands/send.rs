@@ -16,7 +16,7 @@ use crate::args::{LinkArgs, SendArgs};
 const SENT: Duration = Duration::from_millis(50);
 
 /// Sends frames in the given order. All of them are checked before the first one is sent.
-pub fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let frame = |(i, text): (usize, &String)| {
         let record = parsed(text.trim(), i + 1).unwrap_or_else(|| Err(Failure::usage("an empty frame")))?;
         Ok::<_, Failure>(record.frame)

@@ -25,7 +25,7 @@ use crate::interrupt::listen;
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Owns the bus until SIGINT or SIGTERM. Then stops the boards that the agent has started.
-pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if args.sim && link.bus.is_some() {
         return Err(
             Failure::usage("--bus and --sim cannot be used together").next("omit --bus, and unset UCOM_BUS")

@@ -18,7 +18,7 @@ use crate::interrupt::listen;
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Serves a simulated chain until SIGINT or SIGTERM.
-pub fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn sim(args: &SimArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = listen(&CleanupList::default())?;
     let profile = link.profile()?;
     let config = config(args, &profile)?;

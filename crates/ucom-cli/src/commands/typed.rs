@@ -11,7 +11,7 @@ use ucom_host::session::{Driver, History, Prepared, note_rounded, only, words};
 use crate::args::{Assignment, RunArgs};
 
 /// Reads lines from stdin, in parallel with the bus.
-pub fn typed() -> Receiver<String> {
+pub(super) fn typed() -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || each_line(std::io::stdin().lock(), |line| sender.send(line).is_ok()));
     receiver
@@ -49,7 +49,12 @@ fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignmen
 }
 
 /// Executes a line: `ci 1 set_position=1500`, `par 1 kp=80`, `active on`, `active off`.
-pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) -> Result<(), Failure> {
+pub(super) fn obey(
+    driver: &mut Driver,
+    args: &RunArgs,
+    line: &str,
+    prepared: &Prepared,
+) -> Result<(), Failure> {
     let form = || {
         Failure::usage(format!(
             "\"{line}\" is not a command, expected ci N NAME=VALUE, par N NAME=VALUE, active on|off, or stop"

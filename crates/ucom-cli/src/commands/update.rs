@@ -15,7 +15,7 @@ use super::update_report::print;
 use crate::args::{Boards, LinkArgs, UpdateArgs};
 
 /// Programs the selected boards.
-pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
+pub(super) fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let profile = link.profile()?;
     let files = Files::read(args, &profile, out)?;
     let day = day(args.date.as_deref(), &profile)?;

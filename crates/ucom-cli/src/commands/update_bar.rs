@@ -22,7 +22,7 @@ struct Step {
 }
 
 /// Bar of the boards in progress.
-pub struct Bar<'a> {
+pub(super) struct Bar<'a> {
     out: &'a Output,
     bar: Option<(Vec<u8>, ProgressBar)>,
     serial: usize,
@@ -33,7 +33,7 @@ pub struct Bar<'a> {
 
 impl<'a> Bar<'a> {
     /// Creates a bar that stays hidden before the first progress.
-    pub fn new(out: &'a Output) -> Result<Self, Failure> {
+    pub(super) fn new(out: &'a Output) -> Result<Self, Failure> {
         let (steps, drawn) = sync_channel(WAITING);
         let (end, ended) = channel::<()>();
         let draw = move || {
@@ -47,7 +47,7 @@ impl<'a> Bar<'a> {
     }
 
     /// Draws the progress in an event, if the terminal accepts it.
-    pub fn see(&mut self, event: &Event) {
+    pub(super) fn see(&mut self, event: &Event) {
         let Event::Progress { progress, .. } = event else { return };
         if self.bar.as_ref().is_none_or(|(boards, _)| *boards != progress.boards) {
             let list: Vec<String> = progress.boards.iter().map(u8::to_string).collect();
@@ -64,7 +64,7 @@ impl<'a> Bar<'a> {
     }
 
     /// Removes the bar, before any other output.
-    pub fn end(self) {
+    pub(super) fn end(self) {
         let Self { steps, ended, .. } = self;
         drop(steps);
         // The thread sends no message; the channel closes when it ends.

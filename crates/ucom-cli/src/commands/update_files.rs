@@ -13,7 +13,7 @@ use ucom_host::master::update::{UpdateImage, has_header};
 use crate::args::{Addresses, UpdateArgs};
 
 /// Contents of the files.
-pub struct Files {
+pub(super) struct Files {
     /// The image.
     pub image: UpdateImage,
     /// Image of the other cycle.
@@ -26,7 +26,7 @@ pub struct Files {
 
 impl Files {
     /// Reads the files that the plan needs; refuses other files.
-    pub fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
+    pub(super) fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
         if args.name_target && !has_header(profile) {
             return Err(Failure::usage(
                 "--name-target: the name is part of the header, but the profile sends no header",
@@ -130,7 +130,7 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
 }
 
 /// Returns the flash date: the requested one, or else today (UTC); 0 if no header contains a date.
-pub fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
+pub(super) fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let form = profile.prog_date;
     let date = match asked {
         Some(_) if !has_header(profile) => {

@@ -9,7 +9,7 @@ use ucom_host::date_text;
 use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult, has_header};
 
 /// Prints the report; `names` are the files of its images.
-pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {
+pub(super) fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {
     let images = report.images.iter().zip(names);
     let value = json!({
         "dry_run": report.dry_run,

@@ -14,17 +14,17 @@ fn command() -> Command {
 }
 
 /// Runs `ucom` with these words.
-pub fn ucom(words: &[&str]) -> CommandOutput {
+pub(crate) fn ucom(words: &[&str]) -> CommandOutput {
     ucom_with(words, "")
 }
 
 /// Runs `ucom` with this text on its stdin.
-pub fn ucom_with(words: &[&str], stdin: &str) -> CommandOutput {
+pub(crate) fn ucom_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
 
 /// A simulated chain; it ends with the test.
-pub struct Sim {
+pub(crate) struct Sim {
     child: Child,
     pub url: String,
     pub dir: tempfile::TempDir,
@@ -32,7 +32,7 @@ pub struct Sim {
 
 impl Sim {
     /// Starts a simulator on a free port and waits until it is ready.
-    pub fn start(options: &[&str]) -> Self {
+    pub(crate) fn start(options: &[&str]) -> Self {
         let mut child = command()
             .args(["sim", "--listen", "127.0.0.1:0"])
             .args(options)
@@ -52,14 +52,14 @@ impl Sim {
     }
 
     /// Like `start`, with numbered boards.
-    pub fn numbered(options: &[&str]) -> Self {
+    pub(crate) fn numbered(options: &[&str]) -> Self {
         let sim = Self::start(options);
         sim.ucom(&["init"]).ends(0);
         sim
     }
 
     /// Returns the command `ucom` on its bus.
-    pub fn command(&self) -> Command {
+    pub(crate) fn command(&self) -> Command {
         let mut command = command();
         command.env("UCOM_BUS", &self.url).env("UCOM_INVENTORY", self.path("inventory.toml"));
         command.env("UCOM_CACHE", self.path("cache"));
@@ -67,40 +67,40 @@ impl Sim {
     }
 
     /// Runs `ucom` on its bus, with a separate inventory and cache.
-    pub fn ucom(&self, words: &[&str]) -> CommandOutput {
+    pub(crate) fn ucom(&self, words: &[&str]) -> CommandOutput {
         run(self.command(), words, "")
     }
 
     /// Returns the answer of `ucom --json` with these words; panics if the command ends with another code.
-    pub fn json(&self, words: &[&str], code: i32) -> Value {
+    pub(crate) fn json(&self, words: &[&str], code: i32) -> Value {
         self.ucom(&[&["--json"], words].concat()).ends(code).json()
     }
 
     /// Returns the status byte of a board.
-    pub fn status_byte(&self, board: &str) -> Value {
+    pub(crate) fn status_byte(&self, board: &str) -> Value {
         self.json(&["status", board], 0)["boards"][0]["status_byte"].clone()
     }
 
     /// Starts `ucom` on its bus, in parallel with the test.
-    pub fn spawn(&self, words: &[&str]) -> Child {
+    pub(crate) fn spawn(&self, words: &[&str]) -> Child {
         let mut command = self.command();
         command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.spawn().expect("ucom starts")
     }
 
     /// Returns a path in its directory.
-    pub fn path(&self, name: &str) -> String {
+    pub(crate) fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
 
     /// Creates a file in its directory.
-    pub fn file(&self, name: &str, bytes: &[u8]) -> String {
+    pub(crate) fn file(&self, name: &str, bytes: &[u8]) -> String {
         std::fs::write(self.path(name), bytes).expect("a file");
         self.path(name)
     }
 
     /// Starts a fault.
-    pub fn fault(&mut self, line: &str) {
+    pub(crate) fn fault(&mut self, line: &str) {
         let stdin = self.child.stdin.as_mut().expect("stdin");
         writeln!(stdin, "{line}").expect("the simulator reads");
         // The simulator polls its stdin every 50 ms.
@@ -108,24 +108,24 @@ impl Sim {
     }
 
     /// Joins its bus as a device that sends and receives plain frames.
-    pub fn peer(&self) -> Peer {
+    pub(crate) fn peer(&self) -> Peer {
         Peer { bus: can_link::open(&self.url).expect("the bus opens") }
     }
 
     /// Kills the simulator, as in a power cut. Its directory stays.
-    pub fn kill(mut self) -> tempfile::TempDir {
+    pub(crate) fn kill(mut self) -> tempfile::TempDir {
         self.child.kill().expect("kill");
         self.child.wait().expect("it ends");
         std::mem::replace(&mut self.dir, tempfile::tempdir().expect("a directory"))
     }
 
     /// Sends a signal to the simulator.
-    pub fn signal(&self, name: &str) {
+    pub(crate) fn signal(&self, name: &str) {
         signal(&self.child, name);
     }
 
     /// Sends a signal, waits for the end and returns the exit code.
-    pub fn end(mut self, name: &str) -> i32 {
+    pub(crate) fn end(mut self, name: &str) -> i32 {
         signal(&self.child, name);
         self.child.wait().expect("it ends").code().unwrap_or(-1)
     }
@@ -139,24 +139,24 @@ impl Drop for Sim {
 }
 
 /// Sends a signal to a command and waits for its end.
-pub fn ended_by(child: Child, name: &str) -> CommandOutput {
+pub(crate) fn ended_by(child: Child, name: &str) -> CommandOutput {
     signal(&child, name);
     ended(child)
 }
 
 /// Returns the outcome of each board of an update.
-pub fn outcomes(report: &Value) -> Vec<&str> {
+pub(crate) fn outcomes(report: &Value) -> Vec<&str> {
     report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect()
 }
 
 /// A device on the bus that sends and receives raw frames.
-pub struct Peer {
+pub(crate) struct Peer {
     bus: Box<dyn CanBus + Send>,
 }
 
 impl Peer {
     /// Sends a frame in candump notation, for example `1C1#0202`.
-    pub fn send(&mut self, text: &str) {
+    pub(crate) fn send(&mut self, text: &str) {
         let (id, data) = text.split_once('#').expect("ID#DATA");
         let id = Id::standard(u32::from_str_radix(id, 16).expect("hex")).expect("11 bits");
         let data: Vec<u8> = (0..data.len() / 2)
@@ -166,12 +166,12 @@ impl Peer {
     }
 
     /// Returns how often its controller went bus-off, as the server reported.
-    pub fn times_bus_off(&self) -> u64 {
+    pub(crate) fn times_bus_off(&self) -> u64 {
         self.bus.times_bus_off()
     }
 
     /// Returns the next frame within a time.
-    pub fn receive(&mut self, within_ms: u64) -> Option<String> {
+    pub(crate) fn receive(&mut self, within_ms: u64) -> Option<String> {
         self.receive_for(Duration::from_millis(within_ms))
     }
 
@@ -182,7 +182,7 @@ impl Peer {
     }
 
     /// Returns all frames within a time.
-    pub fn all(&mut self, within_ms: u64) -> Vec<String> {
+    pub(crate) fn all(&mut self, within_ms: u64) -> Vec<String> {
         let end = Instant::now() + Duration::from_millis(within_ms);
         let mut received = Vec::new();
         while let Some(left) = end.checked_duration_since(Instant::now()) {
@@ -192,7 +192,7 @@ impl Peer {
     }
 
     /// Waits for a frame that begins with `start`; skips others.
-    pub fn wait(&mut self, start: &str) -> String {
+    pub(crate) fn wait(&mut self, start: &str) -> String {
         let mut patience = Patience::begin();
         let mut next = || patience.wait(format_args!("a frame {start}"), |time| self.receive_for(time));
         loop {
@@ -203,17 +203,17 @@ impl Peer {
     }
 
     /// Waits for `count` frames that begin with `start`.
-    pub fn wait_for(&mut self, count: usize, start: &str) {
+    pub(crate) fn wait_for(&mut self, count: usize, start: &str) {
         (0..count).for_each(|_| drop(self.wait(start)));
     }
 }
 
 /// Returns an image of `bytes` bytes, different for each seed.
-pub fn image(bytes: usize, seed: u8) -> Vec<u8> {
+pub(crate) fn image(bytes: usize, seed: u8) -> Vec<u8> {
     (0..bytes).map(|i| (i * 37 + 11) as u8 ^ seed).collect()
 }
 
 /// Returns the image of the protocol's example, whose Program ID is 0x4B3F.
-pub fn golden() -> Vec<u8> {
+pub(crate) fn golden() -> Vec<u8> {
     (0..1000_usize).map(|i| (37 * i + 11) as u8).collect()
 }

@@ -9,7 +9,7 @@ mod request;
 mod run;
 mod scan;
 mod seen;
-pub mod update;
+pub(super) mod update;
 
 pub use conformance::{ConformanceOptions, ConformanceProgram, ConformanceReport, ConformanceTest, Verdict};
 pub use flags::{AdminChange, StopLevel};

@@ -5,13 +5,13 @@ use ucom::Frame;
 use super::bench::{Member, frame};
 
 /// Answers a frame by a rule. The first answer is due 300 µs after the frame, each further answer 1 µs after the previous one.
-pub struct Answering<A> {
+pub(super) struct Answering<A> {
     answers: A,
     out: Vec<(u64, Frame)>,
 }
 
 impl<A: FnMut(&str) -> &'static [&'static str]> Answering<A> {
-    pub fn new(answers: A) -> Self {
+    pub(super) fn new(answers: A) -> Self {
         Self { answers, out: Vec::new() }
     }
 }

@@ -6,14 +6,14 @@ use ucom::{Frame, Profile};
 use ucom_host::master::{Event, Master, Outcome, ProcedureId, Request, frame_bits};
 use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
-pub use super::exit::Exit;
-pub use super::script::Script;
+pub(super) use super::exit::Exit;
+pub(super) use super::script::Script;
 
 /// Microseconds in a millisecond.
-pub const MS: u64 = 1000;
+pub(super) const MS: u64 = 1000;
 
 /// Participant on the bus other than the master.
-pub trait Member {
+pub(super) trait Member {
     fn poll(&mut self, now: u64) -> Option<Frame>;
     fn sent(&mut self, now: u64, frame: &Frame);
     fn receive(&mut self, now: u64, frame: &Frame);
@@ -24,7 +24,7 @@ pub trait Member {
     }
 }
 
-pub type TestNode = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
+pub(super) type TestNode = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
 
 impl Member for TestNode {
     fn poll(&mut self, now: u64) -> Option<Frame> {
@@ -44,13 +44,13 @@ impl Member for TestNode {
     }
 }
 
-pub fn frame(text: &str) -> Frame {
+pub(super) fn frame(text: &str) -> Frame {
     text.parse().unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
 /// Fault of one frame during transmission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub(super) enum Fault {
     Lost,
     Doubled,
     /// The frame arrives after the next frame.
@@ -63,12 +63,12 @@ pub enum Fault {
 
 /// Sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum From {
+pub(super) enum From {
     Master,
     Member(usize),
 }
 
-pub struct Bench {
+pub(super) struct Bench {
     pub master: Master,
     pub members: Vec<Box<dyn Member>>,
     pub now: u64,
@@ -91,7 +91,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(profile: Profile, members: Vec<Box<dyn Member>>) -> Self {
+    pub(super) fn new(profile: Profile, members: Vec<Box<dyn Member>>) -> Self {
         let pending = members.iter().map(|_| None).collect();
         Self {
             master: Master::new(profile),
@@ -111,21 +111,21 @@ impl Bench {
     }
 
     /// Adds a member to the bus.
-    pub fn join(&mut self, member: Box<dyn Member>) {
+    pub(super) fn join(&mut self, member: Box<dyn Member>) {
         self.members.push(member);
         self.pending.push(None);
     }
 
-    pub fn script(script: Script) -> Self {
+    pub(super) fn script(script: Script) -> Self {
         Self::new(Profile::default(), vec![Box::new(script)])
     }
 
     /// Creates a chain of real boards, each with an application.
-    pub fn chain(flash_ids: &[u16]) -> Self {
+    pub(super) fn chain(flash_ids: &[u16]) -> Self {
         Self::chain_with(flash_ids, Profile::default())
     }
 
-    pub fn chain_with(flash_ids: &[u16], profile: Profile) -> Self {
+    pub(super) fn chain_with(flash_ids: &[u16], profile: Profile) -> Self {
         let mut pins = WirePins::chain(flash_ids.len());
         let boards =
             flash_ids.iter().map(|flash| Box::new(node(*flash, pins.remove(0), profile)) as Box<dyn Member>);
@@ -225,25 +225,29 @@ impl Bench {
     }
 
     /// Lets time pass.
-    pub fn run(&mut self, ms: u64) {
+    pub(super) fn run(&mut self, ms: u64) {
         let until = self.now + ms * MS;
         while self.now < until && self.step(until) {}
     }
 
     /// Lets time pass until `done` returns `true`.
-    pub fn until(&mut self, done: impl Fn(&Self) -> bool) {
+    pub(super) fn until(&mut self, done: impl Fn(&Self) -> bool) {
         while !done(self) {
             self.run(1);
         }
     }
 
     /// Starts a procedure and waits for its end. Panics if it takes more than `limit_s` of virtual time.
-    pub fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
+    pub(super) fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
         let id = self.master.start(self.now, request).expect("nothing else is under way");
         self.wait(id, limit_s)
     }
 
-    pub fn wait(&mut self, id: ProcedureId, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
+    pub(super) fn wait(
+        &mut self,
+        id: ProcedureId,
+        limit_s: u64,
+    ) -> Result<Outcome, ucom_host::master::Error> {
         let limit = self.now + limit_s * 1000 * MS;
         let seen = self.events.len();
         loop {
@@ -263,12 +267,12 @@ impl Bench {
     }
 
     /// Frames that the master sent, as text.
-    pub fn sent(&self) -> Vec<String> {
+    pub(super) fn sent(&self) -> Vec<String> {
         self.log.iter().filter(|(_, from, _)| *from == From::Master).map(|(.., f)| f.to_string()).collect()
     }
 
     /// Times at which the master sent this frame.
-    pub fn times_of(&self, text: &str) -> Vec<u64> {
+    pub(super) fn times_of(&self, text: &str) -> Vec<u64> {
         let wanted = frame(text);
         self.log
             .iter()
@@ -277,16 +281,16 @@ impl Bench {
             .collect()
     }
 
-    pub fn count(&self, text: &str) -> usize {
+    pub(super) fn count(&self, text: &str) -> usize {
         self.times_of(text).len()
     }
 
     /// Returns the number of frames, from any sender, that begin with `start`.
-    pub fn beginning(&self, start: &str) -> usize {
+    pub(super) fn beginning(&self, start: &str) -> usize {
         self.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
     }
 
-    pub fn board(&mut self, i: usize) -> &mut TestNode {
+    pub(super) fn board(&mut self, i: usize) -> &mut TestNode {
         self.members[i].board().expect("a board")
     }
 }
@@ -303,14 +307,14 @@ fn corrupted(frame: &Frame, bit: u8) -> Frame {
 }
 
 /// Input names of the boards of the golden chain.
-pub const CI: [&str; 2] = ["target velocity", "current limit"];
-pub const SO: [&str; 4] = ["pos_soll", "pos_ist", "current", "temperature"];
-pub const PAR: [&str; 3] = ["P", "I", "D"];
+pub(super) const CI: [&str; 2] = ["target velocity", "current limit"];
+pub(super) const SO: [&str; 4] = ["pos_soll", "pos_ist", "current", "temperature"];
+pub(super) const PAR: [&str; 3] = ["P", "I", "D"];
 
 /// Program ID and date of the program that every board of the bench has.
-pub const OLD: (u16, u16) = (0x1234, 0x386E);
+pub(super) const OLD: (u16, u16) = (0x1234, 0x386E);
 
-pub fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {
+pub(super) fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {
     let mut memory = MemoryFlash::default();
     let image = [0x55; 64];
     memory.install(Record { program_id: OLD.0, date: OLD.1, address: 0, words: 32 }, &image);
@@ -322,6 +326,6 @@ pub fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {
 }
 
 /// Returns the golden image: byte i is (37·i + 11) mod 256.
-pub fn image(len: usize) -> Vec<u8> {
+pub(super) fn image(len: usize) -> Vec<u8> {
     (0..len).map(|i| (37 * i + 11) as u8).collect()
 }

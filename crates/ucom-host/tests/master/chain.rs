@@ -4,7 +4,7 @@ use ucom_host::master::{InitOptions, Outcome, Request};
 
 use super::bench::Bench;
 
-pub fn initialised(flash_ids: &[u16]) -> Bench {
+pub(super) fn initialised(flash_ids: &[u16]) -> Bench {
     let mut bench = Bench::chain(flash_ids);
     match bench.go(Request::Init(InitOptions::default()), 60) {
         Ok(Outcome::Init(report)) => assert!(report.is_ok(), "{:?}", report.findings),

@@ -15,7 +15,7 @@ use ucom_sim::memory::WirePins;
 use super::bench::{Bench, From, Member, TestNode, frame, image, node};
 
 /// Options that allow everything.
-pub fn all() -> ConformanceOptions {
+pub(super) fn all() -> ConformanceOptions {
     let program = ConformanceProgram {
         board: 1,
         flash_number: 0x21,

@@ -5,7 +5,7 @@ use ucom_host::master::update::UpdateReport;
 use ucom_host::master::{Diagnose, Error, ErrorKind, InitReport};
 
 /// Exit code of the command, as its documentation defines it.
-pub trait Exit {
+pub(super) trait Exit {
     fn exit(&self) -> u8;
 }
 

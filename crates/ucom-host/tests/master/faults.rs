@@ -9,7 +9,7 @@ use super::chain::initialised;
 const IDS: [u16; 3] = [0x21, 0x42, 0x63];
 
 /// Every kind of fault for frame `at`; the frame's number determines the damaged bit.
-pub fn kinds(at: usize) -> [Fault; 6] {
+pub(super) fn kinds(at: usize) -> [Fault; 6] {
     let bit = (at * 7 + 3) as u8;
     [
         Fault::Lost,

@@ -5,7 +5,7 @@ use ucom::Frame;
 use super::bench::{Bench, MS, Member};
 
 /// A board as a table. The board accepts every block; the last rule defines the end of the update.
-pub struct Loader {
+pub(super) struct Loader {
     /// Program ID and date in `DSP_INFO` before and after the update.
     pub info: [&'static str; 2],
     /// Flash number that the board sends. It depends on the number of resets so far, and on whether the transfer was
@@ -30,7 +30,7 @@ pub struct Loader {
 }
 
 impl Loader {
-    pub fn new(blocks: usize) -> Self {
+    pub(super) fn new(blocks: usize) -> Self {
         Self {
             info: ["34126E38", "3F4BC13A"],
             flash: |_, _| "2100",
@@ -108,6 +108,6 @@ impl Member for Loader {
     }
 }
 
-pub fn loader(loader: Loader) -> Bench {
+pub(super) fn loader(loader: Loader) -> Bench {
     Bench::new(Default::default(), vec![Box::new(loader)])
 }

@@ -8,7 +8,7 @@ use super::bench::{MS, Member, frame};
 
 /// Bus member that consists of a table of frames.
 #[derive(Default)]
-pub struct Script {
+pub(super) struct Script {
     /// Rules: answers and their delays in milliseconds.
     rules: Vec<Rule>,
     due: BTreeMap<(u64, u64), Frame>,
@@ -27,16 +27,16 @@ struct Rule {
 
 impl Script {
     /// Each of `answers` is `"ms:frame"` or `"frame"`, for example `["441#21", "5:482#42"]`.
-    pub fn on(self, ask: &str, answers: &[&str]) -> Self {
+    pub(super) fn on(self, ask: &str, answers: &[&str]) -> Self {
         self.rule(ask, 0, u32::MAX, answers)
     }
 
     /// Like [`Self::on`], for the first request only.
-    pub fn once(self, ask: &str, answers: &[&str]) -> Self {
+    pub(super) fn once(self, ask: &str, answers: &[&str]) -> Self {
         self.rule(ask, 0, 1, answers)
     }
 
-    pub fn rule(mut self, ask: &str, skip: u32, uses: u32, answers: &[&str]) -> Self {
+    pub(super) fn rule(mut self, ask: &str, skip: u32, uses: u32, answers: &[&str]) -> Self {
         let answer = |text: &&str| match text.split_once(':') {
             Some((ms, text)) => (ms.parse::<u64>().unwrap() * MS, frame(text)),
             None => (300, frame(text)),
@@ -46,7 +46,7 @@ impl Script {
     }
 
     /// Sends a frame without a request at a time in milliseconds.
-    pub fn at(mut self, ms: u64, text: &str) -> Self {
+    pub(super) fn at(mut self, ms: u64, text: &str) -> Self {
         self.serial += 1;
         self.due.insert((ms * MS, self.serial), frame(text));
         self

@@ -15,14 +15,14 @@ use super::bench::{Bench, Fault, MS, OLD, Script, image};
 use super::chain::initialised;
 use super::loader::{Loader, loader};
 
-pub const DATE: u16 = 0x3AC1;
+pub(super) const DATE: u16 = 0x3AC1;
 
-pub fn options(boards: &[u8], len: usize) -> UpdateOptions {
+pub(super) fn options(boards: &[u8], len: usize) -> UpdateOptions {
     let targets = boards.iter().map(|b| UpdateTarget { board: *b, flash_number: None }).collect();
     UpdateOptions::new(targets, UpdateImage { bytes: image(len).into(), address_words: 0 }, DATE)
 }
 
-pub fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport {
+pub(super) fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport {
     match bench.go(Request::Update(options), 600) {
         Ok(Outcome::Update(report)) => report,
         other => panic!("{other:?} (fault {:?})", bench.fault),
@@ -30,7 +30,7 @@ pub fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport {
 }
 
 /// Returns these options with the flash records of an update with the same image.
-pub fn recorded(options: UpdateOptions, report: &UpdateReport) -> UpdateOptions {
+pub(super) fn recorded(options: UpdateOptions, report: &UpdateReport) -> UpdateOptions {
     let image = &options.image;
     let record = |info: &BoardInfo| FlashRecord::new(&image.bytes, image.address_words, info);
     let shown = report.boards.iter().filter_map(|board| board.after);
@@ -38,12 +38,12 @@ pub fn recorded(options: UpdateOptions, report: &UpdateReport) -> UpdateOptions 
     UpdateOptions { records, ..options }
 }
 
-pub fn outcomes(report: &UpdateReport) -> Vec<&str> {
+pub(super) fn outcomes(report: &UpdateReport) -> Vec<&str> {
     report.boards.iter().map(|b| b.outcome.name()).collect()
 }
 
 /// Checks that a board has the old program, the new one, or none, and never a part of one.
-pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) {
+pub(super) fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) {
     let record = bench.board(board).record();
     let bytes = bench.board(board).flash.bytes(Memory::Program).to_vec();
     match record.map(|r| (r.program_id, r.date)) {

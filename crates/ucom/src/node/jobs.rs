@@ -33,7 +33,7 @@ pub(super) struct Jobs {
 }
 
 impl Jobs {
-    pub const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             info: None,
             info_again: false,
@@ -49,14 +49,14 @@ impl Jobs {
     }
 
     /// Requests DSP_INFO. A request that arrives during such an answer is served afterwards, so strings are never mixed (D-14).
-    pub fn ask_info(&mut self) {
+    pub(super) fn ask_info(&mut self) {
         self.info_again = self.info.is_some();
         self.info = self.info.or(Some(Place::First));
     }
 
     /// Like `ask_info`, but sends no frame of the answer before `due_us`. By then the request with the same identifier has left the bus
     /// (D-05).
-    pub fn ask_dump_io(&mut self, due_us: u64) {
+    pub(super) fn ask_dump_io(&mut self, due_us: u64) {
         if let Some(Place::String { .. }) = self.dump_io {
             self.dump_io_again = Some(due_us);
         } else {
@@ -65,26 +65,26 @@ impl Jobs {
         }
     }
 
-    pub fn info_done(&mut self) {
+    pub(super) fn info_done(&mut self) {
         self.info = core::mem::take(&mut self.info_again).then_some(Place::First);
     }
 
-    pub fn dump_io_done(&mut self) {
+    pub(super) fn dump_io_done(&mut self) {
         let again = self.dump_io_again.take();
         self.dump_io = again.map(|_| Place::First);
         self.dump_io_at = again.unwrap_or(0);
     }
 
-    pub fn ask_dump_ci(&mut self) {
+    pub(super) fn ask_dump_ci(&mut self) {
         self.dump_ci_again = self.dump_ci.is_some();
         self.dump_ci = self.dump_ci.or(Some(0));
     }
 
-    pub fn forget_application(&mut self) {
+    pub(super) fn forget_application(&mut self) {
         *self = Self { info: self.info, info_again: self.info_again, ..Self::new() };
     }
 
-    pub fn deadline(&self) -> u64 {
+    pub(super) fn deadline(&self) -> u64 {
         if self.info.is_some() || self.so.is_some() || self.dump_ci.is_some() || self.text.is_some() {
             0
         } else if self.dump_io.is_some() {

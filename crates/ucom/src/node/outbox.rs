@@ -36,7 +36,7 @@ pub(super) struct Outbox {
 }
 
 impl Outbox {
-    pub const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             in_flight: None,
             trouble: false,
@@ -53,25 +53,25 @@ impl Outbox {
     }
 
     /// Drops answers of a transfer that has ended.
-    pub fn forget_transfer(&mut self) {
+    pub(super) fn forget_transfer(&mut self) {
         self.block_taken = false;
         self.finished = false;
     }
 
     /// Drops frames that only an application sends.
-    pub fn forget_application(&mut self) {
+    pub(super) fn forget_application(&mut self) {
         self.mca_ready = false;
         self.alive = false;
         self.admin_at = None;
     }
 
     /// Queues an error. Returns `false` if the queue is full.
-    pub fn push_error(&mut self, code: ErrorCode, from: Sequence) -> bool {
+    pub(super) fn push_error(&mut self, code: ErrorCode, from: Sequence) -> bool {
         let place = self.errors.iter_mut().find(|place| place.is_none());
         place.map(|place| *place = Some((code, from))).is_some()
     }
 
-    pub fn pop_error(&mut self) -> Option<(ErrorCode, Sequence)> {
+    pub(super) fn pop_error(&mut self) -> Option<(ErrorCode, Sequence)> {
         let first = self.errors.first().copied().flatten();
         self.errors.rotate_left(1);
         if let Some(last) = self.errors.last_mut() {
@@ -80,14 +80,14 @@ impl Outbox {
         first
     }
 
-    pub fn push_report(&mut self, due_us: u64) {
+    pub(super) fn push_report(&mut self, due_us: u64) {
         if let Some(place) = self.reports.iter_mut().find(|place| place.is_none()) {
             *place = Some((due_us, 0));
         }
     }
 
     /// Returns the earliest due time of the waiting frames.
-    pub fn deadline(&self) -> u64 {
+    pub(super) fn deadline(&self) -> u64 {
         let first_error = self.errors.first().is_some_and(Option::is_some);
         if self.ack || first_error || self.block_taken || self.finished || self.mca_ready || self.alive {
             return 0;

@@ -41,7 +41,7 @@ pub(super) struct Cycle {
 }
 
 impl Cycle {
-    pub fn bytes(&self) -> u32 {
+    pub(super) fn bytes(&self) -> u32 {
         self.header.length.saturating_mul(2)
     }
 }
@@ -63,7 +63,7 @@ pub(super) struct Programming {
 }
 
 impl Programming {
-    pub fn new(_: &Profile) -> Self {
+    pub(super) fn new(_: &Profile) -> Self {
         Self {
             block: [0; BLOCK_LEN],
             filled: 0,
@@ -77,27 +77,27 @@ impl Programming {
     }
 
     /// Starts a new transfer with cycle 1.
-    pub fn restart(&mut self, profile: &Profile) {
+    pub(super) fn restart(&mut self, profile: &Profile) {
         *self = Self::new(profile);
     }
 
     /// Drops the transfer. If an error occurred before, the board stays silent.
-    pub fn cancel(&mut self, profile: &Profile) {
+    pub(super) fn cancel(&mut self, profile: &Profile) {
         *self = Self { discard: self.discard, ..Self::new(profile) };
     }
 
-    pub const fn discarding(&self) -> bool {
+    pub(super) const fn discarding(&self) -> bool {
         self.discard
     }
 
     /// Allows the next block. Called when DSP_READY has left.
-    pub fn answered(&mut self) {
+    pub(super) fn answered(&mut self) {
         if self.work == Work::Answer {
             self.work = Work::None;
         }
     }
 
-    pub fn deadline(&self, now_us: u64, config: &NodeConfig) -> u64 {
+    pub(super) fn deadline(&self, now_us: u64, config: &NodeConfig) -> u64 {
         let pause = u64::from(config.profile.prog_frame_timeout) * 1000 + 1;
         match self.work {
             Work::None if self.filled > 0 => self.last_frame_us.saturating_add(pause),

@@ -3,7 +3,7 @@
 use core::fmt;
 
 /// Conversion of a key's value to and from text.
-pub trait Value: Sized {
+pub(crate) trait Value: Sized {
     /// Reads a value from a text.
     fn read(text: &str) -> Option<Self>;
     /// Writes a value as text.

@@ -4,12 +4,12 @@ use ucom::node::{Node, NodeConfig, Record};
 use ucom::{BoardInfo, Frame, Header, Profile, checksum, data_block};
 use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
-pub type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
+pub(super) type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
 
-pub const MS: u64 = 1000;
+pub(super) const MS: u64 = 1000;
 
 /// Boards and the frames on their bus.
-pub struct Bus {
+pub(super) struct Bus {
     pub boards: Vec<Board>,
     pub now: u64,
     /// Frames from the boards since the last `take`, with their times.
@@ -28,11 +28,11 @@ pub struct Bus {
 }
 
 /// Returns the worst-case duration of a classic frame at 1 Mbit/s, in microseconds.
-pub fn duration(frame: &Frame) -> u64 {
+pub(super) fn duration(frame: &Frame) -> u64 {
     55 + 10 * u64::from(frame.dlc())
 }
 
-pub fn application() -> MemoryApplication {
+pub(super) fn application() -> MemoryApplication {
     MemoryApplication::new(
         "UCoM2 head pan",
         &["pos_soll", "velocity"],
@@ -42,11 +42,11 @@ pub fn application() -> MemoryApplication {
 }
 
 /// The application of the golden vectors: Program ID 0x1234, 2008-03-14.
-pub const GOLDEN: Record = Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 };
+pub(super) const GOLDEN: Record = Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 };
 
 impl Bus {
     /// Boards with these flash numbers, programmed, powered up at time 0 and ready to listen.
-    pub fn new(flash_numbers: &[u16], profile: Profile) -> Self {
+    pub(super) fn new(flash_numbers: &[u16], profile: Profile) -> Self {
         let mut boards = Vec::new();
         for (flash_number, pins) in flash_numbers.iter().zip(WirePins::chain(flash_numbers.len())) {
             let mut flash = MemoryFlash::default();
@@ -72,19 +72,19 @@ impl Bus {
         bus
     }
 
-    pub fn one() -> Self {
+    pub(super) fn one() -> Self {
         Self::new(&[0x21], Profile::default())
     }
 
     /// Returns a bus with a board that has number 1 and its pin on; `received` is empty.
-    pub fn initialised() -> Self {
+    pub(super) fn initialised() -> Self {
         let mut bus = Self::one();
         bus.number(1);
         bus
     }
 
     /// Returns a bus with a board whose application is up.
-    pub fn started() -> Self {
+    pub(super) fn started() -> Self {
         let mut bus = Self::initialised();
         bus.send("301#");
         bus.run(50);
@@ -93,7 +93,7 @@ impl Bus {
     }
 
     /// Returns a bus with a board whose control loop runs.
-    pub fn running() -> Self {
+    pub(super) fn running() -> Self {
         let mut bus = Self::started();
         bus.send("541#");
         bus.run(5);
@@ -102,7 +102,7 @@ impl Bus {
     }
 
     /// Gives the next board its number.
-    pub fn number(&mut self, number: u8) {
+    pub(super) fn number(&mut self, number: u8) {
         self.send(&format!("{:03X}#", 0x280 + u16::from(number)));
         self.run(5);
         self.send(&format!("{:03X}#0202", 0x1C0 + u16::from(number)));
@@ -111,11 +111,11 @@ impl Bus {
     }
 
     /// Puts a frame of the PC on the bus now.
-    pub fn send(&mut self, text: &str) {
+    pub(super) fn send(&mut self, text: &str) {
         self.send_frame(&text.parse().unwrap_or_else(|e| panic!("{text}: {e}")));
     }
 
-    pub fn send_frame(&mut self, frame: &Frame) {
+    pub(super) fn send_frame(&mut self, frame: &Frame) {
         self.run_us(duration(frame));
         let number = self.frames_to_boards;
         self.frames_to_boards += 1;
@@ -129,11 +129,11 @@ impl Bus {
     }
 
     /// Lets milliseconds pass.
-    pub fn run(&mut self, ms: u64) {
+    pub(super) fn run(&mut self, ms: u64) {
         self.run_us(ms * MS);
     }
 
-    pub fn run_us(&mut self, us: u64) {
+    pub(super) fn run_us(&mut self, us: u64) {
         let end = self.now + us;
         // Number of steps in a row without a frame. Its limit below is far above the number of reasons to wake up.
         let mut quiet = 0;
@@ -185,7 +185,7 @@ impl Bus {
     }
 
     /// Sends the held frames now.
-    pub fn release(&mut self) {
+    pub(super) fn release(&mut self) {
         self.hold = |_| false;
         for (i, frame) in std::mem::take(&mut self.held) {
             self.boards[i].sent(self.now, &frame);
@@ -194,7 +194,7 @@ impl Bus {
     }
 
     /// Checks the invariants of the status byte (D-20).
-    pub fn check(&self) {
+    pub(super) fn check(&self) {
         for board in &self.boards {
             let status = board.status();
             assert_eq!(status.contradiction(), None, "{status} at {}", self.now);
@@ -202,12 +202,12 @@ impl Bus {
     }
 
     /// Returns the frames received since the last `take`.
-    pub fn take(&mut self) -> Vec<Frame> {
+    pub(super) fn take(&mut self) -> Vec<Frame> {
         std::mem::take(&mut self.received).into_iter().map(|(_, frame)| frame).collect()
     }
 
     /// Sends a frame, waits, and returns the frames received since then.
-    pub fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
+    pub(super) fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
         self.received.clear();
         self.send(text);
         self.run(ms);
@@ -215,7 +215,7 @@ impl Bus {
     }
 
     /// Returns DSP_INFO of board `n`; `None` if the board does not answer.
-    pub fn info(&mut self, n: u8) -> Option<BoardInfo> {
+    pub(super) fn info(&mut self, n: u8) -> Option<BoardInfo> {
         let id = 0x140 + u16::from(n);
         let endian = self.boards[0].config().profile.endian;
         let received = self.ask(&format!("{:03X}#", 0x200 + u16::from(n)), 20);
@@ -224,12 +224,12 @@ impl Bus {
     }
 
     /// Returns the status byte of board `n`, as read with PC_INFO.
-    pub fn status(&mut self, n: u8) -> u8 {
+    pub(super) fn status(&mut self, n: u8) -> u8 {
         self.info(n).unwrap_or_else(|| panic!("board {n} does not answer")).status.0
     }
 
     /// Sends a block in frames 200 µs apart and waits for an answer of board 1. Returns the received frames.
-    pub fn block(&mut self, block: &[u8; 64], wait_ms: u64) -> Vec<Frame> {
+    pub(super) fn block(&mut self, block: &[u8; 64], wait_ms: u64) -> Vec<Frame> {
         self.received.clear();
         for data in block.chunks_exact(8) {
             self.send_frame(&Frame::new(0x2C1, data).unwrap());
@@ -246,17 +246,17 @@ impl Bus {
 }
 
 /// Frames in candump's form, separated by blanks.
-pub fn frames(text: &str) -> Vec<Frame> {
+pub(super) fn frames(text: &str) -> Vec<Frame> {
     text.split_whitespace().map(|frame| frame.parse().unwrap()).collect()
 }
 
 /// Returns the image of the golden vectors: 1000 bytes.
-pub fn image() -> Vec<u8> {
+pub(super) fn image() -> Vec<u8> {
     (0..1000).map(|i| (37 * i + 11) as u8).collect()
 }
 
 /// Returns the header of an image for any board.
-pub fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
+pub(super) fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
     Header {
         cycle,
         memory: 0,
@@ -269,7 +269,7 @@ pub fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
 }
 
 /// Returns all blocks of both cycles, headers included.
-pub fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
+pub(super) fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
     let mut all = Vec::new();
     for cycle in 1..=2 {
         all.push(header(image, cycle, profile).build(profile.prog_endian));
@@ -279,7 +279,7 @@ pub fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
 }
 
 /// Sorts frames by identifier.
-pub fn sorted(mut received: Vec<Frame>) -> Vec<Frame> {
+pub(super) fn sorted(mut received: Vec<Frame>) -> Vec<Frame> {
     received.sort_by_key(Frame::id);
     received
 }

@@ -8,12 +8,12 @@ use ucom::{Checksum, Memory, Profile, Status};
 use super::bus::{Bus, GOLDEN, blocks, frames, header, image};
 
 /// Returns 200 bytes: four data blocks, the last one short.
-pub fn small() -> Vec<u8> {
+pub(super) fn small() -> Vec<u8> {
     (0..200u32).map(|i| (i * i % 251) as u8).collect()
 }
 
 /// Sends all blocks and waits for an answer after each one, whatever the answer is. Returns `true` if FINISHED came.
-pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
+pub(super) fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.send("041#");
     bus.run(1);
     let mut finished = false;
@@ -28,7 +28,7 @@ pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
 }
 
 /// Checks that the record of a valid application belongs to a complete image: the old one or the new one.
-pub fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
+pub(super) fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     let board = &bus.boards[0];
     let stored = board.flash.bytes(Memory::Program);
     match board.record() {
@@ -219,7 +219,7 @@ fn d40_exloader_then_application() {
     assert_eq!(bus.block(&header(&image, 1, &profile).build(Endian::Little), 5), frames("081#02"));
 }
 
-pub fn data(image: &[u8]) -> Vec<[u8; 64]> {
+pub(super) fn data(image: &[u8]) -> Vec<[u8; 64]> {
     (0..).map_while(|i| ucom::data_block(image, i)).collect()
 }
 

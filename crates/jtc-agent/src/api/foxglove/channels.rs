@@ -6,7 +6,7 @@ use jtc_host::recording::Topic;
 use super::protocol::{Channel, Service, Shape, Subscription};
 
 /// Number of the channel that carries the status as text. The other channels carry numbers.
-pub const STATUS: u32 = Topic::ALL.len() as u32 + 1;
+pub(super) const STATUS: u32 = Topic::ALL.len() as u32 + 1;
 const STATUS_SCHEMA: &str = r#"{
   "type": "object",
   "properties": {
@@ -24,16 +24,16 @@ const STATUS_SCHEMA: &str = r#"{
 }"#;
 
 /// Numbers of the services.
-pub const STOP: u32 = 1;
-pub const PAUSE: u32 = 2;
+pub(super) const STOP: u32 = 1;
+pub(super) const PAUSE: u32 = 2;
 
 /// Returns the topic of a channel; `None` for the text channel and for unknown channels.
-pub fn topic(channel: u32) -> Option<Topic> {
+pub(super) fn topic(channel: u32) -> Option<Topic> {
     Topic::ALL.get((channel as usize).checked_sub(1)?).copied()
 }
 
 /// Returns all channels.
-pub fn channels() -> Vec<Channel<'static>> {
+pub(super) fn channels() -> Vec<Channel<'static>> {
     let numbered = (1..).zip(Topic::ALL).map(|(id, topic)| {
         let (schema_name, schema) = topic.schema();
         Channel { id, topic: topic.name(), encoding: "cdr", schema_name, schema, schema_encoding: "ros2msg" }
@@ -50,7 +50,7 @@ pub fn channels() -> Vec<Channel<'static>> {
 }
 
 /// Returns the services Stop and Pause.
-pub fn services() -> Vec<Service<'static>> {
+pub(super) fn services() -> Vec<Service<'static>> {
     let shape =
         |schema_name, schema| Shape { encoding: "json", schema_name, schema_encoding: "jsonschema", schema };
     let service = |id, name| Service {
@@ -75,11 +75,14 @@ struct Subscribed {
 
 /// Subscriptions of a client, at most one per channel.
 #[derive(Default)]
-pub struct Subscriptions(BTreeMap<u32, Subscribed>);
+pub(super) struct Subscriptions(BTreeMap<u32, Subscribed>);
 
 impl Subscriptions {
     /// Adds a subscription. The error is a message for the user.
-    pub fn add(&mut self, Subscription { id, channel_id: channel }: &Subscription) -> Result<(), String> {
+    pub(super) fn add(
+        &mut self,
+        Subscription { id, channel_id: channel }: &Subscription,
+    ) -> Result<(), String> {
         if topic(*channel).is_none() && *channel != STATUS {
             return Err(format!("subscription {id} refused: channel {channel} does not exist"));
         }
@@ -97,12 +100,12 @@ impl Subscriptions {
     }
 
     /// Removes a subscription.
-    pub fn remove(&mut self, id: u32) {
+    pub(super) fn remove(&mut self, id: u32) {
         self.0.remove(&id);
     }
 
     /// Returns the subscriptions of constant data that have not received it yet.
-    pub fn take_latched(&mut self) -> Vec<u32> {
+    pub(super) fn take_latched(&mut self) -> Vec<u32> {
         let due = |(id, subscribed): (&u32, &mut Subscribed)| {
             std::mem::take(&mut subscribed.latched).then_some(*id)
         };
@@ -110,7 +113,7 @@ impl Subscriptions {
     }
 
     /// Returns the subscription and channel numbers of all subscriptions to changing data.
-    pub fn live(&self) -> Vec<(u32, u32)> {
+    pub(super) fn live(&self) -> Vec<(u32, u32)> {
         let live =
             self.0.iter().filter(|(_, subscribed)| topic(subscribed.channel) != Some(Topic::Description));
         live.map(|(id, subscribed)| (*id, subscribed.channel)).collect()

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 /// The two names of the protocol in the handshake.
-pub const NAMES: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
+pub(super) const NAMES: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 
 /// Text messages to a client.
 #[derive(serde::Serialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
-pub enum ToClient<'a> {
+pub(super) enum ToClient<'a> {
     /// First message.
     ServerInfo {
         name: &'a str,
@@ -28,7 +28,7 @@ pub enum ToClient<'a> {
 }
 
 impl ToClient<'_> {
-    pub fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         // The message contains only strings and numbers, so this cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
@@ -36,7 +36,7 @@ impl ToClient<'_> {
 
 #[derive(serde::Serialize)]
 #[serde(rename_all = "camelCase")]
-pub struct Channel<'a> {
+pub(super) struct Channel<'a> {
     pub id: u32,
     pub topic: &'a str,
     pub encoding: &'a str,
@@ -46,7 +46,7 @@ pub struct Channel<'a> {
 }
 
 #[derive(serde::Serialize)]
-pub struct Service<'a> {
+pub(super) struct Service<'a> {
     pub id: u32,
     pub name: &'a str,
     #[serde(rename = "type")]
@@ -58,7 +58,7 @@ pub struct Service<'a> {
 /// Format of a request or a response of a service.
 #[derive(serde::Serialize)]
 #[serde(rename_all = "camelCase")]
-pub struct Shape<'a> {
+pub(super) struct Shape<'a> {
     pub encoding: &'a str,
     pub schema_name: &'a str,
     pub schema_encoding: &'a str,
@@ -68,7 +68,7 @@ pub struct Shape<'a> {
 /// Text messages of a client.
 #[derive(serde::Deserialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
-pub enum FromClient {
+pub(super) enum FromClient {
     Subscribe {
         subscriptions: Vec<Subscription>,
     },
@@ -82,13 +82,13 @@ pub enum FromClient {
 
 #[derive(serde::Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub struct Subscription {
+pub(super) struct Subscription {
     pub id: u32,
     pub channel_id: u32,
 }
 
 /// Returns a message on a channel, for one subscription.
-pub fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> {
+pub(super) fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(13 + payload.len());
     bytes.push(1);
     bytes.extend(subscription.to_le_bytes());
@@ -99,7 +99,7 @@ pub fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> {
 
 /// Call of a service.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Call<'a> {
+pub(super) struct Call<'a> {
     pub service: u32,
     pub call: u32,
     pub encoding: &'a [u8],
@@ -107,7 +107,7 @@ pub struct Call<'a> {
 
 impl<'a> Call<'a> {
     /// Returns `None` if a binary message is not a valid call.
-    pub fn parse(bytes: &'a [u8]) -> Option<Self> {
+    pub(super) fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (2, rest) = bytes.split_first()? else { return None };
         let (service, rest) = number(rest)?;
         let (call, rest) = number(rest)?;
@@ -117,7 +117,7 @@ impl<'a> Call<'a> {
     }
 
     /// Returns the response message, in the encoding of the call.
-    pub fn answer(&self, payload: &[u8]) -> Vec<u8> {
+    pub(super) fn answer(&self, payload: &[u8]) -> Vec<u8> {
         let mut bytes = vec![3];
         bytes.extend(self.service.to_le_bytes());
         bytes.extend(self.call.to_le_bytes());

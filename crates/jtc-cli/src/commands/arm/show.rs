@@ -156,7 +156,7 @@ fn of_controller(values: &[ArmValue]) -> String {
 }
 
 /// Returns a row for each pose.
-pub fn poses(arm: &Arm, deg: bool) -> String {
+pub(crate) fn poses(arm: &Arm, deg: bool) -> String {
     let row = |(name, position): (&String, &[f64; 6])| {
         let cells = position.iter().map(|v| number(if deg { v * DEGREES } else { *v }));
         std::iter::once(name.clone()).chain(cells).collect()

@@ -12,7 +12,7 @@ use ratatui::widgets::{Cell, Row, Table};
 use super::super::status::{gripper_answers, gripper_state, joint_state};
 
 /// Colours of the joints, as in the report.
-pub const COLOURS: [Color; 6] = [
+pub(super) const COLOURS: [Color; 6] = [
     Color::Rgb(122, 165, 255),
     Color::Rgb(255, 157, 87),
     Color::Rgb(67, 211, 158),
@@ -37,7 +37,7 @@ const COLUMNS: [Column; 7] = [
 const WITH_WORDS: u16 = 56;
 
 /// Returns the number of rows.
-pub fn count(s: &Status) -> usize {
+pub(super) fn count(s: &Status) -> usize {
     s.joints.len() + usize::from(s.gripper.is_some())
 }
 
@@ -128,7 +128,7 @@ fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
 }
 
 /// Returns the rows from `first` on, at the width of the view.
-pub fn table(s: &Status, silent: bool, width: u16, framed: bool, first: usize) -> Table<'static> {
+pub(super) fn table(s: &Status, silent: bool, width: u16, framed: bool, first: usize) -> Table<'static> {
     let shown = |c: &&Column| width >= c.2;
     let mut widths: Vec<Constraint> = COLUMNS.iter().filter(shown).map(|c| Constraint::Length(c.1)).collect();
     if let Some(last) = widths.get_mut(COLUMNS.len() - 1) {

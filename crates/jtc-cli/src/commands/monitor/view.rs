@@ -30,7 +30,7 @@ const LEAST_ROWS: u16 = 3;
 const KEYS: &str = "s stops   q ends";
 
 /// State of the view.
-pub struct View {
+pub(super) struct View {
     port: String,
     last: Option<Status>,
     /// Time since the last status.
@@ -50,7 +50,7 @@ pub struct View {
 
 impl View {
     /// Creates the view of a controller at this port, before the first status.
-    pub fn new(port: String) -> Self {
+    pub(super) fn new(port: String) -> Self {
         Self {
             port,
             last: None,
@@ -65,7 +65,7 @@ impl View {
     }
 
     /// Takes a status.
-    pub fn push(&mut self, s: Status) {
+    pub(super) fn push(&mut self, s: Status) {
         for (j, joint) in s.joints.iter().enumerate() {
             let known = |value: f32| if is_measured(&s, j) { f64::from(value) } else { f64::NAN };
             for (history, value) in
@@ -81,14 +81,14 @@ impl View {
     }
 
     /// Returns the failure of the port, with the known state of the motion.
-    pub fn lost(&self, failure: Failure) -> Failure {
+    pub(super) fn lost(&self, failure: Failure) -> Failure {
         let moving = self.last.is_some_and(|s| s.is_executing());
         let message = format!("{}{}", failure.message, if moving { "; THE ARM MAY BE MOVING" } else { "" });
         Failure { message, ..failure }
     }
 
     /// Draws all parts that fit.
-    pub fn draw(&mut self, frame: &mut Frame<'_>) {
+    pub(super) fn draw(&mut self, frame: &mut Frame<'_>) {
         if too_small(frame, KEYS) {
             return;
         }

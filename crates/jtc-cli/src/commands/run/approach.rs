@@ -8,13 +8,13 @@ use serde_json::json;
 use super::Course;
 
 /// Prints the duration and the speed of an approach.
-pub fn note(duration_s: f64, course: &Course, speed: MoveSpeed, out: &Output) {
+pub(super) fn note(duration_s: f64, course: &Course, speed: MoveSpeed, out: &Output) {
     let of_speed = speed.note(course.speed_option).map_or(String::new(), |words| format!(", {words}"));
     out.note(format!("approach: {duration_s:.1} s to the first point{of_speed}"));
 }
 
 /// Returns the failure of a run whose approach is not possible. With `--json`, prints its verdict.
-pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Failure {
+pub(super) fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Failure {
     let verdict = match error {
         ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
         ApproachError::Check(CheckError::Refused(verdict)) => verdict,

@@ -20,14 +20,14 @@ use crate::link::LinkPort;
 const KEPT: usize = 1000;
 
 /// A finished motion.
-pub struct Done {
+pub(super) struct Done {
     pub phase: Phase,
     pub summary: Summary,
 }
 
 /// Finished motions: their number, and the figures of the last ones.
 #[derive(Default)]
-pub struct Finished {
+pub(super) struct Finished {
     kept: VecDeque<Done>,
     /// Number of runs, without approaches.
     runs: usize,
@@ -36,7 +36,7 @@ pub struct Finished {
 }
 
 impl Finished {
-    pub fn push(&mut self, done: Done) {
+    pub(super) fn push(&mut self, done: Done) {
         self.runs += usize::from(done.phase != Phase::Approach);
         if self.kept.len() == KEPT {
             self.kept.pop_front();
@@ -56,7 +56,7 @@ fn word(outcome: &Result<Outcome, Error>) -> &'static str {
 }
 
 /// Writes the files of a run and prints its outcome.
-pub fn conclude(
+pub(super) fn conclude(
     job: &Job,
     ended: Ended,
     taken: Taken,

@@ -11,13 +11,13 @@ use crate::failure::output_lost;
 use crate::tape::Tape;
 
 /// Files of a run, which are opened before the run.
-pub struct Outputs {
+pub(super) struct Outputs {
     record: Option<OutputFile>,
     report: Option<OutputFile>,
 }
 
 impl Outputs {
-    pub fn open(course: &Course) -> Result<Self, Failure> {
+    pub(super) fn open(course: &Course) -> Result<Self, Failure> {
         let mut others: Vec<&Path> = course.inputs.iter().map(|path| path.as_path()).collect();
         let files = &course.execute.files;
         let open = |path: Option<&Path>, others: &[&Path]| {
@@ -30,13 +30,13 @@ impl Outputs {
     }
 
     /// Begins the recording. If it was begun before, it starts again with an empty file.
-    pub fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
+    pub(super) fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
         self.record.as_mut().map(|file| Tape::begin(file, info, "the motion continues", out)).transpose()
     }
 
     /// Completes all files. The loss of one file does not affect the other. Returns the names of the complete files,
     /// and the failures.
-    pub fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
+    pub(super) fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
         let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
         let report =
             self.report.map(|file| (file.name(), file.write(report::html(input)).map_err(output_lost)));

@@ -27,7 +27,7 @@ use crate::operator::Operator;
 use crate::tape::Tape;
 
 /// Recording of a run.
-pub struct Reel {
+pub(super) struct Reel {
     pub info: RecordingInfo,
     pub tape: Option<Tape>,
     /// Start of its first motion, on the clock of the session.
@@ -44,7 +44,7 @@ impl Reel {
 }
 
 /// Recording and figures of a run.
-pub struct Taken {
+pub(super) struct Taken {
     /// Motions before the last one.
     pub done: Finished,
     /// Samples of the last motion, oldest first, on the clock of the whole run.
@@ -54,7 +54,7 @@ pub struct Taken {
 }
 
 /// The command that runs motions.
-pub struct Terminal<'a, 'o> {
+pub(super) struct Terminal<'a, 'o> {
     course: &'a Course,
     job: &'a Job,
     order: &'a Order<'a>,
@@ -77,7 +77,7 @@ pub struct Terminal<'a, 'o> {
 }
 
 impl<'a, 'o> Terminal<'a, 'o> {
-    pub fn new(
+    pub(super) fn new(
         course: &'a Course,
         job: &'a Job,
         order: &'a Order<'a>,
@@ -103,7 +103,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
     }
 
     /// Returns the recording and the figures of the run.
-    pub fn taken(self) -> Taken {
+    pub(super) fn taken(self) -> Taken {
         let Self { job, outputs, reel, done, last: samples, .. } = self;
         // Each motion begins the recording before the arm moves.
         let reel = reel.unwrap_or_else(|| Reel::new(RecordingInfo::of(&job.arm), None, Duration::ZERO));
@@ -265,7 +265,7 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
 }
 
 /// Returns the failure if the user ended the command before it moved the arm. `during` is the current step.
-pub fn cancelled(during: &str) -> Failure {
+pub(super) fn cancelled(during: &str) -> Failure {
     let message = format!("cancelled during the {during}; the motion was not started");
     Failure { message, ..Failure::of(&Error::Cancelled) }
 }

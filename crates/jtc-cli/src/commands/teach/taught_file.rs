@@ -27,7 +27,7 @@ struct Row {
 }
 
 /// File with the rows of the motion, and one pose each of the rest before and after the motion.
-pub struct TaughtFile {
+pub(super) struct TaughtFile {
     name: String,
     output: Option<OutputFile>,
     file: Option<File>,
@@ -41,7 +41,7 @@ pub struct TaughtFile {
 
 impl TaughtFile {
     /// Takes an output that stays unchanged until the arm moves.
-    pub fn new(output: OutputFile) -> Self {
+    pub(super) fn new(output: OutputFile) -> Self {
         Self {
             name: output.name(),
             output: Some(output),
@@ -55,17 +55,17 @@ impl TaughtFile {
     }
 
     /// Returns the name for users.
-    pub fn name(&self) -> &str {
+    pub(super) fn name(&self) -> &str {
         &self.name
     }
 
     /// Returns `true` if the file contains a motion.
-    pub fn is_begun(&self) -> bool {
+    pub(super) fn is_begun(&self) -> bool {
         self.file.is_some()
     }
 
     /// Takes the pose at a time (s). If the arm has moved, the pose is in the file when the function returns.
-    pub fn take(&mut self, time_s: f64, position: [f64; 6]) -> Result<(), Failure> {
+    pub(super) fn take(&mut self, time_s: f64, position: [f64; 6]) -> Result<(), Failure> {
         let slot = (time_s / GRID_S).round() as i64;
         if slot <= self.last_slot {
             return Ok(());
@@ -113,7 +113,7 @@ impl TaughtFile {
 
     /// Removes the rest at the end, and describes the content of the file. `None`: the arm was not moved, and no row
     /// was written. With a tolerance (rad), waypoints replace the motion.
-    pub fn finish(self, thin: Option<f64>) -> Result<Option<String>, Failure> {
+    pub(super) fn finish(self, thin: Option<f64>) -> Result<Option<String>, Failure> {
         let kept = self.in_motion();
         let Self { name, file, mut text, mut rows, .. } = self;
         let Some(mut file) = file else { return Ok(None) };

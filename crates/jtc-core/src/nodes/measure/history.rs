@@ -68,14 +68,14 @@ bit_codec!(History { answers, next, in_turn, as_predicted });
 
 impl History {
     /// Creates a history that has only this answer.
-    pub fn of(answer: &Answered) -> Self {
+    pub(super) fn of(answer: &Answered) -> Self {
         let kept = Kept { position: answer.position as f32, at_ms: answer.at_ms };
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
     /// Stores an answer. Returns the rate between the youngest answer that is old enough, and this one; `None` if there is no such answer.
     #[inline(always)]
-    pub fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
+    pub(super) fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
         self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
         // Nearly always an answer comes in each millisecond, so that only the oldest one is old enough.
@@ -109,7 +109,7 @@ impl History {
 
     /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since then. Only the answer of
     /// the last millisecond may be missing.
-    pub fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
+    pub(super) fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         let n = u32::from(ms).checked_sub(since_newest)?;
         (since_newest <= 1 && n <= u32::from(self.in_turn).min(SLOTS as u32 - 1))
@@ -117,12 +117,12 @@ impl History {
     }
 
     /// Returns the last answer.
-    pub fn newest(&self) -> Answered {
+    pub(super) fn newest(&self) -> Answered {
         self.nth(0)
     }
 
     /// Returns the position of the answer that belongs to this time, rad, if it is still stored.
-    pub fn at(&self, at_ms: u32) -> Option<f64> {
+    pub(super) fn at(&self, at_ms: u32) -> Option<f64> {
         (0..SLOTS).map(|n| self.nth(n)).find(|answer| answer.at_ms == at_ms).map(|answer| answer.position)
     }
 

@@ -86,54 +86,54 @@ impl Ways {
     }
 
     /// Returns the distance that the speed does not explain, rad.
-    pub fn unexplained(&self) -> f64 {
+    pub(crate) fn unexplained(&self) -> f64 {
         self.measured - self.reported
     }
 
     /// Returns the unexplained distance that is tolerated, rad.
-    pub fn tolerance(&self, config: &Config) -> f64 {
+    pub(crate) fn tolerance(&self, config: &Config) -> f64 {
         (STEPS * config.encoder_step).max(LEAST) + SHARE * self.reported.abs()
     }
 }
 
 impl Jumps {
     /// Returns the jump that is subtracted from each answer, rad.
-    pub fn taken_off(&self) -> f64 {
+    pub(super) fn taken_off(&self) -> f64 {
         self.taken_off
     }
 
     /// Returns the fault that was found since the drive was configured, with the size of a jump (rad) or the factor of a speed.
-    pub fn found(&self) -> Option<(StopKind, f64)> {
+    pub(super) fn found(&self) -> Option<(StopKind, f64)> {
         self.found.map(|kind| (kind, self.value.into()))
     }
 
     /// Returns `true` while it is not decided whether a possible jump is a jump.
     #[inline(always)]
-    pub fn watching(&self) -> bool {
+    pub(super) fn watching(&self) -> bool {
         self.answers > 0
     }
 
     /// Records that an answer came as expected.
     #[inline(always)]
-    pub fn as_expected(&mut self) {
+    pub(super) fn as_expected(&mut self) {
         self.answers = 0;
     }
 
     /// Subtracts this distance (rad) from each answer from now on.
-    pub fn take_off(&mut self, way: f64) {
+    pub(super) fn take_off(&mut self, way: f64) {
         self.taken_off += way;
         self.found = Some(StopKind::EncoderJump);
     }
 
     /// Stores that positions change `factor` times as fast as the reported speed.
-    pub fn find_factor(&mut self, factor: f32) {
+    pub(super) fn find_factor(&mut self, factor: f32) {
         (self.value, self.answers) = (factor, 0);
         self.found = Some(StopKind::SpeedScale);
     }
 
     /// Evaluates an unexpected answer at `at_ms`. `velocity`: velocity that the answer before it reported, rad/s. `twist`: largest twist of
     /// the gear, rad. A joint that is struck can move away from its motor within some answers, and stay there, but by less than this twist.
-    pub fn look(
+    pub(super) fn look(
         &mut self,
         answer: &Reading,
         velocity: f64,

@@ -36,13 +36,13 @@ bit_codec!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 impl Lateness {
     /// Returns `true` if no answer is considered late and the `answers` of a tick, at most one, are not evidence. [`Self::count`] need not
     /// be called for this tick.
-    pub fn stands(&self, answers: u8) -> bool {
+    pub(super) fn stands(&self, answers: u8) -> bool {
         self.left_ms == 0 && answers <= 1
     }
 
     /// Counts one tick, `elapsed_ms` after the last one, with this number of `answers`. `asked`: a Move was sent for it. Returns the
     /// lateness of the newest answer, ticks.
-    pub fn count(&mut self, asked: bool, answers: u8, elapsed_ms: u32) -> u8 {
+    pub(super) fn count(&mut self, asked: bool, answers: u8, elapsed_ms: u32) -> u8 {
         if self.left_ms == 0 {
             *self = Self { moves: u8::MAX, ..Self::default() };
         }
@@ -67,7 +67,7 @@ impl Lateness {
     }
 
     /// Corrects the count: the newest answer was only `late` ticks late, because some of the outstanding answers were lost.
-    pub fn lost(&mut self, late: u8) {
+    pub(super) fn lost(&mut self, late: u8) {
         let behind = self.moves & !u8::MAX.checked_shl(late.into()).unwrap_or(0);
         self.outstanding = self.outstanding.min(behind.count_ones() as u8);
         self.fewest = self.fewest.min(self.outstanding);

@@ -26,10 +26,10 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
 }
 
 impl Frame {
-    pub const IDENTITY: Self = Self { rotation: UNIT, position: [0.0; 3] };
+    pub(super) const IDENTITY: Self = Self { rotation: UNIT, position: [0.0; 3] };
 
     /// Creates the frame Rz(yaw)·Ry(pitch)·Rx(roll), which is the convention of URDF.
-    pub fn of(origin: &Origin) -> Self {
+    pub(super) fn of(origin: &Origin) -> Self {
         let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.map(f64::sin_cos);
         Self {
             rotation: [
@@ -42,7 +42,7 @@ impl Frame {
     }
 
     /// Returns xyz and rpy. If roll and yaw turn about the same axis, yaw is 0.
-    pub fn origin(&self) -> Origin {
+    pub(super) fn origin(&self) -> Origin {
         let r = &self.rotation;
         let cos_pitch = r[0][0].hypot(r[1][0]);
         let pitch = (-r[2][0]).atan2(cos_pitch);
@@ -54,12 +54,12 @@ impl Frame {
         Origin { xyz: self.position, rpy }
     }
 
-    pub fn is_identity(&self) -> bool {
+    pub(super) fn is_identity(&self) -> bool {
         *self == Self::IDENTITY
     }
 
     /// Transforms the frame `next` from this frame into this frame's parent.
-    pub fn then(&self, next: &Self) -> Self {
+    pub(super) fn then(&self, next: &Self) -> Self {
         let moved = applied(&self.rotation, &next.position);
         Self {
             rotation: product(&self.rotation, &next.rotation),
@@ -67,19 +67,19 @@ impl Frame {
         }
     }
 
-    pub fn inverse(&self) -> Self {
+    pub(super) fn inverse(&self) -> Self {
         let rotation = transposed(&self.rotation);
         let position = applied(&rotation, &self.position).map(|v| -v);
         Self { rotation, position }
     }
 
     /// Transforms a direction of this frame into its parent.
-    pub fn direction(&self, direction: &[f64; 3]) -> [f64; 3] {
+    pub(super) fn direction(&self, direction: &[f64; 3]) -> [f64; 3] {
         applied(&self.rotation, direction)
     }
 
     /// Returns a rotation that turns z to `axis`. Returns `None` if the axis is zero.
-    pub fn turning_z_to(axis: [f64; 3]) -> Option<Self> {
+    pub(super) fn turning_z_to(axis: [f64; 3]) -> Option<Self> {
         let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !(norm > 1e-9 && norm.is_finite()) {
             return None;
@@ -107,10 +107,10 @@ pub(super) struct Body {
 }
 
 impl Body {
-    pub const NONE: Self = Self { mass: 0.0, centre: [0.0; 3], inertia: [[0.0; 3]; 3] };
+    pub(super) const NONE: Self = Self { mass: 0.0, centre: [0.0; 3], inertia: [[0.0; 3]; 3] };
 
     /// Creates the body of a link in the link's frame.
-    pub fn of(link: &Link) -> Self {
+    pub(super) fn of(link: &Link) -> Self {
         let [xx, xy, xz, yy, yz, zz] = link.inertia;
         let own = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
         let frame = Frame::of(&link.origin);
@@ -119,7 +119,7 @@ impl Body {
     }
 
     /// Transforms the body from `frame` into its parent.
-    pub fn seen_from(&self, frame: &Frame) -> Self {
+    pub(super) fn seen_from(&self, frame: &Frame) -> Self {
         let turned = applied(&frame.rotation, &self.centre);
         Self {
             mass: self.mass,
@@ -141,7 +141,7 @@ impl Body {
     }
 
     /// Adds the mass and inertia of `other` to this body.
-    pub fn add(&mut self, other: &Self) {
+    pub(super) fn add(&mut self, other: &Self) {
         let mass = self.mass + other.mass;
         let centre = if mass == 0.0 {
             other.centre
@@ -157,7 +157,7 @@ impl Body {
     }
 
     /// Returns a link whose inertia frame is parallel to the link's frame.
-    pub fn link(&self) -> Link {
+    pub(super) fn link(&self) -> Link {
         let i = &self.inertia;
         Link {
             origin: Origin { xyz: self.centre, rpy: [0.0; 3] },

@@ -8,7 +8,7 @@ use crate::snapshot::BusSnapshot;
 
 /// Board as last seen.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct BoardObject {
+pub(crate) struct BoardObject {
     /// Number of the board.
     pub number: u8,
     /// Flash number of the bootloader, which identifies the board; missing before the first answer of the board.
@@ -50,7 +50,7 @@ pub struct BoardObject {
 
 /// Names of the values of a board's application.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct OffersObject {
+pub(crate) struct OffersObject {
     /// Description of the application.
     pub description: String,
     /// Names of controller inputs.
@@ -104,7 +104,7 @@ impl BoardObject {
 
 /// Board as it answered.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct FoundObject {
+pub(crate) struct FoundObject {
     /// Number of the board.
     pub number: u8,
     /// Flash number of the bootloader, which identifies the board.
@@ -133,7 +133,7 @@ impl FoundObject {
 
 /// Board as it answered after a command.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct AnswerObject {
+pub(crate) struct AnswerObject {
     /// Number of the board.
     pub board: u8,
     /// State: `exloader`, `programming`, `started`, `running`.

@@ -6,7 +6,7 @@ use crate::snapshot::BusSnapshot;
 
 /// Status of the bus, and the lease.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct StatusObject {
+pub(crate) struct StatusObject {
     /// `true` if the boards are simulated: nothing moves.
     pub simulated: bool,
     /// Name of the bus.
@@ -54,7 +54,7 @@ pub struct StatusObject {
 
 /// Lease, and its holder.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct LeaseObject {
+pub(crate) struct LeaseObject {
     /// Name of the holder.
     pub holder: String,
     /// Time since the holder took the lease, ms.
@@ -68,7 +68,7 @@ pub struct LeaseObject {
 
 /// State of this computer's CAN controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ControllerObject {
+pub(crate) struct ControllerObject {
     /// `true` if it is bus-off.
     pub bus_off: bool,
     /// Number of bus-off events.

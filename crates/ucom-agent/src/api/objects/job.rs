@@ -9,7 +9,7 @@ use crate::jobs::{Done, Job};
 
 /// Boards of the chain.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ChainObject {
+pub(crate) struct ChainObject {
     /// Boards with a number.
     pub boards: Vec<FoundObject>,
     /// Unusual observations; empty: none.
@@ -18,7 +18,7 @@ pub struct ChainObject {
 
 /// Finding of a diagnosis.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct FindingObject {
+pub(crate) struct FindingObject {
     /// Severity: `problem`, `warning` or `good`.
     pub severity: String,
     /// Text of the finding.
@@ -44,7 +44,7 @@ impl From<&Finding> for FindingObject {
 
 /// Result of an update for one board.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct UpdatedObject {
+pub(crate) struct UpdatedObject {
     /// Number of the board.
     pub board: u8,
     /// Flash number of the bootloader, which identifies the board.
@@ -73,7 +73,7 @@ pub struct UpdatedObject {
 
 /// Result of an update.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct UpdateObject {
+pub(crate) struct UpdateObject {
     /// `true` if the agent sent only requests that change nothing.
     pub dry_run: bool,
     /// Program ID that the boards must show; missing: not known.
@@ -117,7 +117,7 @@ impl UpdateObject {
 
 /// Running board.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct RunningObject {
+pub(crate) struct RunningObject {
     /// Number of the board.
     pub board: u8,
     /// `true` if its outputs are enabled.
@@ -126,7 +126,7 @@ pub struct RunningObject {
 
 /// Running boards.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct RunObject {
+pub(crate) struct RunObject {
     /// Boards that run.
     pub boards: Vec<RunningObject>,
     /// Predicted bus load of these boards, %.
@@ -135,7 +135,7 @@ pub struct RunObject {
 
 /// Job, while it runs and afterwards.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct JobObject {
+pub(crate) struct JobObject {
     /// Number of the job.
     pub number: u64,
     /// Description of the job.

@@ -12,7 +12,7 @@ const OLD_US: u64 = 500_000;
 
 /// Values of a board.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ValuesObject {
+pub(crate) struct ValuesObject {
     /// Number of the board.
     pub board: u8,
     /// Age of its outputs, s; missing before the first outputs.
@@ -33,7 +33,7 @@ pub struct ValuesObject {
 
 /// Value of a signal.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub struct ValueObject {
+pub(crate) struct ValueObject {
     /// Name of the signal.
     pub name: String,
     /// Index in the buffer.

@@ -14,12 +14,12 @@ pub(super) struct Lines<R> {
 
 impl<R: BufRead> Lines<R> {
     /// Creates a reader at the start of the file.
-    pub fn new(input: R) -> Self {
+    pub(super) fn new(input: R) -> Self {
         Self { input, number: 0, endless: false, failed: false }
     }
 
     /// Returns the next line without surrounding blanks; `None` at the end of the file. The memory is bounded for any input.
-    pub fn line(&mut self) -> Result<Option<String>, RecordingError> {
+    pub(super) fn line(&mut self) -> Result<Option<String>, RecordingError> {
         let mut line = Vec::new();
         self.input.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line)?;
         if line.is_empty() {
@@ -35,7 +35,7 @@ impl<R: BufRead> Lines<R> {
 
     /// Returns the next record. `parse` creates it from its line, and `comment` receives the comment lines before it. The sequence ends
     /// after the first error.
-    pub fn record(
+    pub(super) fn record(
         &mut self,
         parse: fn(&str) -> Result<Record, RecordProblem>,
         comment: impl FnMut(&str),

@@ -29,21 +29,21 @@ pub(super) struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    pub fn new(link: &'a Link, options: &'a ConformanceOptions, found: &'a Found) -> Self {
+    pub(super) fn new(link: &'a Link, options: &'a ConformanceOptions, found: &'a Found) -> Self {
         Self { link, options, found, sent: Vec::new(), came: Vec::new() }
     }
 
-    pub fn profile(&self) -> Profile {
+    pub(super) fn profile(&self) -> Profile {
         self.link.profile()
     }
 
     /// Returns the sent and the received frames.
-    pub fn log(self) -> (Vec<String>, Vec<String>) {
+    pub(super) fn log(self) -> (Vec<String>, Vec<String>) {
         (self.sent, self.came)
     }
 
     /// Sends a frame. Frames received before are discarded.
-    pub async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
+    pub(super) async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
         let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
         let Some(frame) = Frame::new(function.id(number), data) else { return };
         if self.sent.len() < KEPT {
@@ -54,14 +54,14 @@ impl<'a> Bench<'a> {
     }
 
     /// Returns all frames that boards send within `us` µs, except those that they send without a request.
-    pub async fn receive(&mut self, us: u64) -> Vec<Frame> {
+    pub(super) async fn receive(&mut self, us: u64) -> Vec<Frame> {
         let all = self.hear_all(us).await;
         let answer = |f: &Frame| f.address().is_ok_and(|(function, _)| !NOISE.contains(&function));
         all.into_iter().map(|(_, f)| f).filter(answer).collect()
     }
 
     /// Like `receive`, but includes all functions and the time of each frame.
-    pub async fn hear_all(&mut self, us: u64) -> Vec<(u64, Frame)> {
+    pub(super) async fn hear_all(&mut self, us: u64) -> Vec<(u64, Frame)> {
         let until = self.link.now() + us;
         let mut all = Vec::new();
         while let Some((at, frame)) = self.link.next_raw(until).await {
@@ -77,7 +77,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Returns the first frame with this function and number that arrives within `us` µs.
-    pub async fn wait(&mut self, function: Function, from: u8, us: u64) -> Option<Frame> {
+    pub(super) async fn wait(&mut self, function: Function, from: u8, us: u64) -> Option<Frame> {
         let until = self.link.now() + us;
         while let Some((_, frame)) = self.link.next_raw(until).await {
             self.keep(&frame);
@@ -96,7 +96,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Returns the values in the answer to PC_INFO; `None` if the board does not answer.
-    pub async fn info(&mut self, board: u8) -> Option<BoardInfo> {
+    pub(super) async fn info(&mut self, board: u8) -> Option<BoardInfo> {
         for _ in 0..3 {
             self.send(Function::Info, board, &[]).await;
             let first = self.wait(Function::DspInfo, board, self.link.times().info).await;
@@ -110,7 +110,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Checks that a board has the expected status bits. The bits of the pins and of autostart are ignored.
-    pub async fn status_is(&mut self, board: u8, bits: u8, step: &str) -> Result<(), Verdict> {
+    pub(super) async fn status_is(&mut self, board: u8, bits: u8, step: &str) -> Result<(), Verdict> {
         let mask = !(Status::IPINIT | Status::OPINIT | Status::ASTART);
         match self.info(board).await {
             Some(info) if info.status & mask == Status(bits) & mask => Ok(()),
@@ -123,7 +123,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Ends or resumes the heartbeats of this PC.
-    pub fn heartbeats(&self, on: bool) {
+    pub(super) fn heartbeats(&self, on: bool) {
         self.link.with(|core| match on {
             true => core.start_session(),
             false => core.session = Session::Quiet,
@@ -131,7 +131,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Starts the application, but not its loop.
-    pub async fn started(&mut self, board: u8) -> Result<Result<(), Verdict>, Error> {
+    pub(super) async fn started(&mut self, board: u8) -> Result<Result<(), Verdict>, Error> {
         match start_application(self.link, board).await {
             Ok(_) => {}
             Err(e) => return skipped_or(e),

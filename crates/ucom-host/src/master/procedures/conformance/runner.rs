@@ -25,7 +25,7 @@ pub(super) struct Runner<'a> {
 }
 
 impl<'a> Runner<'a> {
-    pub fn new(link: &'a Link, options: &'a ConformanceOptions, found: &'a Found) -> Self {
+    pub(super) fn new(link: &'a Link, options: &'a ConformanceOptions, found: &'a Found) -> Self {
         Self { link, options, found, report: Default::default(), unnumbered: false, at: None }
     }
 
@@ -61,7 +61,7 @@ impl<'a> Runner<'a> {
     }
 
     /// Runs every allowed test. Other tests are skipped, with the reason.
-    pub async fn all(&mut self) -> Result<(), Error> {
+    pub(super) async fn all(&mut self) -> Result<(), Error> {
         let planned = self.planned();
         for (i, (test, board)) in planned.iter().copied().enumerate() {
             let talk = match (test.level.needs(self.options), &test.run) {
@@ -127,7 +127,7 @@ impl<'a> Runner<'a> {
     }
 
     /// Records the tests that were skipped because the run ended early.
-    pub fn skip_rest(&mut self, why: &str) {
+    pub(super) fn skip_rest(&mut self, why: &str) {
         for (test, board) in self.planned() {
             if self.report.tests.iter().any(|t| t.id == test.id && t.board == board) {
                 continue;

@@ -39,46 +39,46 @@ pub(super) struct UpdateSession {
 }
 
 impl UpdateSession {
-    pub fn new(options: UpdateOptions) -> Self {
+    pub(super) fn new(options: UpdateOptions) -> Self {
         let results = options.targets.iter().map(|t| UpdateResult::new(t.board)).collect();
         let (active, to_start, programming) = (Vec::new(), Vec::new(), Vec::new());
         Self { options, results, active, starting: None, to_start, programming, stages: BTreeMap::new() }
     }
 
-    pub fn result(&mut self, board: u8) -> Option<&mut UpdateResult> {
+    pub(super) fn result(&mut self, board: u8) -> Option<&mut UpdateResult> {
         self.results.iter_mut().find(|r| r.board == board)
     }
 
     /// Marks the board as in progress. Other boards of its group may be in progress as well.
-    pub fn begin(&mut self, board: u8) {
+    pub(super) fn begin(&mut self, board: u8) {
         if !self.active.contains(&board) {
             self.active.push(board);
         }
     }
 
-    pub fn stage(&self, board: u8) -> Stage {
+    pub(super) fn stage(&self, board: u8) -> Stage {
         self.stages.get(&board).copied().unwrap_or_default()
     }
 
     /// Returns `true` if the old application is, or may be, completely or partly erased.
-    pub fn may_be_erased(&self, board: u8) -> bool {
+    pub(super) fn may_be_erased(&self, board: u8) -> bool {
         self.stage(board) > Stage::Untouched
     }
 
-    pub fn reach(&mut self, board: u8, stage: Stage) {
+    pub(super) fn reach(&mut self, board: u8, stage: Stage) {
         let known = self.stages.entry(board).or_default();
         *known = stage.max(*known);
     }
 
     /// Records that PC_INFO shows the same state as before the update, so the frames that might have erased the board did not do so.
-    pub fn proved_untouched(&mut self, board: u8) {
+    pub(super) fn proved_untouched(&mut self, board: u8) {
         if self.stage(board) == Stage::MaybeErased {
             self.stages.remove(&board);
         }
     }
 
     /// Records that the board shows the program and that this tool has written it.
-    pub fn prove(&mut self, board: u8) {
+    pub(super) fn prove(&mut self, board: u8) {
         if let Some(result) = self.result(board) {
             result.verified = true;
         }
@@ -88,7 +88,7 @@ impl UpdateSession {
         self.results.iter().any(|r| r.board == board && r.verified)
     }
 
-    pub fn end(&mut self, board: u8, outcome: UpdateOutcome, failure: Option<UpdateFailure>) {
+    pub(super) fn end(&mut self, board: u8, outcome: UpdateOutcome, failure: Option<UpdateFailure>) {
         self.active.retain(|b| *b != board);
         if let Some(result) = self.result(board) {
             result.outcome = outcome;
@@ -97,7 +97,7 @@ impl UpdateSession {
     }
 
     /// Records a failure. The outcome is derived from the change of the board's memory so far.
-    pub fn fail(&mut self, board: u8, failure: UpdateFailure) {
+    pub(super) fn fail(&mut self, board: u8, failure: UpdateFailure) {
         let outcome = match self.stage(board) {
             Stage::Untouched if matches!(failure, UpdateFailure::Cancelled { .. }) => {
                 UpdateOutcome::Cancelled
@@ -113,7 +113,7 @@ impl UpdateSession {
     }
 
     /// Records an error of a step. The kind of failure depends on the state of the board's memory.
-    pub fn fail_with(&mut self, board: u8, error: Error) {
+    pub(super) fn fail_with(&mut self, board: u8, error: Error) {
         let (kind, error) = (error.kind(), Box::new(error));
         let failure = match self.stage(board) {
             Stage::Untouched => match kind {
@@ -128,7 +128,7 @@ impl UpdateSession {
     }
 
     /// Records a cancel by the user. If the board was commanded to start and is not known to be stopped, it may be running.
-    pub fn cancel(&mut self, board: u8) {
+    pub(super) fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
         let started = self.starting == Some(board);
         if let Some(result) = self.result(board) {
@@ -138,55 +138,55 @@ impl UpdateSession {
     }
 
     /// Cancels the starts of boards that are otherwise done.
-    pub fn cancel_starts(&mut self) {
+    pub(super) fn cancel_starts(&mut self) {
         for board in core::mem::take(&mut self.to_start) {
             let left = self.outcome(board);
             self.end(board, left, Some(UpdateFailure::Cancelled { left }));
         }
     }
 
-    pub fn outcome(&self, board: u8) -> UpdateOutcome {
+    pub(super) fn outcome(&self, board: u8) -> UpdateOutcome {
         self.results.iter().find(|r| r.board == board).map(|r| r.outcome).unwrap_or_default()
     }
 
     /// Returns the boards whose update has not begun.
-    pub fn open(&self) -> Vec<u8> {
+    pub(super) fn open(&self) -> Vec<u8> {
         let open = |r: &&UpdateResult| r.failure.is_none() && r.outcome == UpdateOutcome::NotStarted;
         self.results.iter().filter(open).map(|r| r.board).collect()
     }
 
     /// Refuses the update of all boards that have not begun.
-    pub fn refuse(&mut self, error: &Error) {
+    pub(super) fn refuse(&mut self, error: &Error) {
         for board in self.open() {
             self.fail(board, UpdateFailure::Refused(Box::new(error.clone())));
         }
     }
 
     /// Skips all boards whose update has not begun, because board `after` failed.
-    pub fn skip_open(&mut self, after: u8) {
+    pub(super) fn skip_open(&mut self, after: u8) {
         for board in self.open() {
             self.fail(board, UpdateFailure::Skipped { after });
         }
     }
 
     /// Returns the boards that are in progress or have not begun.
-    pub fn unfinished(&self) -> Vec<u8> {
+    pub(super) fn unfinished(&self) -> Vec<u8> {
         let mut boards = self.active.clone();
         boards.extend(self.open().iter().filter(|b| !self.active.contains(b)));
         boards
     }
 
-    pub fn flash_number(&self, board: u8) -> Option<u16> {
+    pub(super) fn flash_number(&self, board: u8) -> Option<u16> {
         self.results.iter().find(|r| r.board == board).and_then(|r| r.flash_number)
     }
 
     /// Returns the board's state before the update.
-    pub fn before(&self, board: u8) -> Option<BoardInfo> {
+    pub(super) fn before(&self, board: u8) -> Option<BoardInfo> {
         self.results.iter().find(|r| r.board == board).and_then(|r| r.before)
     }
 
     /// Returns the plan for one board, or for a group of boards.
-    pub fn plan(&self, link: &Link, board: Option<u8>) -> Result<UpdatePlan, Error> {
+    pub(super) fn plan(&self, link: &Link, board: Option<u8>) -> Result<UpdatePlan, Error> {
         let named = board.and_then(|b| self.flash_number(b)).filter(|_| self.options.name_target);
         Ok(UpdatePlan::new(&self.options, named.unwrap_or(Header::ANY_BOARD), &link.profile())?)
     }

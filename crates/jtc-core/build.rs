@@ -51,15 +51,17 @@ fn generate(arm: &Table) -> String {
     let links = tables(arm, "link", &[7]);
     let friction = tables(arm, "friction_table", &[1, 6]);
     let name = get(arm, "name").as_str().expect("arms/avena.toml: the name is a text");
-    let _ = writeln!(s, "/// Name of the arm.\npub const NAME: &str = {name:?};");
+    let _ = writeln!(s, "/// Name of the arm.\npub(crate) const NAME: &str = {name:?};");
     let _ = writeln!(
         s,
-        "/// Acceleration of gravity in the base frame, m/s².\npub const GRAVITY: [f64; 3] = {:?};",
+        "/// Acceleration of gravity in the base frame, m/s².\npub(crate) const GRAVITY: [f64; 3] = {:?};",
         numbers(get(arm, "gravity_m_s2"))
     );
 
-    let _ =
-        writeln!(s, "/// Limits and rotor inertia per joint.\npub const JOINT_CONFIG: [JointConfig; 6] = [");
+    let _ = writeln!(
+        s,
+        "/// Limits and rotor inertia per joint.\npub(crate) const JOINT_CONFIG: [JointConfig; 6] = ["
+    );
     for j in &joints[..6] {
         let n = |key: &str| number(get(j, key));
         let rotor = j.get("rotor_inertia_kg_m2").map_or(0.0, number);
@@ -76,7 +78,7 @@ fn generate(arm: &Table) -> String {
             n("position_error_max_rad"),
         );
     }
-    let _ = writeln!(s, "];\n/// Gains per joint.\npub const PID: [PidGains; 6] = [");
+    let _ = writeln!(s, "];\n/// Gains per joint.\npub(crate) const PID: [PidGains; 6] = [");
     for j in &joints[..6] {
         let pid = get(j, "pid").as_table().expect("pid is a table");
         let n = |key: &str| number(get(pid, key));
@@ -93,13 +95,14 @@ fn generate(arm: &Table) -> String {
     let polynomials: Vec<_> = joints[..6].iter().map(|j| numbers(get(j, "friction_polynomial"))).collect();
     let _ = writeln!(
         s,
-        "];\n/// Friction polynomial c0..c5 per joint.\npub const POLYNOMIAL: [[f64; 6]; 6] = {polynomials:?};"
+        "];\n/// Friction polynomial c0..c5 per joint.\npub(crate) const POLYNOMIAL: [[f64; 6]; 6] = {polynomials:?};"
     );
 
     let origin = |t: &Table, xyz: &str, rpy: &str| {
         format!("Origin {{ xyz: {:?}, rpy: {:?} }}", numbers(get(t, xyz)), numbers(get(t, rpy)))
     };
-    let _ = writeln!(s, "/// Kinematics and masses.\npub const MODEL: ArmModel = ArmModel {{ joints: [");
+    let _ =
+        writeln!(s, "/// Kinematics and masses.\npub(crate) const MODEL: ArmModel = ArmModel {{ joints: [");
     for j in &joints {
         let _ = writeln!(s, "{},", origin(j, "origin_xyz_m", "origin_rpy_rad"));
     }
@@ -115,7 +118,7 @@ fn generate(arm: &Table) -> String {
     }
     let _ = writeln!(
         s,
-        "] }};\n/// Friction tables: one for all joints, or one each.\npub static TABLES: [TableOf<f32>; {}] = [",
+        "] }};\n/// Friction tables: one for all joints, or one each.\npub(crate) static TABLES: [TableOf<f32>; {}] = [",
         friction.len()
     );
     for t in &friction {

@@ -70,6 +70,7 @@ fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
 
 #[cfg(unix)]
 pub use terminal::Keys;
+#[cfg(unix)]
 pub(crate) use terminal::restore;
 
 #[cfg(unix)]

@@ -71,7 +71,7 @@ struct Current<T> {
 }
 
 struct State<D, T> {
-    /// Functions of Stops that have not begun, the newest first.
+    /// Functions of Stops that have not begun, the oldest first.
     stopping: VecDeque<(T, Act<D>)>,
     waiting: VecDeque<Request<D, T>>,
     current: Option<Current<T>>,
@@ -115,6 +115,7 @@ impl<D, T: Clone> Queue<D, T> {
     }
 
     /// Like [`Queue::stop`], for a Stop that needs no turn, for example because another program has stopped the device.
+    /// [`Queue::refuse_late`] should follow.
     pub fn count_stop(&self) -> u64 {
         self.lock().count_stop()
     }
@@ -126,7 +127,7 @@ impl<D, T: Clone> Queue<D, T> {
             drop(state);
             act(Err(Refused::Closed));
         } else if !alike || state.stopping.is_empty() {
-            state.stopping.push_front((tag, act));
+            state.stopping.push_back((tag, act));
         }
         number
     }

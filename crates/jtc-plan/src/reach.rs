@@ -6,8 +6,8 @@ use crate::{ArmDynamics, JOINTS, Limits};
 /// Number of rows per point: acceleration and torque of each joint in both directions.
 const ROWS: usize = 4 * JOINTS;
 
-/// Share of a limit that is less than the rounding of the others.
-const NEGLIGIBLE: f64 = 1e-12;
+/// Largest share of a limit that may be neglected.
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// Limits at one place, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
 struct Rows {
@@ -36,7 +36,7 @@ pub(crate) fn fastest(
     };
     let step = |(i, cell): (usize, &Cell)| {
         let rows = |end: usize| Rows::new(&cell.ends[end], shares[i], cap(i + end), limits, arm);
-        Step::new([rows(0), rows(1)], cap(i), cell.to - cell.from)
+        Step::new([rows(0), rows(1)], [cap(i), cap(i + 1)], cell.to - cell.from)
     };
     let steps: Vec<Step> = cells.iter().enumerate().map(step).collect();
     let squares = along_the_steps(&steps);
@@ -57,7 +57,7 @@ fn along_the_steps(steps: &[Step]) -> Vec<f64> {
     // Forward: the largest acceleration at each place.
     let mut squares = vec![0.0; steps.len() + 1];
     for (i, step) in steps.iter().enumerate() {
-        let next = squares[i] + 2.0 * step.length * step.most(squares[i]).0;
+        let next = squares[i] + 2.0 * step.length * step.fastest(squares[i]);
         squares[i + 1] = next.clamp(0.0, highest[i + 1]);
     }
     squares
@@ -83,8 +83,10 @@ struct Step {
 }
 
 impl Step {
-    /// Makes the step between two places with these rows. At the second place ṡ² is larger by 2·length·s̈.
-    fn new(rows: [Rows; 2], mut cap: f64, length: f64) -> Self {
+    /// Makes the step between two places with these rows and caps. At the second place ṡ² is larger by 2·length·s̈.
+    fn new(rows: [Rows; 2], caps: [f64; 2], length: f64) -> Self {
+        // |s̈| is at most highest/(2·length).
+        let (mut cap, highest) = (caps[0], caps[0].max(caps[1]));
         let (mut upper, mut lower) = (Vec::new(), Vec::new());
         for (rows, added) in rows.iter().zip([0.0, 2.0 * length]) {
             for row in 0..ROWS {
@@ -93,13 +95,21 @@ impl Step {
                 if !limit.is_finite() {
                     continue;
                 }
-                // A share of s̈ that is lost in rounding: the row limits ṡ² alone.
-                if by_acceleration.abs() * cap <= NEGLIGIBLE * length * limit {
-                    cap = if by_speed > 0.0 { cap.min(limit / by_speed) } else { cap };
-                    continue;
+                let size = by_acceleration.abs();
+                // The row limits ṡ² alone if the share of s̈ is negligible: beside the limit, or because the row shifts the place by a
+                // negligible part of the step (x·ṡ² + u·s̈ is x·ṡ² at a distance of u/2x).
+                let negligible = size * highest <= NEGLIGIBLE * length * limit
+                    || size <= NEGLIGIBLE * length * by_speed.abs();
+                // Likewise, if the row at the first place permits a higher ṡ² only if the arm then comes to rest within the step.
+                let rests =
+                    added == 0.0 && by_acceleration > 0.0 && by_acceleration <= 2.0 * length * by_speed;
+                if (negligible || rests) && by_speed > 0.0 {
+                    cap = cap.min(limit / by_speed);
                 }
-                let bounds = if by_acceleration > 0.0 { &mut upper } else { &mut lower };
-                bounds.push(Line { at: limit / by_acceleration, by: -by_speed / by_acceleration });
+                if !negligible {
+                    let bounds = if by_acceleration > 0.0 { &mut upper } else { &mut lower };
+                    bounds.push(Line { at: limit / by_acceleration, by: -by_speed / by_acceleration });
+                }
             }
         }
         Self { length, cap, upper, lower }
@@ -123,11 +133,21 @@ impl Step {
             .fold(none, |a, b| if b.0 > a.0 { b } else { a })
     }
 
+    /// Returns the largest possible s̈ at this ṡ². If rounding has made it smaller than the smallest one, the bound that rounding changes
+    /// less has priority: the one that depends less on ṡ².
+    fn fastest(&self, square: f64) -> f64 {
+        let (most, least) = (self.most(square), self.least(square));
+        if most.0 < least.0 && least.1.by.abs() < most.1.by.abs() { least.0 } else { most.0 }
+    }
+
     /// Returns the largest ṡ² from which a possible s̈ leads to at most `next` and at least 0 at the next place.
     ///
     /// The difference of the largest and the smallest s̈ is a concave function of ṡ², and not negative at 0. So Newton's method from the cap
-    /// downwards ends at its zero after at most one iteration per pair of bounds.
+    /// downwards ends at its zero after at most one iteration per bound.
     fn highest(&self, next: f64) -> f64 {
+        if self.length <= 0.0 {
+            return self.cap.min(next);
+        }
         let slope = -0.5 / self.length;
         let (to_next, to_rest) = (Line { at: -slope * next, by: slope }, Line { at: 0.0, by: slope });
         let mut square = self.cap;
@@ -140,8 +160,11 @@ impl Step {
                 break;
             }
             let crossing = (most.1.at - least.1.at) / (least.1.by - most.1.by);
-            // Rounding must not lead upwards.
-            square = crossing.clamp(0.0, square);
+            if crossing >= square {
+                // Rounding is larger than the remaining difference.
+                break;
+            }
+            square = crossing.max(0.0);
         }
         square
     }
@@ -171,5 +194,109 @@ impl Rows {
             }
         }
         rows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Returns rows (coefficient of ṡ², coefficient of s̈, limit); the others have no limit.
+    fn rows(given: &[(f64, f64, f64)]) -> Rows {
+        let mut rows =
+            Rows { by_speed: [0.0; ROWS], by_acceleration: [0.0; ROWS], limit: [f64::INFINITY; ROWS] };
+        for (i, (by_speed, by_acceleration, limit)) in given.iter().enumerate() {
+            (rows.by_speed[i], rows.by_acceleration[i], rows.limit[i]) =
+                (*by_speed, *by_acceleration, *limit);
+        }
+        rows
+    }
+
+    /// Returns the rows of one joint with these derivatives of the path.
+    fn joint(first: f64, second: f64, limit: f64) -> Rows {
+        rows(&[(second, first, limit), (-second, -first, limit)])
+    }
+
+    #[test]
+    fn a_bend_that_begins_suddenly_is_passed_without_a_stop() {
+        let cap = |first: f64| (1.0 / first).powi(2);
+        let straight = |first: f64| {
+            Step::new([joint(first, 0.0, 1.0), joint(first, 0.0, 1.0)], [cap(first); 2], 1.0 / 16.0)
+        };
+        let bent = |i: usize| {
+            let first = |i: usize| 0.05 + 0.2 * i as f64;
+            let ends = [joint(first(i), 20.0, 1.0), joint(first(i + 1), 20.0, 1.0)];
+            Step::new(ends, [cap(first(i)), cap(first(i + 1))], 0.01)
+        };
+        let before = (0..16).map(|_| straight(0.05));
+        let steps: Vec<Step> =
+            before.chain((0..9).map(bent)).chain((0..16).map(|_| straight(1.85))).collect();
+        let squares = along_the_steps(&steps);
+        assert!(squares[1..steps.len()].iter().all(|square| *square > 1e-3), "{squares:?}");
+    }
+
+    #[test]
+    fn a_coefficient_of_rounding_breaks_no_other_limit() {
+        let start = rows(&[(1.0, 6.123e-17, 8.733361872477616), (0.0, 1.0, 10.0), (0.0, -1.0, 10.0)]);
+        let end = rows(&[(1.0, 6e-17, 8.733361872477616), (0.0, 1.0, 10.0), (0.0, -1.0, 10.0)]);
+        let step = Step::new([start, end], [4e4; 2], 0.01);
+        let fastest = step.fastest(step.highest(4e4));
+        assert!(fastest.abs() <= 10.0 + 1e-5, "{fastest}");
+    }
+
+    #[test]
+    fn a_low_cap_of_one_place_drops_no_limit_of_the_other() {
+        let step = Step::new([joint(1.0, 0.0, 1.0), joint(1.0, 0.0, 1.0)], [1e-14, 9.0], 0.05);
+        assert!(step.fastest(0.0) <= 1.0);
+    }
+
+    #[test]
+    fn a_step_without_length_keeps_the_speed_of_the_next_place() {
+        let step = Step::new([joint(1.0, 0.0, 1.0), joint(1.0, 0.0, 1.0)], [4.0; 2], 0.0);
+        assert_eq!((step.highest(1.0), step.highest(9.0)), (1.0, 4.0));
+    }
+
+    /// Largest x of a program in two variables, from all its corners: rows a·x + b·u ≤ c.
+    fn largest_of_the_corners(rows: &[(f64, f64, f64)]) -> f64 {
+        let mut largest: f64 = 0.0;
+        for (i, (a, b, c)) in rows.iter().enumerate() {
+            for (d, e, f) in &rows[i + 1..] {
+                let determinant = a * e - b * d;
+                if determinant.abs() < 1e-12 {
+                    continue;
+                }
+                let (x, u) = ((c * e - b * f) / determinant, (a * f - c * d) / determinant);
+                if rows.iter().all(|(a, b, c)| a * x + b * u <= c + 1e-9 * (1.0 + c.abs())) {
+                    largest = largest.max(x);
+                }
+            }
+        }
+        largest
+    }
+
+    proptest! {
+        #[test]
+        fn the_highest_speed_is_that_of_the_best_corner(
+            start in prop::collection::vec((-5.0..5.0f64, 0.01..5.0f64, any::<bool>(), 0.01..5.0f64), 1..6),
+            end in prop::collection::vec((-5.0..5.0f64, 0.01..5.0f64, any::<bool>(), 0.01..5.0f64), 1..6),
+            length in 0.01..1.0f64,
+            next in 0.0..4.0f64,
+            cap in 0.1..9.0f64,
+        ) {
+            let signed = |list: &[(f64, f64, bool, f64)]| -> Vec<(f64, f64, f64)> {
+                list.iter().map(|(a, b, up, c)| (*a, if *up { *b } else { -b }, *c)).collect()
+            };
+            let (start, end) = (signed(&start), signed(&end));
+            // This kind of row has a lower cap on purpose.
+            prop_assume!(start.iter().all(|(a, b, _)| !(*b > 0.0 && *b <= 2.0 * length * a)));
+            let step = Step::new([rows(&start), rows(&end)], [cap; 2], length);
+            let mut all = start;
+            all.extend(end.iter().map(|(a, b, c)| (*a, b + 2.0 * length * a, *c)));
+            all.extend([(1.0, 0.0, cap), (-1.0, 0.0, 0.0), (1.0, 2.0 * length, next), (-1.0, -2.0 * length, 0.0)]);
+            let (ours, best) = (step.highest(next), largest_of_the_corners(&all));
+            prop_assert!((ours - best).abs() <= 1e-6 * (1.0 + best), "{} {}", ours, best);
+        }
     }
 }

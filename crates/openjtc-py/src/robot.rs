@@ -188,8 +188,7 @@ impl Link {
         if self.worker.is_closed() {
             return Ok(());
         }
-        let rested = self.worker.end_motion(py);
-        self.worker.end(py).and(rested)
+        self.worker.end(py)
     }
 
     fn run(slf: &Bound<'_, Self>, trajectory: &Trajectory, options: Options) -> Result<Motion, Failure> {

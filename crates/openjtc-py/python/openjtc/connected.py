@@ -64,7 +64,9 @@ class Connected:
             self._note_stop()
 
     def _note_stop(self) -> None:
-        self._stops[threading.get_ident()] = self._link.asked()
+        thread = threading.get_ident()
+        # In a forked process `asked` is 0.
+        self._stops[thread] = max(self._stops.get(thread, 0), self._link.asked())
 
     def _stopped_since(self, asked: int) -> bool:
         """Returns true if this thread has stopped the arm since the number of Stops was `asked`."""

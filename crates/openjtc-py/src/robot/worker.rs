@@ -62,11 +62,14 @@ impl Worker {
         let (opened, is_open) = channel::<Result<String, Failure>>();
         let own = Arc::clone(&shared);
         let asked = Asked::now(&shared);
-        let body = move || match WorkerState::open(target, own, &asked) {
-            Err(failure) => drop(opened.send(Err(failure))),
-            Ok(mut state) => {
-                let _ = opened.send(Ok(state.port_name()));
-                serve(&mut state);
+        let body = move || {
+            let _closing = Closing(Arc::clone(&own));
+            match WorkerState::open(target, own, &asked) {
+                Err(failure) => drop(opened.send(Err(failure))),
+                Ok(mut state) => {
+                    let _ = opened.send(Ok(state.port_name()));
+                    serve(&mut state);
+                }
             }
         };
         let thread = std::thread::Builder::new().name("openjtc".into()).spawn(body)?;
@@ -91,6 +94,10 @@ impl Worker {
         let asked = Asked::after(&self.shared, at);
         self.put(at, move |state| {
             state.begin(&asked)?;
+            // The begin may have waited, and a Stop may have come.
+            if asked.is_halted() {
+                return Err(jtc_host::Error::Cancelled.into());
+            }
             job(state, &asked)
         })
     }
@@ -108,7 +115,10 @@ impl Worker {
         after: u64,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> Result<Receiver<Result<T, Failure>>, Failure> {
-        self.is_here()?;
+        if self.is_closed() {
+            self.is_here()?;
+            return Err(closed());
+        }
         let (act, came) = act(job);
         self.shared.queue.put(Request { kind: Kind::Command, after, tag: (), act });
         self.wake();
@@ -123,8 +133,8 @@ impl Worker {
         self.is_here()?;
         let (act, came) = act(job);
         self.shared.queue.stop((), act);
-        self.shared.queue.refuse_late();
         self.wake();
+        self.shared.queue.refuse_late();
         Ok(came)
     }
 
@@ -162,12 +172,6 @@ impl Worker {
         self.is_here()?;
         self.shared.will_stop_all();
         let came = self.overtake(WorkerState::stop)?;
-        Ok(self.wait(py, came)??)
-    }
-
-    /// Stops the motion and the teaching of this connection, and waits for standstill. Cancels all earlier requests.
-    pub(super) fn end_motion(&self, py: Python<'_>) -> PyResult<()> {
-        let came = self.overtake(WorkerState::rest)?;
         Ok(self.wait(py, came)??)
     }
 
@@ -271,21 +275,24 @@ impl Worker {
         Ok(())
     }
 
-    /// Takes no further requests and waits until the thread has ended the connection. A signal ends the wait.
-    pub(super) fn end(&self, py: Python<'_>) -> PyResult<()> {
+    /// Takes no further requests, stops the motion and the teaching of this connection, waits for standstill, and ends the connection. A
+    /// signal ends the wait.
+    pub fn end(&self, py: Python<'_>) -> PyResult<()> {
         if self.is_foreign() {
             return Ok(());
         }
+        // Before the Stop, so that no request can begin after it.
         self.shared.end();
-        self.wake();
-        let Some(thread) = lock(&self.thread).take() else { return Ok(()) };
+        let came = self.overtake(WorkerState::rest)?;
+        let rested = self.wait(py, came);
+        let Some(thread) = lock(&self.thread).take() else { return Ok(rested??) };
         while !thread.is_finished() {
             py.detach(|| std::thread::sleep(Duration::from_millis(2)));
             py.check_signals()?;
         }
         // A panic of the thread was already reported in the thread.
         let _ = thread.join();
-        Ok(())
+        Ok(rested??)
     }
 
     /// Returns `true` if another process owns the connection.
@@ -320,18 +327,31 @@ fn act<T: Send + 'static>(
             Refused::Stopped | Refused::Cancelled => jtc_host::Error::Cancelled.into(),
             Refused::Closed => closed(),
         };
-        let result = state.map_err(refused).and_then(job);
+        let result = state.map_err(refused).and_then(|state| {
+            let result = job(state);
+            state.shared.queue.done();
+            result
+        });
         // The caller may have stopped waiting.
         let _ = done.send(result);
     };
     (Box::new(act), came)
 }
 
-/// Does the requests one after the other. Reads statuses between them, so that the last status is always recent. At the end, stops a motion
-/// of this connection.
+/// Closes the queue when the thread ends, in whatever way, so that no caller waits for an answer without end.
+struct Closing(Arc<Shared>);
+
+impl Drop for Closing {
+    fn drop(&mut self) {
+        self.0.queue.close();
+    }
+}
+
+/// Does the requests one after the other. Reads statuses between them, so that the last status is always recent. At the end, does the
+/// Stops that wait, and stops a motion of this connection.
 fn serve(state: &mut WorkerState) {
     let shared = Arc::clone(&state.shared);
-    while !shared.has_ended() {
+    while !shared.has_ended() || shared.queue.stop_waits() {
         let done = catch_unwind(AssertUnwindSafe(|| {
             match shared.queue.take() {
                 Some(turn) => turn.run(state),

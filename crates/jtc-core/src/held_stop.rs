@@ -1,22 +1,11 @@
 //! Held stops (J-69): moving joints come to rest, the arm is held, and the cause is kept for the host.
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, Reactions, StopCause, StopKind};
 
-use crate::bit_codec::bit_codec;
 use crate::controller::Controller;
+use crate::last_stop::LastStop;
 use crate::motion::RUSH;
 use crate::teach::too_fast;
 use crate::{JOINTS, TrajectoryState, joint_error};
-
-/// Cause of the last held stop.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct LastStop {
-    cause: StopCause,
-    /// Tick in which the stop began; 0 without a stop.
-    tick: u64,
-}
-
-bit_codec!(StopCause { kind, joint, value, limit });
-bit_codec!(LastStop { cause, tick });
 
 /// Returns this `error` for each joint of a mask.
 fn errors_of(joints: u8, error: u16) -> [u16; JOINTS] {

@@ -13,7 +13,7 @@ use crate::controller::Controller;
 use crate::defaults;
 use crate::errors::Errors;
 use crate::friction::celsius;
-use crate::held_stop::LastStop;
+use crate::last_stop::LastStop;
 use crate::host_parameters::{HostParameters, read_pid};
 use crate::io::{HostEvent, Inputs};
 use crate::nodes::GRIPPER;
@@ -21,7 +21,7 @@ use crate::parameters::PidGains;
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
 use priority::Priority;
 use slices::{SliceOutcome, SliceProgress};
-use upload::LineUpload;
+use line_upload::LineUpload;
 
 /// Joints and gripper in a mask of nodes.
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;

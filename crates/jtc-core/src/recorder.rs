@@ -22,6 +22,7 @@ use jtc_wire::{Answer, LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState, RawPoint};
 
 use crate::bit_codec::{BitCodec, BitSink};
 use crate::controller::Controller;
+use crate::extension::state::LogRequest;
 use crate::io::{Inputs, Outputs};
 use inputs::Reference;
 use memory::Writer;
@@ -48,15 +49,6 @@ pub const AFTER_ERROR_MS: u16 = 300;
 const EARLY_SNAPSHOT_MS: u16 = 250;
 /// Ticks for which recording pauses after a page was requested, so that the block that is being read is not overwritten.
 const HELD_MS: u16 = 2_000;
-
-/// Request of a host to the recorder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum LogRequest {
-    /// Sends a page to this line, from a byte of a block on.
-    Page { line: usize, block: u32, offset: u16 },
-    /// Discards the log and begins a new one.
-    Clear,
-}
 
 /// The recorder. `P` is a piece of its memory: blocks that keep their contents during a reset and are not cached.
 ///

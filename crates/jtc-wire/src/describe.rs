@@ -1,9 +1,10 @@
 //! Text of a frame: one line, as in a network sniffer. `{:#}` adds all numbers.
 use core::fmt::{Display, Formatter, Result};
 
-use crate::command::{Command, Floats};
+use crate::command::Command;
 use crate::encode::FloatName;
 use crate::extension::Answer;
+use crate::floats::Floats;
 use crate::frame::{FrameRef, FrameType, HEADER, field};
 use crate::segment::Segment;
 use crate::status::Status;

@@ -4,8 +4,9 @@
 use core::fmt;
 
 use crate::crc16;
-use crate::encode::EncodeError;
+use crate::error::EncodeError;
 use crate::frame::{FRAME_MIN, FrameRef, FrameType, HEADER, POINT_LEN};
+use crate::layout::{ANSWER_MAX, PAGE_HEAD_LEN, VALUE_LEN};
 use crate::segment::RawPoint;
 
 mod image;
@@ -14,23 +15,13 @@ mod log;
 mod reactions;
 
 pub use image::{ArmImage, FrictionImage, Hash, IMAGE_MAX, field as image_field};
-pub(crate) use log::LOG_HEAD_LEN;
 pub use log::{LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState};
 pub use reactions::{Reactions, StopCause, StopKind};
 
-pub(crate) use info::INFO_LEN;
 pub use info::{BootCause, INFO_WRITTEN, Info, Program, SIMULATOR, StoreState, capability};
 
 /// Version of the extensions that this crate implements. Later versions only add to it.
 pub const EXTENSION_VERSION: u8 = 1;
-/// Longest frame that answers an extension request (J-56).
-pub const ANSWER_MAX: usize = 256;
-/// Bytes of a [`SettingValue`].
-pub const VALUE_LEN: usize = 10;
-/// Highest number of values in a SetSettings frame.
-pub const SET_VALUES_MAX: usize = 256;
-/// Length of the head of a Settings, Arm or Points body: the number of the first item or byte, and the total number.
-pub(crate) const PAGE_HEAD_LEN: usize = 4;
 /// Highest number of values in a Settings frame.
 pub const PAGE_VALUES: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / VALUE_LEN;
 /// Highest number of bytes of the arm image in an Arm frame.

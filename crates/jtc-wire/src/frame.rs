@@ -3,7 +3,7 @@ use core::ops::Range;
 
 use crate::code::codes;
 use crate::crc16;
-use crate::extension::{ANSWER_MAX, INFO_LEN, LOG_HEAD_LEN, PAGE_HEAD_LEN, SET_VALUES_MAX, VALUE_LEN};
+use crate::layout::{ANSWER_MAX, INFO_LEN, LOG_HEAD_LEN, PAGE_HEAD_LEN, SET_VALUES_MAX, VALUE_LEN};
 
 /// First byte of every frame.
 pub const HEADER: u8 = 0x9B;

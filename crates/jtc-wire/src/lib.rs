@@ -16,9 +16,12 @@ mod command;
 mod crc;
 mod describe;
 mod encode;
+mod error;
 mod extension;
 pub mod fixed;
+mod floats;
 mod frame;
+mod layout;
 mod receive;
 mod response;
 mod segment;
@@ -31,26 +34,28 @@ pub mod words;
 pub use batch::{EVENTS_MAX, EventBatch, ReceivedEvent};
 pub use bits::{can_flag, error, joint_error, missing_parameter};
 pub use code::{Code, Known};
-pub use command::{ALL_NODES, Command, ExecCommand, Floats};
+pub use command::{ALL_NODES, Command, ExecCommand};
 pub use crc::{crc16, crc16_update};
 pub use describe::{Described, Piece, Pieces, pieces};
 pub use encode::{
-    Channel, EncodeError, FloatName, FrictionTable, OutOfScale, arm_model, floats, friction_polynomial,
-    friction_table, pid_param, set_settings, trajectory,
+    FrictionTable, arm_model, floats, friction_polynomial, friction_table, pid_param, set_settings,
+    trajectory,
 };
+pub use error::{Channel, EncodeError, FloatName, OutOfScale};
 /// The states of drives and gripper in a status are those of the joint bus.
 pub use jtc_bus::{Joint, NodeState};
 
 pub use extension::{
-    ANSWER_MAX, Answer, ArmImage, BootCause, EXTENSION_VERSION, FrictionImage, Hash, IMAGE_MAX, INFO_WRITTEN,
-    Info, LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState, NAME_LEN, Name, PAGE_BYTES, PAGE_POINTS, PAGE_VALUES,
-    Points, Program, Reactions, SET_VALUES_MAX, SIMULATOR, SettingValue, StopCause, StopKind, StoreState,
-    VALUE_LEN, Values, capability,
+    Answer, ArmImage, BootCause, EXTENSION_VERSION, FrictionImage, Hash, IMAGE_MAX, INFO_WRITTEN, Info,
+    LOG_NO_BLOCK, LOG_PAGE, LogPage, LogState, NAME_LEN, Name, PAGE_BYTES, PAGE_POINTS, PAGE_VALUES, Points,
+    Program, Reactions, SIMULATOR, SettingValue, StopCause, StopKind, StoreState, Values, capability,
 };
+pub use floats::Floats;
 pub use frame::{
     FRAME_MAX, FRAME_MIN, FRAME_POINTS_MAX, FrameRef, FrameType, HEADER, JOINTS, Lengths, POINT_LEN,
     TRAJECTORY_OVERHEAD,
 };
+pub use layout::{ANSWER_MAX, SET_VALUES_MAX, VALUE_LEN};
 pub use receive::{FromDevice, StatusCounters, StatusReceiver};
 pub use response::{DataStatus, FrameStatus, Response};
 pub use segment::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, Segment, VELOCITY_SCALE};

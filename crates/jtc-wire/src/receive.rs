@@ -1,6 +1,7 @@
 //! The host's stream parser: finds JtcStatus frames and answers to extension requests in bytes that arrive in pieces of any length.
-use crate::extension::{ANSWER_MAX, Answer};
+use crate::extension::Answer;
 use crate::frame::{FrameRef, FrameType, HEADER, field};
+use crate::layout::ANSWER_MAX;
 use crate::status::Status;
 
 /// Bytes and statuses received so far.

@@ -1,12 +1,7 @@
-//! Parts of the extensions for logs (J-56): the hash of the firmware, and the points of the trajectory.
-use jtc_wire::{Answer, Hash, PAGE_POINTS, POINT_LEN, Points, RawPoint};
+//! Points of the trajectory, for logs (J-56).
+use jtc_wire::{Answer, PAGE_POINTS, POINT_LEN, Points, RawPoint};
 
 use crate::controller::Controller;
-
-/// Returns the hash of a firmware's version and revision, which identifies the firmware in a log (FNV-1a, 64 bits).
-pub fn firmware_hash(version: &str, revision: &str) -> u64 {
-    Hash::new().update(version.as_bytes()).update(&[0]).update(revision.as_bytes()).value()
-}
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Answers with the points in memory, including those of a trajectory that was discarded (J-56).

@@ -10,6 +10,7 @@ use super::snapshot::{Origin, Snapshot};
 use super::{Block, chain, check};
 use crate::bit_codec::{BitCodec, BitSink, BitSource};
 use crate::controller::Controller;
+use crate::extension::state::LogRequest;
 use crate::io::{HostEvent, Inputs, Outputs};
 use crate::nodes::FRAMES_MAX;
 use crate::telemetry::Telemetry;
@@ -243,7 +244,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
             status_free: recorded.status_free,
         };
         let outputs = self.controller.tick(&inputs);
-        if let Some(super::LogRequest::Page { line, .. }) = self.controller.extensions.log_request.take() {
+        if let Some(LogRequest::Page { line, .. }) = self.controller.extensions.log_request.take() {
             let page = jtc_wire::LogPage {
                 state: LogState::Recording,
                 block: 0,

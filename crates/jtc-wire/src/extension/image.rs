@@ -1,6 +1,7 @@
 //! The arm image (J-54): all parameters of an arm in one block of bytes, for storing, reading back and hashing.
-use super::{NAME_LEN, Name, VALUE_LEN, Values};
-use crate::command::Floats;
+use super::{NAME_LEN, Name, Values};
+use crate::floats::Floats;
+use crate::layout::VALUE_LEN;
 
 /// Positions of the parts in the image.
 pub mod field {

@@ -2,14 +2,13 @@
 use core::fmt;
 
 use super::reactions::{REACTIONS_LEN, Reactions};
-use super::{ANSWER_MAX, EXTENSION_VERSION, LogState, NAME_LEN, Name};
+use super::{EXTENSION_VERSION, LogState, NAME_LEN, Name};
 use crate::bits::missing_parameter;
 use crate::code::codes;
 use crate::frame::FRAME_MIN;
+use crate::layout::{ANSWER_MAX, INFO_LEN};
 use crate::words::{self, Bits};
 
-/// Minimum length of an [`Info`]. Later versions are longer.
-pub(crate) const INFO_LEN: usize = 136;
 /// Length of an [`Info`] that this version writes.
 pub const INFO_WRITTEN: usize = 168;
 /// Name of the board of a simulator, whose drives are simulated (J-52).

@@ -1,12 +1,10 @@
 //! Pages of the flight recorder's log (J-56).
 use core::fmt;
 
-use super::ANSWER_MAX;
 use crate::code::codes;
 use crate::frame::FRAME_MIN;
+use crate::layout::{ANSWER_MAX, LOG_HEAD_LEN};
 
-/// Length of the body before the bytes of the log.
-pub(crate) const LOG_HEAD_LEN: usize = 17;
 /// Highest number of bytes of the log in a Log frame, in whole words.
 pub const LOG_PAGE: usize = (ANSWER_MAX - FRAME_MIN - LOG_HEAD_LEN) & !3;
 /// Block number that no log contains. A GetLog with this number returns the extent of the log, without bytes.

@@ -1,0 +1,92 @@
+//! State of the controller for the extensions.
+use jtc_wire::{BootCause, Hash, LogState, Name, Program, StoreState};
+
+use super::answers::Answers;
+use super::image::StoredArm;
+use crate::defaults;
+
+/// Request of a host to the recorder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LogRequest {
+    /// Sends a page to this line, from a byte of a block on.
+    Page { line: usize, block: u32, offset: u16 },
+    /// Discards the log and begins a new one.
+    Clear,
+}
+
+/// Identity of the device, as its board knows it (J-52).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Identity {
+    /// The board.
+    pub board: &'static str,
+    /// Version of the firmware.
+    pub firmware: &'static str,
+    /// Git revision of the firmware.
+    pub revision: &'static str,
+    /// Number of starts of the device.
+    pub boots: u32,
+    /// Cause of the last start.
+    pub boot_cause: BootCause,
+    /// Program in the flash of the board. `None` if the board has none, or has not read it (J-67).
+    pub program: Option<Program>,
+}
+
+/// State of the controller for the extensions.
+#[derive(Clone, Debug)]
+pub(crate) struct Extensions {
+    pub answers: Answers,
+    pub stored: StoredArm,
+    /// The stored arm must be written to non-volatile memory.
+    pub store_requested: bool,
+    /// An arm is stored but not in use, because it could not be loaded or written. The built-in arm does not replace it.
+    pub unusable: bool,
+    /// Hash of the arm in use; `None` until it is computed again.
+    pub hash: Option<u64>,
+    /// Ticks since a frame of a host was received.
+    pub hosts_silent_ms: u32,
+    /// Time left in which a Jog with a velocity is refused. This time begins again with each such Jog.
+    pub jogs_refused_ms: u16,
+    /// Progress of the hash of the arm.
+    pub(super) hashed: (usize, Hash),
+    pub identity: Identity,
+    /// Hash of the firmware's version and revision.
+    pub firmware_hash: u64,
+    /// State of the flight recorder, and the pending request of a host to it (J-56).
+    pub log: LogState,
+    pub log_request: Option<LogRequest>,
+    pub(super) name: Name,
+    pub(super) store: StoreState,
+    pub(super) sequence: u32,
+}
+
+impl Extensions {
+    /// Refuses jogs after a jog was stopped, so that a key that is still held down causes no motion (J-58).
+    pub(crate) fn refuse_jogs(&mut self) {
+        self.jogs_refused_ms = crate::jog::LASTS_MS;
+    }
+
+    pub(crate) fn new() -> Self {
+        Self {
+            answers: Answers::new(),
+            stored: StoredArm::new(),
+            store_requested: false,
+            unusable: false,
+            hash: None,
+            hosts_silent_ms: 0,
+            jogs_refused_ms: 0,
+            hashed: (0, Hash::new()),
+            identity: Identity::default(),
+            firmware_hash: firmware_hash("", ""),
+            log: LogState::Absent,
+            log_request: None,
+            name: Name::cut(defaults::NAME),
+            store: StoreState::Absent,
+            sequence: 0,
+        }
+    }
+}
+
+/// Returns the hash of a firmware's version and revision, which identifies the firmware in a log (FNV-1a, 64 bits).
+pub fn firmware_hash(version: &str, revision: &str) -> u64 {
+    Hash::new().update(version.as_bytes()).update(&[0]).update(revision.as_bytes()).value()
+}

@@ -352,7 +352,7 @@ mod tests {
         bench.request(Kind::Command, 2, 7);
         assert!(bench.queue.stop_waits());
         bench.serve();
-        assert_eq!(bench.device, [6, 5, 7, 1, 4]);
+        assert_eq!(bench.device, [5, 6, 7, 1, 4]);
     }
 
     #[test]

@@ -75,7 +75,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     // A run uses the rotor values of the controller.
     let sim = Sim::start(&["--no-throttle"]).held();
     let output = sim.jtc(&["traj", "run", file, "--arm", urdf]).ends(0);
-    assert!(output.err.contains("without friction, which"), "{}", output.err);
+    assert!(output.err.contains("without friction: the file"), "{}", output.err);
 }
 
 /// J-55: a URDF has neither friction nor gains. The missing values are not replaced by the values of another arm.

@@ -101,7 +101,11 @@ fn j55_an_arm_that_is_not_whole_is_not_pushed() {
     let path = dir.path().join("arm.toml");
     std::fs::write(&path, text).unwrap();
     let output = jtc(&["arm", "push", path.to_str().unwrap(), "--port", "/nowhere/tty"]).ends(2);
-    assert!(output.err.contains("no PID gains") && output.err.contains("jtc arm check"), "{}", output.err);
+    assert!(
+        output.err.contains("values missing in the file: PID gains") && output.err.contains("jtc arm check"),
+        "{}",
+        output.err
+    );
 }
 
 #[test]

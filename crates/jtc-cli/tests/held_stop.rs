@@ -69,7 +69,7 @@ fn j69_the_commands_show_what_was_found_and_what_to_do() {
     assert!(shown.contains(&format!("held stop: {text}; ")) && shown.contains(" s ago\n"), "{shown}");
     let found = sim.jtc(&["doctor"]).ends(1).out;
     assert!(
-        found.contains(&format!("held stop: {text}; ")) && found.contains("remove the object that pushes"),
+        found.contains(&format!("held stop: {text}; ")) && found.contains("remove what pushes"),
         "{found}"
     );
     assert!(!found.contains("torque over limit"), "{found}");
@@ -135,11 +135,8 @@ fn j69_the_agent_asks_for_the_cause_and_shows_it() {
     let stop = &controller["held_stop"];
     is_a_push(stop);
     assert!(stop["since_s"].as_f64().is_some_and(|s| (0.0..600.0).contains(&s)), "{stop}");
-    assert!(stop["remedy"].as_str().expect("words").starts_with("remove the object that pushes"), "{stop}");
-    assert!(
-        controller["next"].as_str().expect("words").contains("remove the object that pushes"),
-        "{controller}"
-    );
+    assert!(stop["remedy"].as_str().expect("words").starts_with("remove what pushes"), "{stop}");
+    assert!(controller["next"].as_str().expect("words").contains("remove what pushes"), "{controller}");
     assert_eq!(get("/api/explain/held-stop-push")["code"], "held-stop-push");
     assert!(
         get("/api/doctor")["findings"][0]["what"].as_str().expect("words").starts_with("held stop: joint 5")

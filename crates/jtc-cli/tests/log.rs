@@ -57,7 +57,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     sim.jtc(&["recover"]).ends(0);
     assert_eq!(sim.json(&["log", "fetch"], 0)["first"], *first);
     let info = sim.jtc(&["info"]).ends(0).out;
-    assert!(info.contains("stopped after an error: jtc log fetch reads it"), "{info}");
+    assert!(info.contains("stopped after an error: jtc log fetch reads the log"), "{info}");
     assert_eq!(sim.json(&["log", "clear"], 0)["before"], "stopped after an error");
     std::thread::sleep(std::time::Duration::from_millis(300));
     let anew = sim.json(&["log", "fetch"], 0);

@@ -89,7 +89,7 @@ fn mistakes_in_options_are_named_with_what_helps() {
         ),
         (&["plan", &bytes, "-o", &out], 2, "not a text file (its bytes are not valid UTF-8)"),
         (&["plan", &degrees, "-o", &out, "--deg"], 2, "omit --deg"),
-        (&["traj", "speed", "-3"], 2, "a speed override of -3 % is outside 5..100"),
+        (&["traj", "speed", "-3"], 2, "speed override -3 % is out of range (5 to 100 %)"),
         (&["traj", "check", &waypoints, "--speed", "300"], 2, "column t (time in s) is missing"),
         (&["traj", "continue", "none.mcap"], 2, "check the name"),
         (&["traj", "continue", &waypoints], 2, "jtc traj run FILE --record"),

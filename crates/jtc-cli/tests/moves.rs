@@ -126,7 +126,7 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
         (vec!["--to-flange", "2,0,0.4,0,0,0"], 4, "no move to 2,0,0.4,0,0,0: out of reach"),
         (vec!["--to-flange", "2,0,0.4,0,0,0", "--line"], 4, "out of reach"),
         (vec!["--to", "0,0,0,0,0,0", "--line"], 4, "nothing was sent"),
-        (vec!["--to-flange", "1,2,3"], 2, "3 numbers, expected 6"),
+        (vec!["--to-flange", "1,2,3"], 2, "3 numbers, not 6"),
         (vec!["--line"], 2, "--to"),
     ] {
         let output = sim.jtc(&[&["move"], &words[..]].concat()).ends(code);
@@ -177,7 +177,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
             "has no pose \"hone\"; the arm has home; nothing was sent",
         ),
         (vec!["move", "--to", "home"], 2, "has no pose \"home\"; the arm has no poses"),
-        (vec!["move", "--to", "0,0,0"], 2, "3 numbers, expected 6"),
+        (vec!["move", "--to", "0,0,0"], 2, "3 numbers, not 6"),
         (
             vec!["move", "--to", "0,1.6,0,0,0,0"],
             4,

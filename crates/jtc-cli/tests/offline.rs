@@ -31,7 +31,7 @@ fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
         assert!(!error["message"].as_str().unwrap().is_empty(), "{error}");
     }
     let by_variable = common::command().env("JTC_JSON", "1").args(["traj", "rum"]).output().unwrap();
-    assert!(String::from_utf8_lossy(&by_variable.stdout).contains("unrecognised subcommand 'rum'"));
+    assert!(String::from_utf8_lossy(&by_variable.stdout).contains("unrecognized subcommand 'rum'"));
     assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
 }
 

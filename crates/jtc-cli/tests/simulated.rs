@@ -21,7 +21,7 @@ fn a_stale_link_is_replaced_and_a_file_is_not() {
     let path = dir.path().join("jtc");
     std::fs::write(&path, "precious").unwrap();
     let output = jtc(&["sim", "--serial", path.to_str().unwrap()]).ends(2);
-    assert!(output.err.contains("a file is there"), "{}", output.err);
+    assert!(output.err.contains("the path is in use: a file"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
     std::fs::remove_file(&path).unwrap();
     std::os::unix::fs::symlink("/dev/pts/99999", &path).unwrap();

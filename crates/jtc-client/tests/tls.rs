@@ -68,7 +68,7 @@ fn certificates_and_keys_that_are_none_or_open_to_all_are_refused() {
         (&file, &open, "every user"),
         (&missing, &key, "missing"),
         (&file, &missing, "missing"),
-        (&key, &key, "no valid certificate"),
+        (&key, &key, "contains no certificate"),
         (&file, &file, "agent.pem"),
         (&other, &key, "certificate and private key"),
     ] {

@@ -6,8 +6,8 @@ mod log;
 pub(crate) mod state;
 
 use jtc_wire::{
-    Answer, Command, DataStatus, Floats, Info, LogState, Name, PAGE_VALUES, Program,
-    RawPoint, StoreState, VALUE_LEN, Values, capability,
+    Answer, Command, DataStatus, Floats, Info, LogState, Name, PAGE_VALUES, Program, RawPoint, StoreState,
+    VALUE_LEN, Values, capability,
 };
 
 use crate::controller::Controller;

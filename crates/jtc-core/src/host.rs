@@ -1,7 +1,8 @@
 //! The host's commands: executed in bounded slices, with one response record each (J-04, J-06).
+pub(crate) mod line_upload;
 pub(crate) mod priority;
 pub(crate) mod slices;
-pub(crate) mod upload;
+mod upload;
 
 use jtc_wire::{
     Command, DataStatus, EVENTS_MAX, ExecCommand, FrameType, FrictionImage, LinkEvent, RawPoint, Response,
@@ -13,15 +14,15 @@ use crate::controller::Controller;
 use crate::defaults;
 use crate::errors::Errors;
 use crate::friction::celsius;
-use crate::last_stop::LastStop;
 use crate::host_parameters::{HostParameters, read_pid};
 use crate::io::{HostEvent, Inputs};
+use crate::last_stop::LastStop;
 use crate::nodes::GRIPPER;
 use crate::parameters::PidGains;
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
+use line_upload::LineUpload;
 use priority::Priority;
 use slices::{SliceOutcome, SliceProgress};
-use line_upload::LineUpload;
 
 /// Joints and gripper in a mask of nodes.
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;

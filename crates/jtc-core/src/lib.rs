@@ -25,6 +25,7 @@ mod host_parameters;
 mod interpolation;
 mod io;
 mod jog;
+mod last_stop;
 mod limits;
 mod load;
 mod motion;

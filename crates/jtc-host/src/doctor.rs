@@ -399,7 +399,7 @@ mod tests {
             text(&Observation { reactions, ..seen(status) })
         };
         for (kind, helps) in [
-            (StopKind::Push, "remove the object that pushes"),
+            (StopKind::Push, "remove what pushes"),
             (StopKind::Overload, "set the payload"),
             (StopKind::Unstable, "gains"),
             (StopKind::EncoderJump, "`jtc reset --joints JOINT`"),

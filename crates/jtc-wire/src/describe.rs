@@ -2,7 +2,7 @@
 use core::fmt::{Display, Formatter, Result};
 
 use crate::command::Command;
-use crate::encode::FloatName;
+use crate::encode_error::FloatName;
 use crate::extension::Answer;
 use crate::floats::Floats;
 use crate::frame::{FrameRef, FrameType, HEADER, field};

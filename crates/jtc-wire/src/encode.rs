@@ -1,7 +1,7 @@
 //! Encoders that write the host's frames into the caller's buffer. Numbers are checked and scaled; they never wrap and are never clipped.
 use crate::command::Command;
 use crate::crc16;
-use crate::error::{Channel, EncodeError, OutOfScale};
+use crate::encode_error::{Channel, EncodeError, OutOfScale};
 use crate::extension::SettingValue;
 use crate::fixed;
 use crate::floats::Floats;

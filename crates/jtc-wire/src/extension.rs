@@ -4,7 +4,7 @@
 use core::fmt;
 
 use crate::crc16;
-use crate::error::EncodeError;
+use crate::encode_error::EncodeError;
 use crate::frame::{FRAME_MIN, FrameRef, FrameType, HEADER, POINT_LEN};
 use crate::layout::{ANSWER_MAX, PAGE_HEAD_LEN, VALUE_LEN};
 use crate::segment::RawPoint;

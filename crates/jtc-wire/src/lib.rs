@@ -16,7 +16,7 @@ mod command;
 mod crc;
 mod describe;
 mod encode;
-mod error;
+mod encode_error;
 mod extension;
 pub mod fixed;
 mod floats;
@@ -41,7 +41,7 @@ pub use encode::{
     FrictionTable, arm_model, floats, friction_polynomial, friction_table, pid_param, set_settings,
     trajectory,
 };
-pub use error::{Channel, EncodeError, FloatName, OutOfScale};
+pub use encode_error::{Channel, EncodeError, FloatName, OutOfScale};
 /// The states of drives and gripper in a status are those of the joint bus.
 pub use jtc_bus::{Joint, NodeState};
 

@@ -15,7 +15,7 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     ucom(&["sim", "--profile", "/nowhere.toml"]).ends(2);
     ucom(&["sim", "--chain", "/nowhere.toml"]).ends(2);
     let output = ucom(&["sim", "--boards", "1", "--flash-ids", "1,2"]).ends(2);
-    assert!(output.err.contains("2 boards"), "{}", output.err);
+    assert!(output.err.contains("2 entries"), "{}", output.err);
     ucom(&["update", "1", "/nowhere.hex", "--bus", "virtual:x"]).ends(2);
     ucom(&["status", "1", "--set", "MCARUN", "--bus", "virtual:x"]).ends(2);
     ucom(&["status", "1", "--set", "PROG", "--clear", "PROG", "--bus", "virtual:x"]).ends(2);

@@ -185,7 +185,7 @@ mod tests {
         let reactions = Reactions { stop: Some((cause, 12_300)), ..Reactions::default() };
         let told = text(&s, Some(&reactions));
         assert!(told.contains(&format!("held stop: {cause}; 12 s ago\n")), "{told}");
-        assert!(told.contains("next: remove the object that pushes the joint"), "{told}");
+        assert!(told.contains("next: remove what pushes the joint"), "{told}");
         let untold = text(&s, None);
         assert!(untold.contains("errors: held stop: joint 2: torque over limit\n"), "{untold}");
         // A held stop whose errors were cleared is not shown.

@@ -6,8 +6,8 @@ use std::vec::Vec;
 
 use jtc_bus::Target;
 use jtc_wire::{
-    ArmImage, EncodeError, FrameRef, FrameStatus, LinkEvent, PAGE_BYTES, Response, SettingValue, Status,
-    UrgentCommand, fixed, missing_parameter, set_settings,
+    ArmImage, BootCause, EncodeError, FrameRef, FrameStatus, Hash, LinkEvent, PAGE_BYTES, Response,
+    SettingValue, Status, UrgentCommand, fixed, missing_parameter, set_settings,
 };
 
 use super::*;

@@ -1,5 +1,5 @@
 //! Segments of a trajectory: acceptance (J-30), and checking and copying in slices (J-36).
-use jtc_wire::{Command, DataStatus, ExecCommand, RawPoint, Segment};
+use jtc_wire::{DataStatus, ExecCommand, RawPoint, Segment};
 
 use super::slices::{SliceOutcome, SliceProgress};
 use crate::check::{TrajectoryCheck, Violation};

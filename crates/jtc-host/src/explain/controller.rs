@@ -128,7 +128,7 @@ entries! {
             "jtc reset --joints 6";
         14 "can-no-answer-gripper":
             "The gripper does not answer.",
-            "Its supply or cable is off, its node number is wrong, or it restarts.",
+            "The node has no supply or no connection, its node number is wrong, or it restarts.",
             "If the arm has no gripper, configure the controller without a gripper.",
             "jtc reset --gripper";
     }

@@ -27,7 +27,7 @@ entries! {
             "jtc traj run FILE";
         4 "incorrect-segment-order":
             "A segment is repeated, skipped or from another trajectory.",
-            "A segment before it was lost, or two programs send at once.",
+            "An earlier segment was lost, or two programs send at the same time.",
             "Make sure that only one program sends. The upload sends a lost segment again by itself.",
             "jtc doctor";
         5 "incorrect-step-time":

@@ -104,6 +104,6 @@ stops! {
     Shove "held-stop-shove":
         "A joint moved away from its commanded position so fast that only a push explains the motion. Or a \
          person led a joint too fast in Teaching.",
-        "A person, an obstacle that moves, a hose or cable that pulls, or a load that was taken up or dropped.",
+        "A person, an obstacle that moves, a hose or cable that pulls, or a load that the arm picked up or dropped.",
         "Remove what moved the joint; set the payload if the arm has taken up a load.";
 }

@@ -214,7 +214,7 @@ mod tests {
         .unwrap();
         let catalogue = Catalogue::read(folder.path()).unwrap();
         let said = catalogue.image("nucleo-h743zi2").unwrap_err().to_string();
-        assert!(said.contains("and is for nucleo-h745zi-q"), "{said}");
+        assert!(said.contains("but its content is for nucleo-h745zi-q"), "{said}");
         assert_eq!(image_bytes("b", 1).len() % 4, 0);
     }
 }

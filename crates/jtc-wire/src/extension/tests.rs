@@ -3,6 +3,7 @@ use std::vec;
 use std::vec::Vec;
 
 use super::*;
+use crate::layout::{INFO_LEN, SET_VALUES_MAX};
 use crate::{Command, fixed, set_settings};
 
 fn info() -> Info {

@@ -277,7 +277,7 @@ impl Worker {
 
     /// Takes no further requests, stops the motion and the teaching of this connection, waits for standstill, and ends the connection. A
     /// signal ends the wait.
-    pub fn end(&self, py: Python<'_>) -> PyResult<()> {
+    pub(super) fn end(&self, py: Python<'_>) -> PyResult<()> {
         if self.is_foreign() {
             return Ok(());
         }

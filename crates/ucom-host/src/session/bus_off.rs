@@ -54,7 +54,10 @@ mod tests {
         let url = "socketcand:127.0.0.1:29536/can0";
         assert_eq!(off.look(0, 0, url), None);
         let message = off.look(1, 10, url).expect("reported at once");
-        assert!(message.contains("is bus-off:") && message.contains("next: ucom doctor"), "{message}");
+        assert!(
+            message.contains("is bus-off:") && message.contains("next: check the bus with ucom doctor"),
+            "{message}"
+        );
         assert_eq!(off.look(1, 20_000_000, url), None);
         let message = off.look(2, 20_000_000, url).expect("reported again");
         assert!(!message.contains("times"), "{message}");

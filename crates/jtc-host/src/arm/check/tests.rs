@@ -184,7 +184,7 @@ fn proposals_are_found_with_their_joints() {
     let checked = marked.check();
     let f = checked.findings.iter().find(|f| f.code == "proposed").unwrap();
     assert_eq!((f.name, checked.is_refused()), (Some("torque_max_nm"), false));
-    assert!(f.finding.what.contains("proposed for joint 1,"), "{}", f.finding.what);
+    assert!(f.finding.what.contains("proposed for joint 1; "), "{}", f.finding.what);
 }
 
 proptest! {
@@ -252,7 +252,7 @@ fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
         .finding
         .next
         .to_string()
-        .split("Ki of ")
+        .split("lower Ki to ")
         .nth(1)
         .unwrap()
         .split(' ')

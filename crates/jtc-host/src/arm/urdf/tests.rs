@@ -305,9 +305,9 @@ fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
         ("lower=\"-inf\" upper=\"90\"", "90° are 1.5708 rad"),
         ("lower=\"nan\" upper=\"1\"", "position limit NaN is not a number"),
         ("lower=\"-1\" upper=\"NaN\"", "position limit NaN is not a number"),
-        ("lower=\"0\" upper=\"0\"", "position limits 0..0 rad leave no way"),
-        ("lower=\"0.5\" upper=\"0.5\"", "position limits 0.5..0.5 rad leave no way"),
-        ("lower=\"0\"", "position limits 0..0 rad leave no way"),
+        ("lower=\"0\" upper=\"0\"", "position limits 0..0 rad leave no range of motion"),
+        ("lower=\"0.5\" upper=\"0.5\"", "position limits 0.5..0.5 rad leave no range of motion"),
+        ("lower=\"0\"", "position limits 0..0 rad leave no range of motion"),
     ] {
         let text = with(limits);
         for error in [
@@ -392,7 +392,7 @@ fn a_velocity_that_is_not_believed_is_marked_and_never_the_fastest_in_silence() 
         let found = arm.check().findings.into_iter().any(|f| {
             f.code == "proposed"
                 && f.name == Some("velocity_max_rad_s")
-                && f.finding.what.contains("joint 1,")
+                && f.finding.what.contains("joint 1; ")
         });
         assert_eq!(found, marked, "{velocity}");
         let said = changes(&arm, Change::LimitAssumed);
@@ -418,7 +418,7 @@ fn j43_limits_beyond_the_drives_are_cut_with_a_word_and_never_turned_around() {
     assert!(error.to_string().contains("joint a1: position limits 3.1..6 rad are outside"), "{error}");
     let error =
         Arm::from_urdf(&with("<limit lower=\"1\" upper=\"-1\" effort=\"9\" velocity=\"1\"/>")).unwrap_err();
-    assert!(error.to_string().contains("joint a1: lower limit 1 is not below upper -1"), "{error}");
+    assert!(error.to_string().contains("joint a1: lower limit 1 is not below upper limit -1"), "{error}");
 }
 
 #[test]

@@ -62,7 +62,8 @@ fn d11_scale_offset_and_unit() {
     // Without the table the number would be the raw word. The signal has no unit, so only a raw word is accepted.
     let message = word(&down, "2").unwrap_err().to_string();
     assert!(
-        message.starts_with("2: the table scales it and names no unit") && message.contains("0x0000"),
+        message.starts_with("2: the table has a scale but no unit for this signal")
+            && message.contains("0x0000"),
         "{message}"
     );
     assert_eq!(word(&down, "0x0002"), Ok(2));

@@ -18,233 +18,8 @@ export interface components {
         };
         /** @description Joints that are set absent. */
         AbsentObject: {
-            /** @description Joints, each at most once; empty: all joints are there. */
+            /** @description Joints, each at most once; empty: no joint is absent. */
             absent: components["schemas"]["AbsentJoint"][];
-        };
-        /** @description Arm in use by the controller. */
-        ArmObject: {
-            /** @description Hash of all parameters that decide how the arm moves. */
-            hash: string;
-            /** @description Name of the arm. */
-            name: string;
-            /** @description Arm file in TOML, as `jtc arm pull` writes it. */
-            text: string;
-        };
-        /** @description Arm to send to the controller. */
-        ArmRequest: {
-            /**
-             * @description `true`: store the arm in non-volatile memory. The arm has no torque meanwhile, and the controller stays in Init
-             *     afterwards.
-             */
-            store?: boolean;
-            /** @description Text of an arm file (TOML), or of a robot description (URDF) in which only the arm has movable joints. */
-            text: string;
-        };
-        /** @description Limiting constraint of a motion during an interval. */
-        BoundObject: {
-            /**
-             * Format: double
-             * @description Start of the interval, s from the start.
-             */
-            from_s: number;
-            /**
-             * Format: u-int8
-             * @description Number of the joint, 1 to 6 from the base.
-             */
-            joint: number;
-            /**
-             * @description Limit: `velocity`, `acceleration`, `jerk`, `torque`, `stop` (margin to stop in time), `friction` (its table) or
-             *     `given time`.
-             */
-            limit: string;
-            /**
-             * Format: double
-             * @description End of the interval, s from the start.
-             */
-            to_s: number;
-        };
-        /** @description Result of a check. */
-        CheckObject: {
-            /** @description Digest of the checked trajectory. */
-            digest: string;
-            /**
-             * Format: double
-             * @description Duration, s.
-             */
-            duration_s: number;
-            margin?: components["schemas"]["MarginObject"] | null;
-            /** @description `true` if the trajectory can run from its first point. */
-            passed: boolean;
-            /** @description Problems, worst first. */
-            problems: components["schemas"]["ProblemObject"][];
-        };
-        /** @description Nodes whose errors to clear. */
-        ClearRequest: {
-            /** @description `true` for the gripper. */
-            gripper?: boolean;
-            /** @description Joints, 1 to 6 from the base. */
-            joints?: number[];
-        };
-        /** @description Status of the controller. */
-        ControllerObject: {
-            /**
-             * @description Causes of the errors, the most specific first, each with its joint; includes the errors of its drive.
-             *     `GET /api/explain/{code}` accepts these texts.
-             */
-            causes: string[];
-            /**
-             * @description Commanded joint positions, rad, from the base; missing if the agent does not know them: no trajectory that was
-             *     sent through the agent is being executed.
-             */
-            commanded_rad?: number[] | null;
-            /**
-             * @description Joints whose encoder had jumped at the last held stop, counted from 1: no trajectory is executed until their
-             *     drives are reset; missing: none.
-             */
-            encoder_jumped?: number[];
-            /** @description Names of the pages about these errors, in the same order: `GET /api/explain/{code}`. */
-            error_codes: string[];
-            /** @description Current errors. */
-            errors: string[];
-            /** @description Errors since the last clearing. */
-            errors_occurred: string[];
-            held_stop?: components["schemas"]["HeldStopObject"] | null;
-            /** @description Joints, from the base. */
-            joints: components["schemas"]["JointObject"][];
-            /** @description Next step; empty without a problem. */
-            next: string;
-            /**
-             * Format: u-int32
-             * @description Current 1 ms point of the trajectory.
-             */
-            point: number;
-            /** @description State, in the words of the protocol. */
-            state: string;
-            /** @description State of the trajectory. */
-            trajectory: string;
-        };
-        /** @description Result of a diagnosis. */
-        DoctorObject: {
-            /** @description Findings, worst first. */
-            findings: components["schemas"]["FindingObject"][];
-            /** @description `true` if no finding is a problem. */
-            healthy: boolean;
-            /**
-             * Format: double
-             * @description Listening time, s.
-             */
-            listened_s: number;
-            /**
-             * Format: u-int64
-             * @description Number of statuses received in this time.
-             */
-            statuses: number;
-        };
-        /** @description Reason why a request was refused or failed. */
-        ErrorObject: {
-            /**
-             * Format: u-int8
-             * @description Number of a board of a chain.
-             */
-            board?: number | null;
-            /** @description Usual cause. */
-            cause?: string | null;
-            /** @description Short name of the error, for programs. */
-            code: string;
-            /**
-             * Format: u-int8
-             * @description Number of a joint of an arm, 1 to 6 from the base.
-             */
-            joint?: number | null;
-            /**
-             * Format: double
-             * @description Limit of the value.
-             */
-            limit?: number | null;
-            /** @description Message for people: request, place, value and limit. */
-            message: string;
-            /** @description Next step. */
-            next: string;
-            /**
-             * Format: u-int32
-             * @description Index of a point of the trajectory, from 0; in motion the 1 ms point.
-             */
-            point?: number | null;
-            /**
-             * Format: double
-             * @description Measured or requested value, in the unit of the message.
-             */
-            value?: number | null;
-        };
-        /** @description Event with its number and time. */
-        EventObject: {
-            /** @description Event. */
-            event: components["schemas"]["ArmEvent"];
-            /**
-             * Format: u-int64
-             * @description Number of the event; counts up from 1 as long as this agent runs.
-             */
-            number: number;
-            /**
-             * Format: double
-             * @description Time of the event by the agent's clock, s since 1970.
-             */
-            unix_s: number;
-        };
-        /** @description Events. */
-        EventsObject: {
-            /** @description Number that identifies this run of the agent; another run counts its events from 1. */
-            agent: string;
-            /** @description Events, oldest first. */
-            events: components["schemas"]["EventObject"][];
-            /**
-             * Format: u-int64
-             * @description Number to use as `after` in the next request.
-             */
-            last: number;
-            /** @description `true` if some requested events were dropped from the journal. */
-            missed: boolean;
-        };
-        /** @description Finding of a diagnosis. */
-        FindingObject: {
-            /** @description Next step; empty if no action is needed. */
-            next: string;
-            /** @description `problem`, `warning` or `good`. */
-            severity: string;
-            /** @description Observation. */
-            what: string;
-            /** @description Usual cause; empty if no cause is known. */
-            why: string;
-        };
-        /** @description Pose of the flange in the frame of the base. */
-        FlangeObject: {
-            /** @description Roll, pitch, yaw about the fixed axes x, y, z, as in a URDF, rad. */
-            rpy_rad: number[];
-            /** @description Position x, y, z, m. */
-            xyz_m: number[];
-        };
-        /** @description Position and orientation of a frame. */
-        FrameObject: {
-            /** @description Roll, pitch, yaw, rad. */
-            origin_rpy_rad: number[];
-            /** @description Origin x, y, z, m. */
-            origin_xyz_m: number[];
-        };
-        /** @description Parameters that were sent to the controller. */
-        GivenObject: {
-            /** @description Hash of the arm, if all parameters were read back without a difference. */
-            hash?: string | null;
-            /** @description `true` if the controller has the name of the arm. */
-            named: boolean;
-            /** @description Friction, gains and model, as far as the controller confirmed them. */
-            parts: components["schemas"]["PartObject"][];
-            /** @description Number of settings that have changed. */
-            settings: number;
-            /**
-             * Format: u-int32
-             * @description Number of the arm in the non-volatile memory.
-             */
-            stored_number?: number | null;
         };
         /** @description Event of an arm or a job. */
         ArmEvent: {
@@ -264,14 +39,14 @@ export interface components {
             errors: string[];
             /** @enum {string} */
             kind: "state";
-            /** @description State, in the words of the protocol. */
+            /** @description State, as named in the protocol. */
             state: string;
             /** @description State of the trajectory. */
             trajectory: string;
         } | {
             /** @enum {string} */
             kind: "lost";
-            /** @description Reason. */
+            /** @description Reason of the loss. */
             why: string;
         } | {
             /** @description Name of the client that requested it. */
@@ -422,9 +197,234 @@ export interface components {
             /** @description `finished`, `stopped` or `failed`. */
             outcome: string;
         };
+        /** @description Arm that the controller uses. */
+        ArmObject: {
+            /** @description Hash of all parameters that decide how the arm moves. */
+            hash: string;
+            /** @description Name of the arm. */
+            name: string;
+            /** @description Arm file in TOML, as `jtc arm pull` writes it. */
+            text: string;
+        };
+        /** @description Arm to send to the controller. */
+        ArmRequest: {
+            /**
+             * @description `true`: store the arm in non-volatile memory. The arm has no torque meanwhile, and the controller stays in Init
+             *     afterwards.
+             */
+            store?: boolean;
+            /** @description Text of an arm file (TOML), or of a robot description (URDF) in which only the arm has movable joints. */
+            text: string;
+        };
+        /** @description Limiting constraint of a motion during an interval. */
+        BoundObject: {
+            /**
+             * Format: double
+             * @description Start of the interval, s from the start.
+             */
+            from_s: number;
+            /**
+             * Format: u-int8
+             * @description Number of the joint, 1 to 6 from the base.
+             */
+            joint: number;
+            /**
+             * @description Limit: `velocity`, `acceleration`, `jerk`, `torque`, `stop` (distance to stop in time), `friction` (the friction
+             *     table) or `given time`.
+             */
+            limit: string;
+            /**
+             * Format: double
+             * @description End of the interval, s from the start.
+             */
+            to_s: number;
+        };
+        /** @description Result of a check. */
+        CheckObject: {
+            /** @description Digest of the checked trajectory. */
+            digest: string;
+            /**
+             * Format: double
+             * @description Duration, s.
+             */
+            duration_s: number;
+            margin?: components["schemas"]["MarginObject"] | null;
+            /** @description `true` if the trajectory can run from its first point. */
+            passed: boolean;
+            /** @description Problems, worst first. */
+            problems: components["schemas"]["ProblemObject"][];
+        };
+        /** @description Nodes whose errors to clear. */
+        ClearRequest: {
+            /** @description `true` for the gripper. */
+            gripper?: boolean;
+            /** @description Joints, 1 to 6 from the base. */
+            joints?: number[];
+        };
+        /** @description Status of the controller. */
+        ControllerObject: {
+            /**
+             * @description Causes of the errors, the most specific first, each with its joint. The causes include the errors of the drives.
+             *     `GET /api/explain/{code}` accepts these texts.
+             */
+            causes: string[];
+            /**
+             * @description Commanded joint positions, rad, from the base. Missing unless the controller executes a trajectory that was sent
+             *     through the agent.
+             */
+            commanded_rad?: number[] | null;
+            /**
+             * @description Joints with an encoder jump at the last held stop, counted from 1; missing: none. The controller executes no
+             *     trajectory until the drives of these joints are reset.
+             */
+            encoder_jumped?: number[];
+            /** @description Codes of these errors, in the same order, for `GET /api/explain/{code}`. */
+            error_codes: string[];
+            /** @description Current errors. */
+            errors: string[];
+            /** @description Errors that have occurred since they were last cleared. */
+            errors_occurred: string[];
+            held_stop?: components["schemas"]["HeldStopObject"] | null;
+            /** @description Joints, from the base. */
+            joints: components["schemas"]["JointObject"][];
+            /** @description Next step; empty without a problem. */
+            next: string;
+            /**
+             * Format: u-int32
+             * @description Current 1 ms point of the trajectory.
+             */
+            point: number;
+            /** @description State, as named in the protocol. */
+            state: string;
+            /** @description State of the trajectory. */
+            trajectory: string;
+        };
+        /** @description Result of a diagnosis. */
+        DoctorObject: {
+            /** @description Findings, worst first. */
+            findings: components["schemas"]["FindingObject"][];
+            /** @description `true` if no finding is a problem. */
+            healthy: boolean;
+            /**
+             * Format: double
+             * @description Listening time, s.
+             */
+            listened_s: number;
+            /**
+             * Format: u-int64
+             * @description Number of statuses received in this time.
+             */
+            statuses: number;
+        };
+        /** @description Reason why a request was refused or failed. */
+        ErrorObject: {
+            /**
+             * Format: u-int8
+             * @description Number of a board of a chain.
+             */
+            board?: number | null;
+            /** @description Usual cause. */
+            cause?: string | null;
+            /** @description Short name of the error, for programs. */
+            code: string;
+            /**
+             * Format: u-int8
+             * @description Number of a joint of an arm, 1 to 6 from the base.
+             */
+            joint?: number | null;
+            /**
+             * Format: double
+             * @description Limit of the value.
+             */
+            limit?: number | null;
+            /** @description Message for people: request, joint, board or point, value and limit. */
+            message: string;
+            /** @description Next step. */
+            next: string;
+            /**
+             * Format: u-int32
+             * @description Index of a point of the trajectory, from 0; during a motion, index of the 1 ms point.
+             */
+            point?: number | null;
+            /**
+             * Format: double
+             * @description Measured or requested value, in the unit of the message.
+             */
+            value?: number | null;
+        };
+        /** @description Event with its number and time. */
+        EventObject: {
+            /** @description Event. */
+            event: components["schemas"]["ArmEvent"];
+            /**
+             * Format: u-int64
+             * @description Number of the event; counts up from 1 as long as this agent runs.
+             */
+            number: number;
+            /**
+             * Format: double
+             * @description Time of the event by the agent's clock, s since 1970.
+             */
+            unix_s: number;
+        };
+        /** @description Events. */
+        EventsObject: {
+            /** @description Number that identifies this run of the agent. Each run counts its events from 1. */
+            agent: string;
+            /** @description Events, oldest first. */
+            events: components["schemas"]["EventObject"][];
+            /**
+             * Format: u-int64
+             * @description Number to use as `after` in the next request.
+             */
+            last: number;
+            /** @description `true` if some requested events were dropped from the journal. */
+            missed: boolean;
+        };
+        /** @description Finding of a diagnosis. */
+        FindingObject: {
+            /** @description Next step; empty if no action is needed. */
+            next: string;
+            /** @description `problem`, `warning` or `good`. */
+            severity: string;
+            /** @description Text of the finding. */
+            what: string;
+            /** @description Usual cause; empty if no cause is known. */
+            why: string;
+        };
+        /** @description Pose of the flange in the frame of the base. */
+        FlangeObject: {
+            /** @description Roll, pitch, yaw about the fixed axes x, y, z, as in a URDF, rad. */
+            rpy_rad: number[];
+            /** @description Position x, y, z, m. */
+            xyz_m: number[];
+        };
+        /** @description Position and orientation of a frame. */
+        FrameObject: {
+            /** @description Roll, pitch, yaw, rad. */
+            origin_rpy_rad: number[];
+            /** @description Origin x, y, z, m. */
+            origin_xyz_m: number[];
+        };
+        /** @description Parameters that were sent to the controller. */
+        GivenObject: {
+            /** @description Hash of the arm, if all parameters were read back without a difference. */
+            hash?: string | null;
+            /** @description `true` if the controller has the name of the arm. */
+            named: boolean;
+            /** @description Friction, gains and model, as far as the controller confirmed them. */
+            parts: components["schemas"]["PartObject"][];
+            /** @description Number of settings that have changed. */
+            settings: number;
+            /**
+             * Format: u-int32
+             * @description Number of the arm in the non-volatile memory.
+             */
+            stored_number?: number | null;
+        };
         /** @description Held stop: the controller has brought the arm to rest and holds its position. */
         HeldStopObject: {
-            /** @description Name of the page about it: `GET /api/explain/{code}`. */
+            /** @description Code of the held stop, for `GET /api/explain/{code}`. */
             code: string;
             /**
              * Format: u-int8
@@ -477,11 +477,11 @@ export interface components {
              * @description Number of starts.
              */
             boots: number;
-            /** @description `true` if its defaults are those of a stored arm, not those of the built-in arm. */
+            /** @description `true` if its defaults are the parameters of a stored arm, not of the built-in arm. */
             defaults_stored: boolean;
             /**
              * Format: u-int8
-             * @description Version of the protocol extensions; 0: the controller has none, and nothing else is known.
+             * @description Version of the protocol extensions. 0: the controller has no extensions, and all other values are unknown.
              */
             extension: number;
             /** @description Version of the firmware. */
@@ -490,7 +490,7 @@ export interface components {
             hash: string;
             /**
              * Format: u-int32
-             * @description Number of records lost because too many waited.
+             * @description Number of response records that were lost because too many records waited.
              */
             lost_records: number;
             /** @description Parameters that the controller has not received. */
@@ -504,7 +504,7 @@ export interface components {
              */
             uptime_s: number;
         };
-        /** @description Job: a request that takes longer than its answer. */
+        /** @description Job: a request that continues after its answer. */
         JobObject: {
             /** @description Name of the client that requested it. */
             client: string;
@@ -516,8 +516,8 @@ export interface components {
              */
             number: number;
             /**
-             * @description Address of the report of its last motion, a page; missing if nothing moved, or if later reports have replaced
-             *     it.
+             * @description Address of the report page of its last motion. Missing if nothing moved, or if later reports have replaced the
+             *     report.
              */
             report?: string | null;
             result?: components["schemas"]["ResultObject"] | null;
@@ -533,12 +533,12 @@ export interface components {
         };
         /** @description Joint rates of a jog. */
         JogRequest: {
-            /** @description Joint rates, rad/s, base to wrist. Rates act for 200 ms: send them again in time, and zeros at the end. */
+            /** @description Joint rates, rad/s, base to wrist. Rates act for 200 ms: send them again within this time, and send zeros at the end. */
             rates_rad_s: number[];
         };
         /** @description Status of a joint. */
         JointObject: {
-            /** @description Names of the pages about these errors, in the same order. */
+            /** @description Codes of these errors, in the same order, for `GET /api/explain/{code}`. */
             error_codes: string[];
             /** @description Errors of this joint that the controller has detected. */
             errors: string[];
@@ -633,7 +633,7 @@ export interface components {
              */
             torque_limit_nm?: number | null;
         };
-        /** @description Place for a planned trajectory. */
+        /** @description Number and name of a planned trajectory. */
         KeepRequest: {
             /** @description Name for people: the first 64 characters. */
             name: string;
@@ -653,7 +653,7 @@ export interface components {
             key: string;
             /**
              * Format: double
-             * @description Duration of the lease without a request, s.
+             * @description Time without a request after which the lease lapses, s.
              */
             lasts_s: number;
             /** @description Policy for a motion after the lease has lapsed. */
@@ -670,7 +670,7 @@ export interface components {
             holder: string;
             /**
              * Format: u-int64
-             * @description Time until the lease lapses without renewal, ms; missing: it lasts while the client is connected.
+             * @description Time until the lease lapses without renewal, ms; missing: the lease lasts while its holder is connected.
              */
             left_ms?: number | null;
             /** @description Name of the client that waits for the lease. */
@@ -679,13 +679,13 @@ export interface components {
         /** @description Request for the lease. */
         LeaseRequest: {
             /**
-             * @description `true`: if another client holds the lease, ask for it and wait. One client waits at a time, and shows by PUT
-             *     requests that it is alive.
+             * @description `true`: if another client holds the lease, ask that client for the lease, and wait. Only one client can wait at a
+             *     time. The waiting client must repeat `PUT /api/lease` within `lasts_s`.
              */
             ask?: boolean;
             /**
              * Format: double
-             * @description Duration of the lease without a request of this client, s.
+             * @description Time without a request of this client after which the lease lapses, s.
              */
             lasts_s?: number;
             /** @description Name of the client for people: the first 64 characters. */
@@ -725,10 +725,10 @@ export interface components {
              * @description Number of blocks of 1 KiB begun since the start of the controller, including overwritten ones.
              */
             blocks: number;
-            /** @description State in words: it records, or the reason why it has stopped. */
+            /** @description State in words: recording, or the reason why the recorder has stopped. */
             state: string;
         };
-        /** @description Values of the log per tick: 1000 rows a second, in columns of the same length. A value that is not known is null. */
+        /** @description Values of the log in columns of the same length. A row is a tick: 1000 rows per second. An unknown value is null. */
         LogValues: {
             /** @description Joints, base to wrist. */
             joints: components["schemas"]["LogJoint"][];
@@ -737,7 +737,7 @@ export interface components {
             /** @description Time of each row, s; 0 at the last row. */
             times_s: number[];
         };
-        /** @description Smallest unused part of a torque limit in a motion, and its place. */
+        /** @description Smallest torque margin of a motion, with its joint and time. */
         MarginObject: {
             /**
              * Format: u-int8
@@ -751,7 +751,7 @@ export interface components {
             limit_nm: number;
             /**
              * Format: double
-             * @description Margin, % of the limit.
+             * @description Margin: unused part of the torque limit, % of the limit.
              */
             percent: number;
             /**
@@ -770,7 +770,7 @@ export interface components {
              */
             torque_nm: number;
         };
-        /** @description Joint: its frame and its limits. */
+        /** @description Frame and limits of a joint. */
         ModelJoint: {
             /**
              * Format: double
@@ -784,9 +784,12 @@ export interface components {
             joint: number;
             /** @description Name of the joint. */
             name: string;
-            /** @description Orientation of its frame there: roll, pitch, yaw about fixed axes, as in a URDF, rad. */
+            /**
+             * @description Orientation of its frame at position 0, in the frame of the joint before it: roll, pitch, yaw about fixed axes, as
+             *     in a URDF, rad.
+             */
             origin_rpy_rad: number[];
-            /** @description Origin of its frame in the frame of the joint before it, at position 0: x, y, z, m. */
+            /** @description Origin of its frame at position 0, in the frame of the joint before it: x, y, z, m. */
             origin_xyz_m: number[];
             /**
              * Format: double
@@ -823,7 +826,7 @@ export interface components {
         };
         /** @description Arm in use. */
         ModelObject: {
-            /** @description The flange, which does not move, in the frame of joint 6. */
+            /** @description Frame of the flange, fixed in the frame of joint 6. */
             flange: components["schemas"]["FrameObject"];
             /** @description Acceleration of gravity in the frame of the base, m/s². */
             gravity_m_s2: number[];
@@ -845,7 +848,7 @@ export interface components {
         ModelSource: "controller" | "agent";
         /** @description Move from the current position to one of the three targets. */
         MoveRequest: {
-            /** @description `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm. */
+            /** @description `true`: accept a controller that cannot report its limits. Its built-in limits must be safe for this arm. */
             accept_device_limits?: boolean;
             /** @description `true`: the flange moves on a straight line. */
             line?: boolean;
@@ -941,14 +944,14 @@ export interface components {
         PlanRequest: {
             /**
              * Format: double
-             * @description Distance from a waypoint within which the corner between two lines or arcs may be rounded, m; 0: the arm stops
-             *     there.
+             * @description Largest distance from a waypoint for rounding the corner between two lines or arcs, m. 0: the arm stops at the
+             *     waypoint.
              */
             blend_m?: number;
             /**
              * Format: double
-             * @description Distance from a waypoint within which its corner may be rounded, rad of the joint that is furthest; 0: the arm
-             *     stops at each waypoint.
+             * @description Largest distance from a waypoint for rounding its corner, rad. The joint that is furthest from the waypoint counts.
+             *     0: the arm stops at each waypoint.
              */
             blend_rad?: number;
             /** @description `true` if the angles are in degrees. */
@@ -962,7 +965,7 @@ export interface components {
              */
             margin_percent?: number;
             /**
-             * @description `true`: the acceleration may change within 20 ms instead of 100 ms, which is faster and harder on gears and
+             * @description `true`: the acceleration may change within 20 ms instead of 100 ms. The motion is faster, and harder on gears and
              *     load.
              */
             no_jerk_limit?: boolean;
@@ -978,16 +981,16 @@ export interface components {
              */
             temperature_c?: number;
             /**
-             * @description Waypoints in a format that `jtc plan` accepts: CSV with the columns q1 to q6, or x, y, z with an orientation, or
-             *     pose; or JSON. At most 500.
+             * @description Waypoints, 500 at most, as CSV or JSON in a format that `jtc plan` accepts. The columns are q1 to q6, or x, y, z with
+             *     an orientation, or pose.
              */
             waypoints: string;
         };
         /** @description Trajectory for a plot. */
         PointsObject: {
             /**
-             * @description Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
-             *     `POST /api/runs` accepts it.
+             * @description Digest of points and step, 16 hexadecimal digits, for `POST /api/runs`. Other points or another step give another
+             *     digest.
              */
             digest: string;
             /**
@@ -1025,7 +1028,7 @@ export interface components {
             name: string;
             /** @description Joint positions, from the base, rad. */
             positions_rad: number[];
-            /** @description Reason why no motion can lead to the pose, in words; missing if a motion is possible. */
+            /** @description Reason why the arm cannot move to the pose, in words; missing if a motion is possible. */
             warning?: string | null;
         };
         /** @description Position of a pose. */
@@ -1045,7 +1048,7 @@ export interface components {
              * @description Limit of the value.
              */
             limit?: number | null;
-            /** @description Message with value, limit and place. */
+            /** @description Message with value, limit and point. */
             message: string;
             /** @description Index of the worst point, from 0. */
             point: number;
@@ -1064,11 +1067,14 @@ export interface components {
         };
         /** @description Reactions of a controller to disturbances. */
         ReactionsObject: {
-            /** @description Joints whose encoder has jumped, counted from 1: no trajectory is executed until their drives are reset. */
+            /**
+             * @description Joints with an encoder jump, counted from 1. The controller executes no trajectory until the drives of these
+             *     joints are reset.
+             */
             encoder_jumped: number[];
             /**
              * Format: double
-             * @description Time for which this run was slowed down because a torque was at its limit, s.
+             * @description Total time for which the controller slowed this run down because a torque was at its limit, s.
              */
             held_back_s: number;
             last_held_stop?: components["schemas"]["HeldStopObject"] | null;
@@ -1082,16 +1088,16 @@ export interface components {
         };
         /** @description Options of a recovery. */
         RecoverRequest: {
-            /** @description `true`: the limits of the controller differ from those of this arm, and are safe for it. */
+            /** @description `true`: the limits of the controller are safe for this arm, although they differ from the limits of the file. */
             accept_device_limits?: boolean;
             /**
-             * @description Text of an arm file or a robot description: its friction, gains and model are sent to the controller. Not
-             *     together with `defaults`.
+             * @description Text of an arm file or a robot description. The agent sends its friction, gains and model to the controller. Not
+             *     possible together with `defaults`.
              */
             arm?: string | null;
             /**
-             * @description `true`: a controller without arm parameters uses its defaults, which are those of the stored arm if there is
-             *     one.
+             * @description `true`: a controller without arm parameters uses its defaults. These are the parameters of the stored arm, or of
+             *     the built-in arm if no arm is stored.
              */
             defaults?: boolean;
         };
@@ -1101,7 +1107,7 @@ export interface components {
         ResetRequest: {
             /** @description `true` for all joints and the gripper. */
             all?: boolean;
-            /** @description `true`: restart also under torque. The arm must be supported, or it may fall. */
+            /** @description `true`: restart also under torque. Support the arm first: it may fall. */
             arm_may_fall?: boolean;
             /** @description `true` for the gripper. */
             gripper?: boolean;
@@ -1125,14 +1131,15 @@ export interface components {
         Role: "viewer" | "operator";
         /** @description Run of a kept trajectory. */
         RunRequest: {
-            /** @description `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm. */
+            /** @description `true`: accept a controller that cannot report its limits. Its built-in limits must be safe for this arm. */
             accept_device_limits?: boolean;
             /**
-             * @description `true`: first move the arm to the first point, if it stands elsewhere. The speed is `speed_percent` of the
-             *     limits, at most 50 %; without `speed_percent` 10 %, and 25 % with a simulated controller.
+             * @description `true`: if the arm is not at the first point, move it there before the run. The speed of this approach is
+             *     `speed_percent` of the limits, at most 50 %. Without `speed_percent`, the speed is 10 %, and 25 % with a simulated
+             *     controller.
              */
             approach?: boolean;
-            /** @description Digest of the trajectory that the client saw: the run is refused if the number has another trajectory by now. */
+            /** @description Digest of the trajectory that the client saw. The agent refuses the run if the number now has another trajectory. */
             digest?: string | null;
             policy?: components["schemas"]["Policy"] | null;
             /**
@@ -1151,11 +1158,11 @@ export interface components {
              */
             trajectory: number;
         };
-        /** @description Command that was handed to the line. */
+        /** @description Command that the agent sends to the controller. */
         SentObject: {
             /**
              * Format: u-int64
-             * @description Number of the command: value of `last_halt` until the next one.
+             * @description Number of the command; `last_halt` has this value until the next Stop or Pause.
              */
             halt: number;
             /** @description Command: `stop` or `pause`. */
@@ -1197,21 +1204,21 @@ export interface components {
             meaning: string;
             /** @description Name of the setting, with its unit. */
             name: string;
-            /** @description `true` if it is stored with the arm and included in its hash. */
+            /** @description `true` if the setting is stored with the arm and included in the hash of the arm. */
             of_arm: boolean;
-            /** @description Unit; empty if it has none. */
+            /** @description Unit; empty for a setting without a unit. */
             unit: string;
             /**
              * Format: double
              * @description Value; switches are 0 or 1.
              */
             value: number;
-            /** @description Condition under which it may be changed. */
+            /** @description Condition under which the setting may be changed. */
             when: components["schemas"]["When"];
             /** @description `true` if only whole numbers are possible. */
             whole: boolean;
         };
-        /** @description Settings to change: all of them, or none. */
+        /** @description Settings to change. The controller changes all of them, or none. */
         SettingsRequest: {
             /** @description Settings, each at most once. */
             settings: components["schemas"]["SettingChange"][];
@@ -1235,8 +1242,8 @@ export interface components {
             agent: string;
             /**
              * Format: u-int64
-             * @description Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
-             *     even at a steady rate.
+             * @description Time of this object since the start of the agent, ms. A client can use this time to detect that statuses arrive
+             *     late, even if they arrive at a steady rate.
              */
             at_ms: number;
             /** @description Number of clients on the line. */
@@ -1270,8 +1277,8 @@ export interface components {
         /** @description Kept trajectory. */
         TrajectoryObject: {
             /**
-             * @description Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
-             *     `POST /api/runs` accepts it.
+             * @description Digest of points and step, 16 hexadecimal digits, for `POST /api/runs`. Other points or another step give another
+             *     digest.
              */
             digest: string;
             /**
@@ -1281,7 +1288,7 @@ export interface components {
             duration_s: number;
             /** @description Name for people. */
             name: string;
-            /** @description Notes about values that were derived or left out when it was read. */
+            /** @description Notes about values that the agent derived or left out when it read the file. */
             notes: string[];
             /**
              * Format: u-int16
@@ -1303,8 +1310,8 @@ export interface components {
             /** @description Name for people: the first 64 characters. */
             name: string;
             /**
-             * @description Text of a file in any format that jtc traj run accepts, except recordings: CSV with a time column and joints,
-             *     JSON, or a ROS JointTrajectory.
+             * @description Text of a file in a format that `jtc traj run` accepts: CSV with a time column and joints, JSON, or a ROS
+             *     JointTrajectory. Recordings are not possible.
              */
             text: string;
         };
@@ -1322,6 +1329,7 @@ export interface components {
 }
 export type AbsentJoint = components['schemas']['AbsentJoint'];
 export type AbsentObject = components['schemas']['AbsentObject'];
+export type ArmEvent = components['schemas']['ArmEvent'];
 export type ArmObject = components['schemas']['ArmObject'];
 export type ArmRequest = components['schemas']['ArmRequest'];
 export type BoundObject = components['schemas']['BoundObject'];
@@ -1336,7 +1344,6 @@ export type FindingObject = components['schemas']['FindingObject'];
 export type FlangeObject = components['schemas']['FlangeObject'];
 export type FrameObject = components['schemas']['FrameObject'];
 export type GivenObject = components['schemas']['GivenObject'];
-export type ArmEvent = components['schemas']['ArmEvent'];
 export type HeldStopObject = components['schemas']['HeldStopObject'];
 export type InfoObject = components['schemas']['InfoObject'];
 export type JobObject = components['schemas']['JobObject'];

@@ -34,7 +34,7 @@ export interface components {
             flash_date?: string | null;
             /**
              * Format: u-int16
-             * @description Number of its bootloader, which identifies the board; missing before its first answer.
+             * @description Flash number of the bootloader, which identifies the board; missing before the first answer of the board.
              */
             flash_number?: number | null;
             /**
@@ -67,148 +67,6 @@ export interface components {
             /** @description Names of the status bits that are set. */
             status: string[];
         };
-        /** @description Boards of the chain. */
-        ChainObject: {
-            /** @description Boards with a number. */
-            boards: components["schemas"]["FoundObject"][];
-            /** @description Unusual observations; empty: none. */
-            findings: string[];
-        };
-        /** @description State of this computer's CAN controller. */
-        ControllerObject: {
-            /** @description `true` if it is bus-off. */
-            bus_off: boolean;
-            /** @description `true` if it is error passive. */
-            passive: boolean;
-            /**
-             * Format: u-int16
-             * @description Receive error counter.
-             */
-            rec?: number | null;
-            /**
-             * Format: u-int16
-             * @description Transmit error counter.
-             */
-            tec?: number | null;
-            /**
-             * Format: u-int64
-             * @description Number of bus-off events.
-             */
-            times_bus_off: number;
-        };
-        /** @description Reason why a request was refused or failed. */
-        ErrorObject: {
-            /**
-             * Format: u-int8
-             * @description Number of a board of a chain.
-             */
-            board?: number | null;
-            /** @description Usual cause. */
-            cause?: string | null;
-            /** @description Short name of the error, for programs. */
-            code: string;
-            /**
-             * Format: u-int8
-             * @description Number of a joint of an arm, 1 to 6 from the base.
-             */
-            joint?: number | null;
-            /**
-             * Format: double
-             * @description Limit of the value.
-             */
-            limit?: number | null;
-            /** @description Message for people: request, place, value and limit. */
-            message: string;
-            /** @description Next step. */
-            next: string;
-            /**
-             * Format: u-int32
-             * @description Index of a point of the trajectory, from 0; in motion the 1 ms point.
-             */
-            point?: number | null;
-            /**
-             * Format: double
-             * @description Measured or requested value, in the unit of the message.
-             */
-            value?: number | null;
-        };
-        /** @description Event with its number and time. */
-        EventObject: {
-            /** @description Event. */
-            event: components["schemas"]["ChainEvent"];
-            /**
-             * Format: u-int64
-             * @description Number of the event; counts up from 1 as long as this agent runs.
-             */
-            number: number;
-            /**
-             * Format: double
-             * @description Time of the event by the agent's clock, s since 1970.
-             */
-            unix_s: number;
-        };
-        /** @description Events. */
-        EventsObject: {
-            /** @description Number that identifies this run of the agent; another run counts its events from 1. */
-            agent: string;
-            /** @description Events, oldest first. */
-            events: components["schemas"]["EventObject"][];
-            /**
-             * Format: u-int64
-             * @description Number to use as `after` in the next request.
-             */
-            last: number;
-            /** @description `true` if some requested events were dropped from the journal. */
-            missed: boolean;
-        };
-        /** @description Expected board at its place. */
-        ExpectedBoard: {
-            /**
-             * Format: u-int8
-             * @description Place of the board, which becomes its number.
-             */
-            board: number;
-            /**
-             * Format: u-int16
-             * @description Number of its bootloader, which identifies the board.
-             */
-            flash_number: number;
-        };
-        /** @description Finding of a diagnosis. */
-        FindingObject: {
-            /** @description Next step; may be empty. */
-            next: string;
-            /** @description Severity: `problem`, `warning` or `good`. */
-            severity: string;
-            /** @description Observation. */
-            what: string;
-            /** @description Probable cause; may be empty. */
-            why: string;
-        };
-        /** @description Board as it answered. */
-        FoundObject: {
-            /** @description Description that the board reports. */
-            description?: string | null;
-            /**
-             * Format: u-int16
-             * @description Number of its bootloader, which identifies the board.
-             */
-            flash_number: number;
-            /**
-             * Format: u-int8
-             * @description Number of the board.
-             */
-            number: number;
-            /**
-             * Format: u-int16
-             * @description Program ID of its application.
-             */
-            program_id?: number | null;
-            /** @description Names of the status bits that are set. */
-            status: string[];
-        };
-        /** @description Value in a request. */
-        GivenValue: boolean | number | string;
         /** @description Event of the chain or a job. */
         ChainEvent: {
             /** @description Name of the holder; missing: no client holds the lease. */
@@ -222,20 +80,20 @@ export interface components {
             kind: "halt";
             /**
              * Format: u-int64
-             * @description Number of Stops within a tenth of a second that end with this one; missing: a single Stop.
+             * @description Number of Stops within 0.1 s up to this Stop; missing: a single Stop.
              */
             times?: number | null;
         } | {
-            /** @description Numbers of boards that have confirmed it. */
+            /** @description Numbers of the boards that have confirmed the Stop. */
             boards: number[];
             /** @enum {string} */
             kind: "stopped";
-            /** @description Boards that may still run, each with the reason; includes boards that ran and are silent now. */
+            /** @description Boards that may still run, each with the reason. This includes boards that ran and do not answer now. */
             not_stopped: string[];
         } | {
             /**
              * Format: u-int8
-             * @description Number of the board; missing: a board that is not known.
+             * @description Number of the board; missing: the agent does not know the board.
              */
             board?: number | null;
             /** @description Change: `late`, `lost`, `back`, or `rebooted`, after which the board has no number. */
@@ -297,7 +155,7 @@ export interface components {
         } | {
             /** @enum {string} */
             kind: "lost";
-            /** @description Reason. */
+            /** @description Reason of the loss. */
             why: string;
         } | {
             /** @description Name of the client that requested it. */
@@ -363,6 +221,148 @@ export interface components {
             /** @description Outcome: `finished`, `cancelled` or `failed`. */
             outcome: string;
         };
+        /** @description Boards of the chain. */
+        ChainObject: {
+            /** @description Boards with a number. */
+            boards: components["schemas"]["FoundObject"][];
+            /** @description Unusual observations; empty: none. */
+            findings: string[];
+        };
+        /** @description State of this computer's CAN controller. */
+        ControllerObject: {
+            /** @description `true` if it is bus-off. */
+            bus_off: boolean;
+            /** @description `true` if it is error passive. */
+            passive: boolean;
+            /**
+             * Format: u-int16
+             * @description Receive error counter.
+             */
+            rec?: number | null;
+            /**
+             * Format: u-int16
+             * @description Transmit error counter.
+             */
+            tec?: number | null;
+            /**
+             * Format: u-int64
+             * @description Number of bus-off events.
+             */
+            times_bus_off: number;
+        };
+        /** @description Reason why a request was refused or failed. */
+        ErrorObject: {
+            /**
+             * Format: u-int8
+             * @description Number of a board of a chain.
+             */
+            board?: number | null;
+            /** @description Usual cause. */
+            cause?: string | null;
+            /** @description Short name of the error, for programs. */
+            code: string;
+            /**
+             * Format: u-int8
+             * @description Number of a joint of an arm, 1 to 6 from the base.
+             */
+            joint?: number | null;
+            /**
+             * Format: double
+             * @description Limit of the value.
+             */
+            limit?: number | null;
+            /** @description Message for people: request, joint, board or point, value and limit. */
+            message: string;
+            /** @description Next step. */
+            next: string;
+            /**
+             * Format: u-int32
+             * @description Index of a point of the trajectory, from 0; during a motion, index of the 1 ms point.
+             */
+            point?: number | null;
+            /**
+             * Format: double
+             * @description Measured or requested value, in the unit of the message.
+             */
+            value?: number | null;
+        };
+        /** @description Event with its number and time. */
+        EventObject: {
+            /** @description Event. */
+            event: components["schemas"]["ChainEvent"];
+            /**
+             * Format: u-int64
+             * @description Number of the event; counts up from 1 as long as this agent runs.
+             */
+            number: number;
+            /**
+             * Format: double
+             * @description Time of the event by the agent's clock, s since 1970.
+             */
+            unix_s: number;
+        };
+        /** @description Events. */
+        EventsObject: {
+            /** @description Number that identifies this run of the agent. Each run counts its events from 1. */
+            agent: string;
+            /** @description Events, oldest first. */
+            events: components["schemas"]["EventObject"][];
+            /**
+             * Format: u-int64
+             * @description Number to use as `after` in the next request.
+             */
+            last: number;
+            /** @description `true` if some requested events were dropped from the journal. */
+            missed: boolean;
+        };
+        /** @description Expected board at a position of the chain. */
+        ExpectedBoard: {
+            /**
+             * Format: u-int8
+             * @description Position of the board in the chain. The board receives this number.
+             */
+            board: number;
+            /**
+             * Format: u-int16
+             * @description Flash number of the bootloader, which identifies the board.
+             */
+            flash_number: number;
+        };
+        /** @description Finding of a diagnosis. */
+        FindingObject: {
+            /** @description Next step; empty if no action is needed. */
+            next: string;
+            /** @description Severity: `problem`, `warning` or `good`. */
+            severity: string;
+            /** @description Text of the finding. */
+            what: string;
+            /** @description Probable cause; empty if no cause is known. */
+            why: string;
+        };
+        /** @description Board as it answered. */
+        FoundObject: {
+            /** @description Description that the board reports. */
+            description?: string | null;
+            /**
+             * Format: u-int16
+             * @description Flash number of the bootloader, which identifies the board.
+             */
+            flash_number: number;
+            /**
+             * Format: u-int8
+             * @description Number of the board.
+             */
+            number: number;
+            /**
+             * Format: u-int16
+             * @description Program ID of its application.
+             */
+            program_id?: number | null;
+            /** @description Names of the status bits that are set. */
+            status: string[];
+        };
+        /** @description Value in a request. */
+        GivenValue: boolean | number | string;
         /**
          * @description Format of an image.
          * @enum {string}
@@ -370,7 +370,7 @@ export interface components {
         ImageFormat: "bin" | "hex" | "srec";
         /** @description Options of the numbering. */
         InitRequest: {
-            /** @description Expected boards at their places; other boards are an error. Empty: any boards. */
+            /** @description Expected boards at their positions; other boards are an error. Empty: any boards. */
             expected?: components["schemas"]["ExpectedBoard"][];
         };
         /** @description Job, while it runs and afterwards. */
@@ -401,7 +401,7 @@ export interface components {
             key: string;
             /**
              * Format: double
-             * @description Duration of the lease without a request, s.
+             * @description Time without a request after which the lease lapses, s.
              */
             lasts_s: number;
             /** @description Policy for running boards after the lease has lapsed. */
@@ -426,11 +426,11 @@ export interface components {
         };
         /** @description Request for the lease. */
         LeaseRequest: {
-            /** @description `true`: if another client holds the lease, ask for it and wait. */
+            /** @description `true`: if another client holds the lease, ask that client for the lease, and wait. */
             ask?: boolean;
             /**
              * Format: double
-             * @description Duration of the lease without a request of this client, s.
+             * @description Time without a request of this client after which the lease lapses, s.
              */
             lasts_s?: number;
             /** @description Name of the client for people: the first 64 characters. */
@@ -449,7 +449,7 @@ export interface components {
         NamedValue: {
             /**
              * Format: u-int8
-             * @description Number of the board; missing: each board to run.
+             * @description Number of the board; missing: the value is for each board of the request.
              */
             board?: number | null;
             /** @description Name of the input or parameter. */
@@ -470,7 +470,7 @@ export interface components {
         };
         /** @description State of the outputs. */
         OutputsRequest: {
-            /** @description `true`: enable the outputs, which needs a running control loop. */
+            /** @description `true`: enable the outputs. The control loop of the board must run. */
             active: boolean;
         };
         /**
@@ -480,7 +480,10 @@ export interface components {
         Policy: "continue" | "stop";
         /** @description Boards that reported after a reset. */
         ResetObject: {
-            /** @description Low bytes of the boards' flash numbers. The boards have no numbers now: `POST /api/init` assigns new ones. */
+            /**
+             * @description Low bytes of the flash numbers of these boards. The boards now have no board numbers: `POST /api/init` assigns new
+             *     ones.
+             */
             reports: number[];
         };
         /**
@@ -523,12 +526,12 @@ export interface components {
         SentObject: {
             /**
              * Format: u-int64
-             * @description Number of the Stop: value of `last_halt` until the next one.
+             * @description Number of the Stop; `last_halt` has this value until the next Stop.
              */
             halt: number;
             /**
              * Format: u-int64
-             * @description Number of the last event before the Stop; its results are reported as later events.
+             * @description Number of the last event before the Stop. Later events report the results of the Stop.
              */
             last_event: number;
             /** @description Command: `stop`. */
@@ -545,8 +548,8 @@ export interface components {
             agent: string;
             /**
              * Format: u-int64
-             * @description Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
-             *     even at a steady rate.
+             * @description Time of this object since the start of the agent, ms. A client can use this time to detect that statuses arrive
+             *     late, even if they arrive at a steady rate.
              */
             at_ms: number;
             /** @description Number of known boards. */
@@ -562,8 +565,8 @@ export interface components {
              */
             foreign_frames: number;
             /**
-             * @description `true` if this agent sends heartbeats: the lease holder has sent a command, or boards that the agent has started
-             *     are not stopped.
+             * @description `true` if this agent sends heartbeats. The agent sends them after a command of the lease holder, and while boards
+             *     that the agent has started are not stopped.
              */
             is_master: boolean;
             /**
@@ -586,7 +589,7 @@ export interface components {
             lost?: string | null;
             /**
              * Format: u-int64
-             * @description Number of received frames, without foreign ones.
+             * @description Number of received frames, without frames of other protocols.
              */
             received: number;
             /** @description Role of the caller. */
@@ -596,7 +599,7 @@ export interface components {
              * @description Number of frames that this agent has sent.
              */
             sent: number;
-            /** @description Numbers that two boards share, in words. */
+            /** @description Board numbers that two boards share, in words. */
             shared_numbers: string[];
             /** @description `true` if the boards are simulated: nothing moves. */
             simulated: boolean;
@@ -610,7 +613,7 @@ export interface components {
             board: number;
             /**
              * Format: u-int16
-             * @description Number that its bootloader must have; missing: any bootloader.
+             * @description Flash number that the board must have; missing: any flash number.
              */
             flash_number?: number | null;
         };
@@ -628,21 +631,21 @@ export interface components {
              * @description Number of bytes of both cycles.
              */
             bytes: number;
-            /** @description `true` if only questions were sent. */
+            /** @description `true` if the agent sent only requests that change nothing. */
             dry_run: boolean;
             /**
              * Format: u-int16
              * @description Program ID that the boards must show; missing: not known.
              */
             program_id?: number | null;
-            /** @description Reason why it is not known. */
+            /** @description Reason why the Program ID is not known. */
             unverifiable?: string | null;
         };
         /** @description Update of boards. */
         UpdateRequest: {
             /**
-             * @description `true`: accept a result that cannot be verified, also of a board that shows the program but whose flash contents
-             *     are not known.
+             * @description `true`: accept a result that cannot be verified. This includes a board that already shows the program, but whose
+             *     flash contents are not known.
              */
             accept_unverified?: boolean;
             addresses?: components["schemas"]["Unit"] | null;
@@ -688,7 +691,7 @@ export interface components {
             error?: components["schemas"]["ErrorObject"] | null;
             /**
              * Format: u-int16
-             * @description Number of its bootloader, which identifies the board.
+             * @description Flash number of the bootloader, which identifies the board.
              */
             flash_number?: number | null;
             /**
@@ -712,8 +715,8 @@ export interface components {
              */
             time_s: number;
             /**
-             * @description `true` if the board shows Program ID and date of the image, and the records of the agent or its inventory show
-             *     that exactly this image was written to this address, now or before.
+             * @description `true` if the board shows Program ID and date of the image, and exactly this image was written to this address, now
+             *     or before. The records of the agent or its inventory show this.
              */
             verified: boolean;
         };
@@ -738,8 +741,8 @@ export interface components {
             /** @description Unit of the signal, if the signal table has one. */
             unit?: string | null;
             /**
-             * @description Value by the signal table: a number in its unit, `true` or `false`, or a word as text; missing if it is not
-             *     known.
+             * @description Value as the signal table defines it: a number in its unit, `true` or `false`, or a word as text. Missing if the
+             *     value is not known.
              */
             value?: unknown;
         };
@@ -752,7 +755,7 @@ export interface components {
         ValuesObject: {
             /**
              * Format: double
-             * @description Age of its outputs, s; missing before the first ones.
+             * @description Age of its outputs, s; missing before the first outputs.
              */
             age_s?: number | null;
             /**
@@ -761,20 +764,20 @@ export interface components {
              */
             board: number;
             /**
-             * @description Controller inputs as last set, or with their initial values. Without a value if this agent has neither set nor
-             *     read them since the application started.
+             * @description Controller inputs as last set, or with their initial values. An input has no value if this agent has neither set
+             *     nor read it since the application started.
              */
             inputs: components["schemas"]["ValueObject"][];
-            /** @description Sensor outputs; empty before the first ones. */
+            /** @description Sensor outputs; empty before the first outputs. */
             outputs: components["schemas"]["ValueObject"][];
             /**
-             * @description Parameters as last written by this agent. Without a value if it has not written them since the application
-             *     started: boards cannot report their parameters.
+             * @description Parameters as last written by this agent. A parameter has no value if this agent has not written it since the
+             *     application started, because boards cannot report their parameters.
              */
             parameters: components["schemas"]["ValueObject"][];
             /**
-             * @description `true` if the outputs are not current: they are older than half a second, or the board is late or lost, or has
-             *     left its control loop.
+             * @description `true` if the outputs are not current: they are older than 0.5 s, or the board is late, lost or not in its control
+             *     loop.
              */
             stale: boolean;
         };
@@ -787,6 +790,7 @@ export interface components {
 }
 export type AnswerObject = components['schemas']['AnswerObject'];
 export type BoardObject = components['schemas']['BoardObject'];
+export type ChainEvent = components['schemas']['ChainEvent'];
 export type ChainObject = components['schemas']['ChainObject'];
 export type ControllerObject = components['schemas']['ControllerObject'];
 export type ErrorObject = components['schemas']['ErrorObject'];
@@ -796,7 +800,6 @@ export type ExpectedBoard = components['schemas']['ExpectedBoard'];
 export type FindingObject = components['schemas']['FindingObject'];
 export type FoundObject = components['schemas']['FoundObject'];
 export type GivenValue = components['schemas']['GivenValue'];
-export type ChainEvent = components['schemas']['ChainEvent'];
 export type ImageFormat = components['schemas']['ImageFormat'];
 export type InitRequest = components['schemas']['InitRequest'];
 export type JobObject = components['schemas']['JobObject'];

@@ -294,7 +294,7 @@ fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
             "lower=\"-1.57\" upper=\"90\"",
             "-1.57..90 rad exceed one turn. If they are degrees: 90° are 1.5708 rad. Write rad",
         ),
-        ("lower=\"-90\" upper=\"1.57\"", "Degrees? -90° are -1.5708 rad. Write rad"),
+        ("lower=\"-90\" upper=\"1.57\"", "If they are degrees: -90° are -1.5708 rad. Write rad"),
         ("lower=\"0\" upper=\"150\"", "150° are 2.618 rad"),
         ("lower=\"-150\" upper=\"0\"", "-150° are -2.618 rad"),
         ("lower=\"-10\" upper=\"170\"", "-10° are -0.1745 rad, 170° are 2.9671 rad"),

@@ -1,8 +1,8 @@
 //! Access control: tokens, and checks of the origin of a request.
 //!
-//! A page of another site that is open in a browser can send requests to the address of this computer. Its `Origin`
-//! shows that. A page that has pointed its own name to this computer (DNS rebinding) is recognised by its `Host`. The
-//! agent refuses both, even with a valid token.
+//! A page of another site that is open in a browser can send requests to the address of this computer. Such a request
+//! is recognised by its `Origin` header. A page can also point its own host name to this computer (DNS rebinding); its
+//! request is recognised by its `Host` header. The agent refuses both kinds of request, even with a valid token.
 mod paths;
 mod tokens;
 
@@ -27,8 +27,8 @@ pub enum Role {
     Operator,
 }
 
-/// Number of wrong tokens per minute that are reported as wrong: per address, and from all addresses together.
-/// Further ones are refused as too many.
+/// Number of wrong tokens per minute that are reported as wrong: per address, and from all addresses together. Further
+/// wrong tokens are refused with "too many".
 const WRONG_MAX: usize = 20;
 const ALL_WRONG_MAX: usize = 2000;
 const MINUTE: Duration = Duration::from_secs(60);
@@ -36,10 +36,10 @@ const MINUTE: Duration = Duration::from_secs(60);
 /// Reason why a request is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// Request for a name that this agent does not have.
+    /// Request for a host name that this agent does not have.
     #[error("host {0} does not belong to this agent: expected its address, or a name set with --name")]
     Host(String),
-    /// Request of a page of another site.
+    /// Request from a web page of another site.
     #[error("pages of {0} have no access to this agent")]
     Origin(String),
     /// Token that does not belong to this agent.
@@ -48,7 +48,7 @@ pub enum Refusal {
     /// Request without a token.
     #[error("token missing: expected the header `Authorization: Bearer …`")]
     NoToken,
-    /// Operator's token in an address; it is refused because addresses are stored in histories and logs.
+    /// Operator's token in a URL; the agent refuses it because URLs are stored in histories and logs.
     #[error("the operator's token is not accepted in an address (URL)")]
     InAddress,
     /// Too many wrong tokens from this address.
@@ -56,20 +56,20 @@ pub enum Refusal {
     TooManyWrong,
 }
 
-/// Parts of a request that decide about access.
+/// Parts of a request that the access check uses.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
     /// Address that the request comes from.
     pub peer: IpAddr,
     /// `Host`.
     pub host: Option<&'a str>,
-    /// `Origin`, which browsers send.
+    /// `Origin` header, which browsers send.
     pub origin: Option<&'a str>,
     /// Token of the request, if it has one.
     pub token: Option<&'a str>,
-    /// Token in the address, for clients that cannot send it otherwise; only the viewer's token is accepted there.
+    /// Token in the URL, for clients that cannot send it in a header; only the viewer's token is accepted there.
     pub address_token: Option<&'a str>,
-    /// `true` if the request cannot change anything: its answer may be shown to pages of allowed origins.
+    /// `true` if the request cannot change anything, so that pages of allowed origins may read its answer.
     pub looks: bool,
     /// `true` for a Stop or a Pause ([`halts`]), which need no token on this computer.
     pub halts: bool,
@@ -78,17 +78,17 @@ pub struct Request<'a> {
 /// Permissions of an accepted request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Role, given by the token.
+    /// Role that belongs to the token.
     pub role: Role,
-    /// `true` if a page of an allowed origin made the request: it has read-only access.
+    /// `true` if a page of an allowed origin sent the request; such a page has read-only access.
     pub looks_only: bool,
 }
 
-/// Checks an origin as browsers send it: scheme, host and port, or `file://`.
+/// Checks an origin in the form that browsers send: scheme, host and port, or `file://`.
 ///
 /// # Errors
 ///
-/// The text is not a valid origin, or is a wildcard for several; the error is a message for people.
+/// The text is not a valid origin, or is a wildcard for several origins. The error is a message for the user.
 pub fn origin(text: &str) -> Result<String, String> {
     let text = text.trim().to_lowercase();
     if text == "file://" {
@@ -129,7 +129,7 @@ impl Access {
         Self { tokens, hosts, origins: Vec::new(), wrong: Mutex::new(Vec::new()) }
     }
 
-    /// Allows read-only access for pages of these origins, written as [`origin`] returns them.
+    /// Allows read-only access for pages of these origins, in the form that [`origin`] returns.
     pub fn allowing(self, origins: &[String]) -> Self {
         Self { origins: origins.to_vec(), ..self }
     }
@@ -150,7 +150,7 @@ impl Access {
         Ok(Entry { role: if looks_only { Role::Viewer } else { role }, looks_only })
     }
 
-    /// Returns the role that the token alone gives.
+    /// Returns the role of the token, without the check of the origin.
     fn role(&self, request: &Request<'_>) -> Result<Role, Refusal> {
         match (request.token, request.address_token) {
             (Some(token), _) => self.bearer(token, request.peer),
@@ -163,7 +163,7 @@ impl Access {
         }
     }
 
-    /// Returns `true` if a page of an allowed origin made the request. Checks the headers only, not the token.
+    /// Returns `true` if a page of an allowed origin sent the request. Checks the headers only, not the token.
     ///
     /// # Errors
     ///
@@ -180,7 +180,7 @@ impl Access {
         }
     }
 
-    /// Checks that the request is addressed to this agent, and that no page of another site made it.
+    /// Checks that the request is addressed to this agent, and that no page of another site sent the request.
     ///
     /// # Errors
     ///
@@ -205,8 +205,8 @@ impl Access {
 
     fn bearer(&self, token: &str, peer: IpAddr) -> Result<Role, Refusal> {
         let is = |other: &str| bool::from(token.as_bytes().ct_eq(other.as_bytes()));
-        // Both tokens are compared before wrong tokens are counted, so that wrong tokens of others never prevent a Stop
-        // by a client with the right one.
+        // Both tokens are compared before wrong tokens are counted, so that wrong tokens from other clients never
+        // prevent a Stop from a client with a valid token.
         match (is(&self.tokens.operator), is(&self.tokens.viewer)) {
             (true, _) => return Ok(Role::Operator),
             (_, true) => return Ok(Role::Viewer),
@@ -357,7 +357,7 @@ mod tests {
             assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::WrongToken));
         }
         assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::TooManyWrong));
-        // Clients with a right token, or that need no token, are still accepted.
+        // Clients that send a valid token or need no token are still accepted.
         assert_eq!(from(Some(&"o".repeat(43))), Ok(Role::Operator));
         assert_eq!(role(&access, "127.0.0.1", Some(HERE), None, None), Ok(Role::Viewer));
     }
@@ -378,7 +378,7 @@ mod tests {
             (None, Some("0123456789abcdefghij")),
             (None, Some(operator.as_str())),
         ];
-        // This also holds after too many wrong tokens.
+        // The result is the same after too many wrong tokens.
         for token in wrong.iter().cycle().take(4 * WRONG_MAX).copied() {
             for here in ["127.0.0.1", "127.8.9.10", "::1", "::ffff:127.0.0.1"] {
                 assert_eq!(enter(here, None, token, true), Ok(Role::Viewer), "{here} {token:?}");

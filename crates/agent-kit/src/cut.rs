@@ -1,11 +1,11 @@
-//! Shortening of foreign text before it is logged or echoed.
+//! Shortening of text from clients before it is logged or sent back.
 use std::borrow::Cow;
 
 use serde_json::Value;
 
-/// Longest foreign text in a log or an answer (a path, a Host, an Origin), in characters.
+/// Longest text from a client in a log or an answer (a path, a Host, an Origin), in characters.
 const FOREIGN_MAX: usize = 200;
-/// Longest text of a line of the log of commands, in characters.
+/// Longest text in a line of the command log, in characters.
 const LOGGED_MAX: usize = 1000;
 
 /// Returns at most 200 characters of a text.
@@ -13,7 +13,7 @@ pub(crate) fn cut(text: &str) -> Cow<'_, str> {
     cut_at(text, FOREIGN_MAX)
 }
 
-/// Returns the first and the last 200 characters of a message that contains foreign text.
+/// Returns the first and the last 200 characters of a message that contains text from a client.
 pub(crate) fn cut_middle(text: &str) -> Cow<'_, str> {
     let length = text.chars().count();
     if length <= 2 * FOREIGN_MAX {

@@ -17,12 +17,13 @@ use crate::socket::{ended, pass};
 const WAIT_MAX_S: f64 = 8.0;
 /// Largest number of events in one answer.
 const EVENTS_MAX: usize = 500;
-/// Number of requests that can wait for an event at the same time. Further requests are answered after [`NO_PLACE_S`],
-/// so that connections remain for other clients.
+/// Number of requests that can wait for an event at the same time. Further requests wait only [`NO_PLACE_S`], so that
+/// connections remain free for other clients.
 const WAITING_MAX: usize = 64;
-/// Longest wait of a further request, in seconds. This wait limits the load by clients that ask again immediately.
+/// Longest wait of a request when the maximum number of requests already waits, in seconds. This wait limits the load
+/// by clients that repeat the request immediately.
 const NO_PLACE_S: f64 = 0.25;
-/// Shortest interval between messages of a stream that are not events.
+/// Shortest interval between two messages of a stream, if the messages are not events.
 const PERIOD: Duration = Duration::from_millis(40);
 
 /// Selection of events.
@@ -60,7 +61,7 @@ pub struct EventsObject<E> {
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StreamRequest {
-    /// Token; it was checked before.
+    /// Token, which the access gate has already checked.
     #[serde(default, rename = "token")]
     _token: Option<serde::de::IgnoredAny>,
     /// Number of the last event that the client has; missing: only new events.
@@ -71,7 +72,7 @@ pub struct StreamRequest {
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage<E> {
-    /// Events in order; only those reported as missed are left out.
+    /// Events in order; only events that are reported as missed are omitted.
     Events(EventsObject<Entry<E>>),
 }
 
@@ -82,7 +83,7 @@ pub struct Events {
 }
 
 impl Events {
-    /// Returns the event requests of the agent with this number of its run.
+    /// Creates the event requests for this run number of the agent.
     pub fn new(agent: Arc<str>) -> Self {
         Self { agent, waiting: Semaphore::new(WAITING_MAX) }
     }
@@ -92,7 +93,8 @@ impl Events {
         EventsObject { agent: self.agent.to_string(), events, last, missed }
     }
 
-    /// Returns the requested events. If the list is empty, waits for the first one; the number of waiting requests is limited.
+    /// Returns the requested events. If the list is empty, waits for the first event; the number of waiting requests is
+    /// limited.
     ///
     /// # Errors
     ///
@@ -124,7 +126,7 @@ impl Events {
     }
 
     /// Sends events on a socket as they occur, and the messages that `show` returns. `show` also returns the time of
-    /// its next call; it is called earlier if `changes` announces a change. Ends when the client disconnects, does
+    /// its next call; `show` is called earlier if `changes` announces a change. Ends when the client disconnects, does
     /// not read, or sends a message that is not expected.
     pub async fn stream<E: JournalEvent + Serialize, M: Serialize>(
         &self,
@@ -152,7 +154,7 @@ impl Events {
                     return;
                 }
             }
-            // Limits the rate of messages. Meanwhile the client may only end the connection.
+            // Limits the rate of messages. During this wait, the client may only end the connection.
             let next = async {
                 period.tick().await;
                 tokio::select! {

@@ -19,7 +19,7 @@ use crate::lease::key_of;
 use crate::log::CommandLog;
 use crate::problem::Denial;
 
-/// Prefix of the token in the list of protocols of a socket.
+/// Prefix of the token in the protocol list of a WebSocket.
 const BEARER: &str = "bearer.";
 /// Longest name of a client, in characters.
 const NAME_MAX: usize = 64;
@@ -37,7 +37,7 @@ impl Gate {
         Self { access: Arc::new(access), log }
     }
 
-    /// Checks that a request uses a name of this agent and was not made by a page of another site. Checks no
+    /// Checks that a request uses a name of this agent and was not sent by a page of another site. Does not check
     /// permissions.
     ///
     /// # Errors
@@ -48,19 +48,19 @@ impl Gate {
         self.access.is_own(host, origin)
     }
 
-    /// Writes a line to the log of commands.
+    /// Writes a line to the command log.
     pub fn note(&self, what: &str, facts: serde_json::Value) {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
 
-    /// Writes a line to the log of commands about an address that can cause many lines. The first lines are written
-    /// in full; later ones are only counted.
+    /// Writes a line to the command log about an address that can cause many lines. The first lines are written in
+    /// full; later lines are only counted.
     pub fn note_repeated(&self, what: &'static str, from: SocketAddr, facts: serde_json::Value) {
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         log.write_repeated(what, &from.ip().to_string(), facts);
     }
 
-    /// Returns the number of lines that the log of commands lost.
+    /// Returns the number of lines that the command log has lost.
     pub fn lost_lines(&self) -> u64 {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).lost_in_all()
     }
@@ -77,7 +77,7 @@ pub struct Caller {
     pub peer: SocketAddr,
 }
 
-/// Client that sends a request, with the lease key that it sends, if any.
+/// Client that sends a request, with the lease key in its request, if any.
 #[derive(Clone, Debug)]
 pub struct Asker {
     /// Client that sends the request.
@@ -131,7 +131,7 @@ impl Caller {
         }
     }
 
-    /// Returns the name to display for a client with this name; its address if the name is empty.
+    /// Returns the name to display for a client, or its address if the name is empty.
     pub fn named(&self, name: &str) -> String {
         let name = plain(name);
         if name.is_empty() { self.peer.to_string() } else { name }
@@ -159,7 +159,7 @@ pub async fn let_in(
         looks: looks(method, request.uri().path()),
         halts: halts(method, request.uri().path()),
     };
-    // A browser sends a preflight request without a token, to learn if its page may send one.
+    // A browser sends a preflight request without a token, to check if its page may send the actual request.
     let origin = headers.get(header::ORIGIN).cloned();
     if preflight && gate.access.is_foreign(&asked) == Ok(true) {
         return may_read(StatusCode::NO_CONTENT.into_response(), origin);
@@ -197,8 +197,8 @@ fn line_of(request: &Request<Body>) -> String {
     format!("{} {}", cut(request.method().as_str()), cut(request.uri().path()))
 }
 
-/// Middleware after [`let_in`]: refuses clients that may not command before the body is read, because a body can arrive
-/// slowly.
+/// Middleware after [`let_in`]: refuses clients that may not command before the body is read, so that slow bodies do
+/// not occupy the agent.
 pub async fn may_command(request: Request<Body>, next: Next) -> Response {
     let (method, path) = (request.method(), request.uri().path());
     let commands = !method.is_safe() && !halts(method.as_str(), path);
@@ -209,8 +209,8 @@ pub async fn may_command(request: Request<Body>, next: Next) -> Response {
     }
 }
 
-/// Returns the token of `Authorization: Bearer TOKEN`; the scheme is not case-sensitive (RFC 9110, 11.1). Any other
-/// header gives the empty text, which is never a valid token.
+/// Returns the token of `Authorization: Bearer TOKEN`; the scheme is not case-sensitive (RFC 9110, 11.1). Returns an
+/// empty text for any other header; an empty text is never a valid token.
 fn bearer_token(value: &str) -> &str {
     match value.split_once(' ') {
         Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => token.trim(),
@@ -236,7 +236,7 @@ struct InAddress {
     token: Option<String>,
 }
 
-/// Returns the token in the address of a socket, for clients that cannot send headers.
+/// Returns the token in the URL of a WebSocket, for clients that cannot send headers.
 fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     let socket = headers.contains_key(header::SEC_WEBSOCKET_KEY);
     let looks = ["/", "/api/foxglove", "/api/stream"].contains(&uri.path());
@@ -244,15 +244,15 @@ fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     asked.and_then(|Query(asked)| asked.token)
 }
 
-/// Returns the token in the list of protocols of a page's socket. A browser lets a page set no other header there,
-/// and it does not store this header in a history.
+/// Returns the token in the protocol list of a page's WebSocket. This list is the only header of a WebSocket that a
+/// browser allows a page to set; browsers do not store it in a history.
 fn protocol_token(headers: &HeaderMap) -> Option<&str> {
     let protocols = text_of(headers, header::SEC_WEBSOCKET_PROTOCOL)?;
     protocols.split(',').find_map(|name| name.trim().strip_prefix(BEARER))
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // A header that is not text is treated as present but never valid.
+    // A header that is not text counts as a token that is never valid.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 

@@ -1,4 +1,5 @@
-//! Numbered Stops and Pauses: a request that was issued before one of them moves nothing, however late it arrives.
+//! Numbered Stops and Pauses. A motion request that was issued before a Stop or Pause never moves the arm, even if it
+//! arrives later.
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use host_kit::Facts;
@@ -6,9 +7,9 @@ use utoipa::IntoParams;
 
 use crate::api::{Asked, Problem};
 
-/// Counter of requested Stops and Pauses.
+/// Counter of the Stops and Pauses that clients have requested.
 pub trait Halts {
-    /// Returns the number of the last Stop or Pause; 0: none yet.
+    /// Returns the number of the last Stop or Pause; 0 if there was none yet.
     fn last_halt(&self) -> u64;
 }
 
@@ -24,8 +25,9 @@ pub struct KnownHalt {
     pub asked_after: Option<u64>,
 }
 
-/// Number of the last Stop or Pause before a request: the number that the client sends, or else the number of the
-/// last one when the head of the request arrived. The number is read before the body, which may arrive slowly.
+/// Number of the last Stop or Pause before a request: the number that the client sends, or otherwise the number of the
+/// last Stop or Pause when the head of the request arrived. The number is read before the body, which may arrive
+/// slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 
@@ -34,7 +36,7 @@ impl KnownHalt {
     ///
     /// # Errors
     ///
-    /// The client sends a number that no Stop or Pause has yet.
+    /// The client sends a number that is higher than the number of the last Stop or Pause.
     pub fn among(self, last: u64) -> Result<AskedAfter, Problem> {
         match self.asked_after {
             Some(known) if known > last => {

@@ -1,11 +1,13 @@
-//! Journal of numbered events; a client that lost the connection requests the events after the last one it has.
+//! Journal of numbered events; a client that lost the connection requests the events after the last event that it
+//! received.
 use std::collections::VecDeque;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-/// Number of events that are kept: some hours of work, or the last minutes of a device that reports often.
+/// Number of events that are stored. This is enough for some hours of work, or for the last minutes of a device that
+/// reports often.
 const KEPT: usize = 4096;
 
 /// Event of a journal.
@@ -45,7 +47,7 @@ struct Kept<E> {
 /// Callback that receives each event when it is written.
 type Follower<E> = Box<dyn Fn(&E) + Send + Sync>;
 
-/// Events of an agent.
+/// Stored events of an agent.
 pub struct Journal<E> {
     kept: Mutex<Kept<E>>,
     last: watch::Sender<u64>,
@@ -79,21 +81,21 @@ impl<E: JournalEvent> Journal<E> {
             kept.events.pop_front();
         }
         kept.events.push_back(Entry { number, unix_s: unix.as_secs_f64(), event });
-        // Under the lock, so that the numbers are announced in order.
+        // The lock is held here, so that the numbers are announced in order.
         self.last.send_replace(number);
     }
 
-    /// Returns the number of the last event; 0: none yet.
+    /// Returns the number of the last event; 0 if there was none yet.
     pub fn last(&self) -> u64 {
         *self.last.borrow()
     }
 
-    /// Returns a receiver that announces each new last number.
+    /// Returns a receiver that announces the number of each new event.
     pub fn changes(&self) -> watch::Receiver<u64> {
         self.last.subscribe()
     }
 
-    /// Returns at most `most` events after the number `after`, only those of `job` if it is given.
+    /// Returns at most `most` events after the number `after`; with `job`, only the events of this job.
     pub fn after(&self, after: u64, job: Option<u64>, most: usize) -> Excerpt<E> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let oldest = kept.events.front().map_or(kept.last + 1, |event| event.number);
@@ -120,7 +122,7 @@ mod tests {
         }
     }
 
-    /// A client that continues from its last number after any break of the connection gets every event once and in
+    /// After any loss of the connection, a client that continues from its last number receives every event once and in
     /// order.
     #[test]
     fn events_are_resumed_by_their_numbers() {

@@ -1,4 +1,5 @@
-//! Lease for clients without a connection of their own: a request with the client's key shows that the client is alive.
+//! Lease for clients without a connection of their own: a request with the client's key shows that the client still
+//! runs.
 mod held;
 
 use std::collections::BTreeMap;
@@ -13,21 +14,21 @@ pub use held::{Lease, Presence};
 
 /// Header with the key of a lease.
 pub const KEY: &str = "lease-key";
-/// Allowed duration of a lease without a request, in seconds.
+/// Allowed time until a lease without a request ends, in seconds.
 const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
-/// Default duration of a lease without a request, in seconds.
+/// Default time until a lease without a request ends, in seconds.
 const LASTS_DEFAULT_S: f64 = 10.0;
-/// Largest number of clients at the same time.
+/// Largest number of clients that are registered at the same time.
 const CLIENTS_MAX: usize = 32;
-/// Time after the end of its lease until a silent client is forgotten.
+/// Time from the end of its lease until a silent client is removed.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
-/// Returns the default duration of a lease without a request, in seconds.
+/// Returns the default time until a lease without a request ends, in seconds.
 pub fn default_lasts_s() -> f64 {
     LASTS_DEFAULT_S
 }
 
-/// Returns the duration of a lease without a request.
+/// Returns the time until a lease without a request ends.
 ///
 /// # Errors
 ///
@@ -69,16 +70,16 @@ pub struct LeaseState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct ClientId(pub u64);
 
-/// Client, and its terms of a lease; `P` is the policy for its work after the lease has lapsed.
+/// Client, and the rules of its lease. `P` is the policy for the client's work after the lease has lapsed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Client<P> {
     /// Number of the client.
     pub id: ClientId,
-    /// Name of the client for people.
+    /// Name of the client that users see.
     pub name: String,
-    /// Duration of its lease without a request.
+    /// Time until the client's lease ends without a request.
     pub lasts: Duration,
-    /// Policy for its work after the lease has lapsed.
+    /// Policy for the client's work after its lease has lapsed.
     pub policy: P,
     seen: Duration,
 }
@@ -144,10 +145,10 @@ impl From<Denied> for Problem {
     }
 }
 
-/// Clients of an agent. At most one of them holds the lease. Times are times of the agent.
+/// Clients of an agent. At most one of them holds the lease. All times are measured by the agent's clock.
 pub struct Leases<P> {
     clients: BTreeMap<String, Client<P>>,
-    /// Lease, with the keys of the clients.
+    /// Lease, in which clients are identified by their keys.
     held: Option<Lease<String>>,
     last: u64,
 }
@@ -164,14 +165,14 @@ pub fn key_of(headers: &HeaderMap) -> Option<&str> {
 }
 
 impl<P: Clone> Leases<P> {
-    /// Registers a client, which takes the lease; with `ask` it waits if another client holds the lease. Returns its
-    /// number, and `true` if it holds the lease. The first waiting client keeps its place until it gets the lease, is
-    /// forgotten, or is silent for the duration of its own lease.
+    /// Registers a client, which takes the lease if it is free. If another client holds the lease, a client with `ask`
+    /// waits for it. Returns the client's number, and `true` if the client holds the lease. The first waiting client
+    /// stays first until it receives the lease, is removed, or is silent for the duration of its own lease.
     ///
     /// # Errors
     ///
-    /// [`Denied`]: another client holds the lease or waits for it, or too many clients are registered. This client is
-    /// not registered then.
+    /// [`Denied`]: another client holds the lease or waits for it, or too many clients are registered. In these cases
+    /// the client is not registered.
     pub fn admit(
         &mut self,
         key: &str,
@@ -189,8 +190,8 @@ impl<P: Clone> Leases<P> {
             other => other.is_none(),
         };
         if self.clients.len() >= CLIENTS_MAX {
-            // The client that has been silent longest is removed, so that a program that restarts again and again
-            // blocks no other client.
+            // The client that has been silent longest is removed, so that a program that restarts again and again does
+            // not block other clients.
             let holder = self.held.as_ref().map(|held| held.holder.clone());
             let others = self.clients.iter().filter(|(key, _)| Some(*key) != holder.as_ref());
             let oldest = others.min_by_key(|(_, client)| client.seen).map(|(key, _)| key.clone());
@@ -209,7 +210,7 @@ impl<P: Clone> Leases<P> {
         Ok((id, held))
     }
 
-    /// Returns the client with this key, and notes that it is alive.
+    /// Returns the client with this key, and records the time of this request.
     ///
     /// # Errors
     ///
@@ -220,7 +221,7 @@ impl<P: Clone> Leases<P> {
         Ok(client.clone())
     }
 
-    /// Returns the client with this key. Renews its lease, or takes the lease if it is free.
+    /// Returns the client with this key. Renews the client's lease, or takes the lease for this client if it is free.
     ///
     /// # Errors
     ///
@@ -235,7 +236,7 @@ impl<P: Clone> Leases<P> {
         Ok(client)
     }
 
-    /// Releases the lease, which passes to the waiting client if there is one; the client is forgotten.
+    /// Releases the lease and removes the client. The lease passes to the waiting client if there is one.
     pub fn release(&mut self, key: &str, now: Duration) {
         self.clients.remove(key);
         if let Some(held) = self.held.take_if(|held| held.holder == key) {
@@ -244,9 +245,9 @@ impl<P: Clone> Leases<P> {
     }
 
     /// Ends a lease that has lapsed and returns its former holder. The lease passes to the waiting client if there is
-    /// one. Also forgets clients that no longer send requests.
+    /// one. Also removes clients that no longer send requests.
     pub fn lapse(&mut self, now: Duration) -> Option<Client<P>> {
-        // The holder is never forgotten before its lease has lapsed: its policy must be applied.
+        // The holder is never removed before its lease has lapsed, because its policy must be applied.
         let holder = self.held.as_ref().map(|held| held.holder.clone());
         self.clients.retain(|key, client| {
             Some(key) == holder.as_ref() || now.saturating_sub(client.seen) < client.lasts + FORGOTTEN
@@ -262,7 +263,7 @@ impl<P: Clone> Leases<P> {
         held.and_then(|held| self.clients.get(&held.holder)).is_some_and(|holder| holder.id == client)
     }
 
-    /// Returns the key of the client that waits for the lease, if it is present.
+    /// Returns the key of the client that waits for the lease, if this client is still registered and not silent.
     fn first(&self, now: Duration) -> Option<&String> {
         self.held
             .as_ref()?
@@ -271,12 +272,12 @@ impl<P: Clone> Leases<P> {
 
     fn pass_on(&mut self, held: &Lease<String>, now: Duration) {
         self.held = held.next(|next| self.clients.get(next).map(|client| client.presence().lasts), now);
-        // The new holder is treated as if it had just sent a request, so it is not forgotten too early.
+        // The new holder is treated as if it had just sent a request, so that it is not removed too early.
         let next = self.held.as_ref().and_then(|held| self.clients.get_mut(&held.holder));
         next.into_iter().for_each(|client| client.seen = now);
     }
 
-    /// Returns the lease, with the names of the clients.
+    /// Returns the lease with the names of the holder and of the waiting client.
     pub fn lease(&self) -> Option<Lease<String>> {
         let Lease { holder, since, until, wanted_by } = self.held.as_ref()?;
         let name = |key: &String| self.clients.get(key).map(|client| client.name.clone());
@@ -335,7 +336,7 @@ mod tests {
         );
         assert!(!leases.holds(ClientId(1), s(5)) && !leases.holds(ClientId(2), s(14)));
         assert!(leases.holds(ClientId(2), s(13)));
-        // A command renews the lease; then it lapses, once.
+        // A command renews the lease; without further commands the lease lapses once.
         assert!(leases.command(Some("bob"), s(13)).is_ok());
         assert_eq!(leases.lapse(s(22)), None);
         assert_eq!(leases.lapse(s(23)).map(|client| client.name), Some("bob".into()));
@@ -355,7 +356,7 @@ mod tests {
         assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), Some(s(7)))));
         assert!(leases.admit("c", ("carl", s(5), ()), false, s(3)).is_err());
         assert!(leases.command(Some("b"), s(3)).is_ok() && leases.command(Some("a"), s(3)).is_err());
-        // No client waits any more; a waiting client that is forgotten gets nothing.
+        // No client waits any more; a waiting client that was removed does not receive the lease.
         assert!(leases.lapse(s(8)).is_some() && leases.lease().is_none());
         leases.admit("d", ("dora", s(60), ()), false, s(8)).expect("nobody has it");
         leases.admit("e", ("emil", s(1), ()), true, s(8)).expect("he may wait");
@@ -363,7 +364,7 @@ mod tests {
         assert!(leases.lapse(s(68)).is_some() && leases.lease().is_none());
     }
 
-    /// The holder of a lapsed lease is returned exactly once, for any time of the request and of the check.
+    /// The holder of a lapsed lease is returned exactly once, for any times of the request and of the check.
     #[test]
     fn who_was_given_the_lease_is_not_forgotten_while_it_has_it() {
         for let_go in 1..=70 {
@@ -395,7 +396,7 @@ mod tests {
         assert_eq!(ask(&mut leases, "bob", 1), Ok(false));
         let awaited = Err(Denied::Awaited { holder: "anna".into(), by: "bob".into() });
         assert_eq!(ask(&mut leases, "carl", 2), awaited);
-        // Bob's request shows that he still waits, and anna's that she still commands.
+        // Bob's request shows that Bob still waits, and Anna's request renews her lease.
         assert!(leases.command(Some("bob"), s(4)).is_err() && leases.command(Some("anna"), s(4)).is_ok());
         assert_eq!(ask(&mut leases, "carl", 8), awaited);
         assert!(leases.command(Some("anna"), s(8)).is_ok());
@@ -422,7 +423,7 @@ mod tests {
     fn the_one_that_was_silent_longest_makes_room_and_never_the_one_who_commands() {
         let mut leases = Leases::default();
         for n in 0..3 * CLIENTS_MAX {
-            // Each client asks after the client before it has stopped waiting.
+            // Each client requests the lease after the previous client has stopped waiting.
             let now = s(2 * n as u64);
             let lasts = s(if n == 0 { 60 } else { 1 });
             leases.admit(&n.to_string(), ("x", lasts, ()), true, now).expect("there is room");

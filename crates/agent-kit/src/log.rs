@@ -1,4 +1,4 @@
-//! Log of commands (who, what, when, result); lines are only appended, never rewritten.
+//! Command log with client, command, time and result. Lines are only appended, never rewritten.
 mod repeats;
 mod rotate;
 
@@ -20,10 +20,10 @@ pub const LIMIT: u64 = 100_000_000;
 
 /// Largest number of lines that wait for a slow disk.
 const WAITING_MAX: usize = 4096;
-/// Longest wait for the last lines when a program ends: a disk that hangs must not block the end.
+/// Longest wait for the last lines when a program ends: a disk that does not respond must not prevent the end.
 const LAST_LINES: Duration = Duration::from_secs(3);
 
-/// File with one JSON object per line, written by a thread of its own, so that a Stop never waits for the disk.
+/// File with one JSON object per line, which a separate thread writes, so that a Stop never waits for the disk.
 pub struct CommandLog {
     lines: Option<SyncSender<Value>>,
     /// Channel that closes when all lines are written.
@@ -33,20 +33,20 @@ pub struct CommandLog {
     /// Number of lines that were dropped since the last line that was queued.
     lost: u64,
     lost_in_all: u64,
-    /// Number of lines that the disk did not accept.
+    /// Number of lines that could not be written to the disk.
     unwritten: Arc<AtomicU64>,
     repeats: Repeats,
 }
 
-/// Kinds of lines about motions, Stops and leases. These lines are written even if other lines are dropped, because
-/// other lines leave half of the queue free.
+/// Kinds of lines about motions, Stops and leases. Other lines use at most half of the queue, so these lines are
+/// written even when other lines are dropped.
 const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 
 impl CommandLog {
-    /// Opens or creates this file; `None`: no line is kept. When the file has half of `limit` bytes it is renamed to
-    /// `FILE.1`, which replaces the previous one. `failed` is called on the writer's thread with the first write error,
-    /// and again for each later failure after a successful write.
+    /// Opens or creates this file; with `None`, no line is stored. When the file reaches half of `limit` bytes, it is
+    /// renamed to `FILE.1` and replaces the previous `FILE.1`. `failed` is called on the writer's thread with the first
+    /// write error, and again for each later failure after a successful write.
     ///
     /// # Errors
     ///
@@ -83,7 +83,7 @@ impl CommandLog {
         Self { lines: Some(lines), written, waiting, lost: 0, lost_in_all: 0, unwritten, repeats }
     }
 
-    /// Writes a line: the name of the event and its facts. Never waits.
+    /// Writes a line with the name of the event and its data. Never waits.
     pub fn write(&mut self, what: &str, facts: Value) {
         for (what, facts) in self.repeats.due(Instant::now()) {
             self.line(what, facts);
@@ -92,8 +92,8 @@ impl CommandLog {
     }
 
     /// Writes a line about a `sender` that can cause many lines without a token. The first ten lines are written in
-    /// full. Later the log gets one line a minute with the number of repetitions (`times`) and the facts of the last
-    /// one.
+    /// full. After that, the log contains one line per minute with the number of repetitions (`times`) and the data of
+    /// the last repetition.
     pub fn write_repeated(&mut self, what: &'static str, sender: &str, facts: Value) {
         if self.lines.is_none() {
             return;
@@ -130,7 +130,7 @@ impl CommandLog {
 }
 
 impl CommandLog {
-    /// Returns the number of lines that were dropped or that the disk did not accept.
+    /// Returns the number of lines that were dropped or could not be written to the disk.
     pub fn lost_in_all(&self) -> u64 {
         self.lost_in_all + self.unwritten.load(Ordering::Relaxed)
     }
@@ -191,7 +191,7 @@ fn write(
     }
 }
 
-/// Writes the bytes. Returns the number of bytes taken, and an error if some were not.
+/// Writes the bytes. Returns the number of bytes written, and an error if some bytes were not written.
 fn write_whole(file: &mut impl io::Write, bytes: &[u8]) -> (usize, io::Result<()>) {
     let mut taken = 0;
     while let Some(rest @ [_, ..]) = bytes.get(taken..) {
@@ -238,7 +238,7 @@ mod tests {
 
     impl Target for Disk {}
 
-    /// A disk that hangs delays the end of a program only briefly.
+    /// A disk that does not respond delays the end of a program only briefly.
     #[test]
     fn a_disk_that_hangs_keeps_nobody() {
         struct Hung(Receiver<()>);
@@ -257,13 +257,13 @@ mod tests {
         let (hangs, until) = sync_channel(0);
         let mut log = CommandLog::on(Hung(until), |_| {});
         log.write("sent", json!({}));
-        // The test passes if this call returns.
+        // The test succeeds if this call returns.
         drop(log);
         drop::<SyncSender<()>>(hangs);
     }
 
-    /// The disk becomes full at any time. Each failure is reported once, lines are complete except for an interrupted
-    /// one, and the next line states the number of missing lines.
+    /// The disk can become full at any time. Each failure is reported once, and all lines except an interrupted line
+    /// are complete. The next line states the number of missing lines.
     #[test]
     fn a_full_disk_costs_the_lines_that_it_does_not_take_and_they_are_counted() {
         for room in 0..120 {
@@ -280,8 +280,8 @@ mod tests {
             };
             (0..5).for_each(|n| log.write("sent", json!({ "n": n })));
             done(&log);
-            // The disk may still process the last line: three more lines are then either certainly refused or written
-            // after it.
+            // The disk may still process the last line, so three more lines follow. Each of them is either refused or
+            // written after it.
             disk.with(|(left, _)| *left = usize::MAX);
             (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
             log.lines = None;
@@ -331,7 +331,8 @@ mod tests {
         }
     }
 
-    /// If the file cannot be renamed, this is reported, the lines are counted as lost, and the limit is kept.
+    /// If the file cannot be renamed, the error is reported and the lines are counted as lost. The file stays within
+    /// its limit.
     #[test]
     fn a_log_that_cannot_be_put_aside_stays_within_its_limit() {
         let dir = tempfile::tempdir().expect("a directory");
@@ -361,7 +362,8 @@ mod tests {
         assert!(!Path::new("/dev/null.1").exists());
     }
 
-    /// A refused request costs a line of limited length, and later no line at all; each request is counted.
+    /// The first refused requests each cause a line of limited length; later ones cause no line. Each request is
+    /// counted.
     #[test]
     fn lines_of_those_who_are_not_let_in_are_short_and_few() {
         let dir = tempfile::tempdir().expect("a directory");

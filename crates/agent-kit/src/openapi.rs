@@ -10,7 +10,7 @@ use utoipa::{IntoResponses, Modify};
 
 use crate::api::Problem;
 
-/// Returns the description as JSON. A response that several operations share is written once.
+/// Returns the description as JSON. A response that several operations share appears only once.
 pub fn text(description: &OpenApi) -> String {
     let mut description = description.clone();
     share_responses(&mut description);
@@ -18,7 +18,8 @@ pub fn text(description: &OpenApi) -> String {
     description.to_pretty_json().unwrap_or_default()
 }
 
-/// Moves responses that several operations share to the components, named after their status: `NotFound`, `NotFound2`.
+/// Moves responses that several operations share to the components. The names come from their status: `NotFound`,
+/// `NotFound2`.
 fn share_responses(description: &mut OpenApi) {
     let mut counts: Vec<(String, RefOr<Response>, u32)> = Vec::new();
     for_each_response(description, |status, response| {
@@ -28,7 +29,7 @@ fn share_responses(description: &mut OpenApi) {
         }
     });
     counts.retain(|(.., count)| *count > 1);
-    // The most frequent response of a status has the name without a number.
+    // The most frequent response of a status gets the name without a number.
     counts.sort_by_key(|(status, _, count)| (status.clone(), Reverse(*count)));
     let mut names: Vec<String> = Vec::new();
     for (status, ..) in &counts {
@@ -56,7 +57,7 @@ fn for_each_response(description: &mut OpenApi, mut act: impl FnMut(&str, &mut R
     }
 }
 
-/// Returns the name of a status without spaces: `NotFound` for 404.
+/// Returns the name of a status without spaces, for example `NotFound` for 404.
 fn status_name(status: &str) -> String {
     let code = status.parse().ok().and_then(|code: u16| StatusCode::from_u16(code).ok());
     let reason = code.and_then(|code| code.canonical_reason()).unwrap_or("Response");

@@ -1,8 +1,8 @@
 //! Pages of the dashboard, which are part of the program: a browser needs no other files.
 //!
 //! A page contains no secrets. The agent serves a page to every browser that requests it by one of the agent's names,
-//! but not to pages of other sites. The page itself asks for a token if one is needed, and its later requests pass the
-//! gate like all others.
+//! but never to pages of other sites. The page itself requests a token from the user if one is needed. Its later
+//! requests pass the access gate like all other requests.
 use std::io::Write as _;
 use std::sync::Arc;
 
@@ -17,28 +17,29 @@ use rust_embed::{EmbeddedFile, RustEmbed};
 
 use crate::gate::Gate;
 
-/// Files that `npm run build` has made in `web/`.
+/// Files that `npm run build` has generated in `web/`.
 #[derive(RustEmbed)]
 #[folder = "../../web/dist"]
 #[allow_missing = true]
 struct Built;
 
-/// Permissions of a page: its own scripts and files, and this agent. No page of another site may show it in a frame.
+/// Permissions of a page: it may use its own scripts and files, and send requests to this agent. No page of another
+/// site may show it in a frame.
 const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; \
                       connect-src 'self' ws: wss:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// Directory of files whose names are made from their contents.
+/// Directory of files whose names contain a hash of their contents.
 const LASTING: &str = "assets/";
-/// File endings of formats that are already compressed.
+/// File name extensions of formats that are already compressed.
 const COMPRESSED: [&str; 3] = ["png", "woff2", "ico"];
 
-/// Header that tells a browser which sites may use a file.
+/// Header that specifies for a browser which sites may use a file.
 const SHOWN_TO: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 
 /// File of the pages, ready to be sent.
 struct File {
     name: String,
     kind: &'static str,
-    /// Entity tag, made from the contents.
+    /// Entity tag, computed from the contents.
     tag: HeaderValue,
     bytes: Bytes,
     /// Contents compressed with gzip, if that is shorter.
@@ -55,7 +56,7 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// Returns the pages for this gate; `first` is the file that is served at `/`, like `index.html`.
+    /// Returns the pages for this gate. `first` is the file that is served at `/`, for example `index.html`.
     pub fn new(gate: Gate, first: &'static str) -> Self {
         let files = Built::iter().filter_map(|name| Built::get(&name).map(|file| File::of(&name, file)));
         Self { gate, first, files: files.collect() }
@@ -116,7 +117,7 @@ impl File {
 /// Middleware in front of the gate: serves the pages and passes on all other requests.
 pub async fn show(State(pages): State<Pages>, request: Request, next: Next) -> Response {
     let looks = [Method::GET, Method::HEAD].contains(request.method());
-    // A request for a socket at `/` does not want the page.
+    // A WebSocket request at `/` does not request the page.
     let socket = request.headers().contains_key(header::SEC_WEBSOCKET_KEY);
     match pages.find(request.uri().path()).filter(|_| looks && !socket) {
         Some(file) => match pages.gate.is_own(request.headers()) {
@@ -208,7 +209,7 @@ mod tests {
             let (status, encoding, _) = answer("a.js", &[(header::ACCEPT_ENCODING, encodings)]);
             assert_eq!((status, encoding.as_str()), (200, sent), "{encodings}");
         }
-        // Its name contains the hash of its contents, so the file never changes.
+        // The name of the file contains the hash of its contents, so the file never changes.
         assert!(
             answer("assets/a.js", &[]).2.contains("immutable") && answer("index.html", &[]).2 == "no-cache"
         );

@@ -1,4 +1,4 @@
-//! Errors of an API as one type of object.
+//! Common error object of the APIs.
 use std::borrow::Cow;
 use std::ops::Deref;
 
@@ -21,13 +21,13 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Returns a refusal with its next step.
+    /// Returns a refusal with the next step for the user.
     pub fn new(code: &'static str, message: impl Into<String>, next: impl Into<Next>) -> Self {
         let failure = Failure::new(ErrorKind::Refused, code, message.into()).next(next);
         Self { failure, status: StatusCode::CONFLICT }
     }
 
-    /// Returns a problem with all facts of a library's error.
+    /// Returns a problem with all details of a library's error.
     pub fn of(error: &impl Diagnose) -> Self {
         Failure::of(error).into()
     }
@@ -45,7 +45,7 @@ impl Problem {
         Self { status: StatusCode::NOT_FOUND, ..problem }
     }
 
-    /// Sets the kind, and the HTTP status that belongs to it.
+    /// Sets the kind of the error, and the HTTP status of this kind.
     pub fn kind(self, kind: ErrorKind) -> Self {
         Failure { kind, ..self.failure }.into()
     }
@@ -55,7 +55,7 @@ impl Problem {
         Self { failure: Failure { message: message.into(), ..self.failure }, ..self }
     }
 
-    /// Sets the next step.
+    /// Sets the next step for the user.
     pub fn next(self, next: impl Into<Next>) -> Self {
         Self { failure: self.failure.next(next), ..self }
     }
@@ -140,7 +140,7 @@ impl<'a> From<&'a Failure> for ErrorObject<'a> {
             value: finite(value),
             limit: finite(limit),
             cause,
-            // Without backticks, which mark code in terminal texts.
+            // Backticks, which mark code in terminal texts, are removed.
             next: failure.next.plain(FrontEnd::Agent),
         }
     }

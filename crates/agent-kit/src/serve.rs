@@ -1,4 +1,4 @@
-//! Serving of an agent until it ends.
+//! HTTP server of an agent, which runs until the agent ends.
 mod in_time;
 mod places;
 
@@ -36,11 +36,12 @@ const HEAD_TIME: Duration = Duration::from_secs(10);
 const HEAD_TIME_OF_FEW: Duration = Duration::from_secs(1);
 /// Longest head of a request, in bytes.
 const HEAD_MAX: usize = 16 << 10;
-/// Longest time for the body of a request while few places are left. Otherwise only the time of the whole request is
-/// limited.
+/// Longest time for the body of a request while few connections are free. If more connections are free, only the time
+/// of the whole request is limited.
 const BODY_TIME_OF_FEW: Duration = Duration::from_secs(1);
 
-/// Serves `router` at `listener`, with TLS if it is configured, until `ended` returns `true`. Blocks.
+/// Serves `router` at `listener`, with TLS if it is configured, until `ended` returns `true`. Blocks the calling
+/// thread.
 ///
 /// # Errors
 ///
@@ -70,12 +71,12 @@ pub fn serve(
     served
 }
 
-/// Accepts connections without end.
+/// Accepts connections in an endless loop.
 async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<TlsAcceptor>) {
     let (here, elsewhere) = (Places::here(), Places::elsewhere());
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
-            // The limit of open files is reached for now.
+            // The program has reached its limit of open files for the moment.
             tokio::time::sleep(LOOK).await;
             continue;
         };
@@ -86,7 +87,7 @@ async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<
             let _ = stream.set_nodelay(true);
             match tls {
                 None => serve_connection(router, stream, place).await,
-                // If a client does not complete the TLS handshake in time, it gets no answer.
+                // If a client does not complete the TLS handshake in time, the agent does not answer it.
                 Some(tls) => {
                     let handshake = tokio::time::timeout(head_time(place.few), tls.accept(stream));
                     if let Ok(Ok(stream)) = handshake.await {
@@ -134,11 +135,11 @@ async fn serve_connection(
         .with_upgrades()
         .await;
     is_socket.store(true, Ordering::Relaxed);
-    // A client that has disconnected needs no answer. Sockets are counted separately (`Sockets`).
+    // A client that has disconnected needs no answer. WebSockets are counted separately (`Sockets`).
     drop((served, place));
 }
 
-/// Returns the answer when the remaining places are reserved for Stop and Pause.
+/// Returns the answer to a request when the remaining connections are reserved for Stop and Pause.
 fn full() -> Response {
     let next = "send the request again after 1 s; the agent still accepts Stop and Pause";
     Problem::new("full", "all connections of this agent are in use", next)

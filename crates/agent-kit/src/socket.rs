@@ -1,4 +1,4 @@
-//! Limits for sockets: number, and traffic of clients with read-only access.
+//! Limits for WebSockets: their number, and the traffic of clients with read-only access.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,10 +10,11 @@ use tokio::sync::Semaphore;
 
 use crate::access::Role;
 
-/// Largest number of sockets of viewers and of operators; viewers cannot block operators.
+/// Largest number of WebSockets for viewers and for operators. Separate limits ensure that viewers cannot block
+/// operators.
 const VIEWERS_MAX: usize = 128;
 const OPERATORS_MAX: usize = 32;
-/// Protocol that a page requests for its socket, in addition to `bearer.` and its token.
+/// Protocol that a page requests for its WebSocket, in addition to `bearer.` with the token.
 pub const PROTOCOL: &str = "openjtc";
 /// Longest message of a client with read-only access, in bytes.
 pub const MESSAGE_MAX: usize = 1024;
@@ -37,7 +38,7 @@ impl Default for Sockets {
 }
 
 impl Sockets {
-    /// Serves a socket in this role if a place is free.
+    /// Serves a WebSocket of this role if the limit is not reached.
     pub fn serve<F: Future<Output = ()> + Send + 'static>(
         &self,
         role: Role,

@@ -1,4 +1,4 @@
-//! TLS with certificate files.
+//! TLS configuration from certificate files.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,6 +1,7 @@
-//! Classes of requests that depend on method and path alone, so they are known before any other part of the request.
+//! Classes of requests. They depend only on the method and the path, so the agent knows the class before it reads the
+//! other parts.
 
-/// Paths that pages of allowed origins may request. With the method GET they change nothing.
+/// Paths that pages of allowed origins may request. A request to these paths with the method GET changes nothing.
 const LOOKS: [&str; 5] = ["/", "/api/foxglove", "/api/stream", "/api/status", "/metrics"];
 
 /// Returns `true` if a request with this method and path has read-only access.
@@ -16,8 +17,9 @@ pub fn halts(method: &str, path: &str) -> bool {
     method == "POST" && HALTS.contains(&path)
 }
 
-/// Returns `true` if a request with this method and path is served even when all other connections are in use: a Stop,
-/// a Pause, a command that ends the work of a board or a job, or the socket that `jtc traj stop` uses for its Stop.
+/// Returns `true` if a request with this method and path is served even when no other connection is free. Such requests
+/// are a Stop, a Pause, a command that ends the work of a board or a job, and the socket that `jtc traj stop` uses for
+/// its Stop.
 pub fn stops(method: &str, path: &str) -> bool {
     let number = |part: &str| part.parse::<u64>().is_ok();
     let board = path.strip_prefix("/api/boards/").and_then(|rest| rest.split_once('/'));

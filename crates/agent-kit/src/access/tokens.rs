@@ -43,7 +43,7 @@ pub enum TokenError {
         /// Problem in the contents.
         what: String,
     },
-    /// Operating system without random numbers.
+    /// Operating system that provides no random numbers.
     #[error("the operating system provides no random numbers: {0}")]
     Random(getrandom::Error),
 }
@@ -126,8 +126,8 @@ impl Tokens {
 impl Tokens {
     /// Returns the lines that announce the agent at `url` when it starts. The operator's token and the dashboard link
     /// that contains it appear only on a terminal, because other outputs (the system journal, a file) are stored and
-    /// can be read by other users. Browsers do not send the part after `#` to any server, and the page removes it from
-    /// the address at once.
+    /// can be read by other users. Browsers do not send the part after `#` to any server, and the page removes this
+    /// part from its URL at once.
     pub fn announce(&self, url: &str, file: &Path, announced: Announced) -> Vec<String> {
         let Announced { are_new, link, on_terminal } = announced;
         let (operator, file) = (&self.operator, file.display());
@@ -150,11 +150,11 @@ impl Tokens {
 /// Conditions under which the tokens are announced.
 #[derive(Clone, Copy, Debug)]
 pub struct Announced {
-    /// `true` if the tokens were made in this start.
+    /// `true` if the tokens were generated at this start.
     pub are_new: bool,
     /// `true` if the user requested the link with the token.
     pub link: bool,
-    /// `true` if the output is a terminal: a person reads it and it is not stored.
+    /// `true` if the output is a terminal, which is read by a person and not stored.
     pub on_terminal: bool,
 }
 

@@ -1,38 +1,39 @@
 //! Lease that a client holds, and the rules of its renewal and succession. All agents use these rules.
 use std::time::Duration;
 
-/// Lease: at most one client holds it at a time. `Id` identifies a client. All times are times of the agent.
+/// Lease: at most one client holds it at a time. `Id` identifies a client. All times are measured by the agent's clock.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lease<Id> {
     /// Client that holds the lease.
     pub holder: Id,
     /// Time when the holder took the lease.
     pub since: Duration,
-    /// Time when the lease lapses without renewal. `None`: the client has its own connection, and the lease does not
+    /// Time when the lease lapses without renewal. `None` if the client has its own connection; such a lease does not
     /// lapse.
     pub until: Option<Duration>,
     /// Client that waits for the lease.
     pub wanted_by: Option<Id>,
 }
 
-/// Sign of life of a client, and the duration of its lease.
+/// Last sign of life of a client, and the duration of its lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Presence {
-    /// Duration of its lease without a sign of life. `None`: the lease lasts while the client is connected.
+    /// Time until the client's lease ends without a sign of life. `None` if the lease lasts while the client is
+    /// connected.
     pub lasts: Option<Duration>,
     /// Time of the last sign of life.
     pub seen: Duration,
 }
 
 impl Presence {
-    /// Returns `true` if the client was not silent for the duration of its own lease.
+    /// Returns `true` if the client sent a sign of life within the duration of its own lease.
     pub fn is_present(&self, now: Duration) -> bool {
         self.lasts.is_none_or(|lasts| now.saturating_sub(self.seen) < lasts)
     }
 }
 
 impl<Id: Clone + PartialEq> Lease<Id> {
-    /// Begins the lease of a client. Without a sign of life it lapses after `lasts`.
+    /// Begins the lease of a client. Without a sign of life the lease lapses after `lasts`.
     pub fn begin(holder: Id, lasts: Option<Duration>, now: Duration) -> Self {
         Self { holder, since: now, until: lasts.map(|lasts| now + lasts), wanted_by: None }
     }
@@ -52,7 +53,8 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         self.wanted_by.as_ref().filter(|first| is_present(first))
     }
 
-    /// Lets a client wait for the lease. A single client waits at a time: the first one keeps its place while it is present.
+    /// Registers a client that waits for the lease. A single client waits at a time: the first waiting client stays
+    /// first while it sends signs of life.
     ///
     /// # Errors
     ///
@@ -67,8 +69,8 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         }
     }
 
-    /// Returns the lease of the client that waits, which follows this lease. `lasts` returns the duration of a client's lease, and `None`
-    /// for a client that has gone.
+    /// Returns the lease of the client that waits, which follows this lease. `lasts` returns the duration of a client's
+    /// lease, and `None` for a client that has disconnected.
     pub fn next(&self, lasts: impl Fn(&Id) -> Option<Option<Duration>>, now: Duration) -> Option<Self> {
         let next = self.wanted_by.clone()?;
         let lasts = lasts(&next)?;

@@ -1,4 +1,5 @@
-//! Lines that clients without a token can cause without limit: the first ones are written, further ones are counted.
+//! Log lines that clients without a token can cause without limit. The first lines are written; further lines are only
+//! counted.
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -6,18 +7,19 @@ use serde_json::Value;
 
 /// Number of lines per kind and sender that are written before repetitions are only counted.
 const FIRST: u32 = 10;
-/// Interval between lines with a count. After this time without a line, a sender starts again with full lines.
+/// Interval between lines with a count. After this time without a line, the next lines of a sender are again written in
+/// full.
 const PERIOD: Duration = Duration::from_secs(60);
-/// Number of senders that are counted separately; all others are counted together.
+/// Number of senders that are counted separately; all other senders are counted together.
 const SENDERS_MAX: usize = 256;
-/// Name for all other senders.
+/// Name for all senders that are counted together.
 const OTHERS: &str = "others";
 
 /// Count of lines of one kind and sender.
 struct Count {
     since: Instant,
     written: u32,
-    /// Number of lines that were not written, and the facts of the last one.
+    /// Number of lines that were not written, and the data of the last of them.
     more: u64,
     facts: Value,
 }
@@ -31,7 +33,7 @@ pub(super) struct Repeats {
 }
 
 impl Repeats {
-    /// Counts a line of this kind and sender. Returns its facts if the line must be written.
+    /// Counts a line of this kind and sender. Returns the data of the line if it must be written.
     pub(super) fn admit(
         &mut self,
         what: &'static str,
@@ -55,7 +57,7 @@ impl Repeats {
         None
     }
 
-    /// Returns the lines with counts that are due: the facts of the last repetition, with `times`.
+    /// Returns the lines with counts that are due. Each contains the data of the last repetition and `times`.
     pub(super) fn due(&mut self, now: Instant) -> Vec<(&'static str, Value)> {
         if self.next.is_none_or(|next| now < next) {
             return Vec::new();
@@ -98,7 +100,8 @@ mod tests {
 
     use super::*;
 
-    /// For any rate of repetitions there are few lines, and their counts add up to all repetitions.
+    /// For any rate of repetitions, only few lines are written, and the sum of their counts is the number of all
+    /// repetitions.
     #[test]
     fn every_repeat_is_written_or_counted_and_the_lines_are_few() {
         for (senders, rounds, step_ms) in [

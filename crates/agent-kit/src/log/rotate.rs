@@ -1,12 +1,12 @@
-//! File of the log of commands, which is renamed when it is full.
+//! File of the command log, which is renamed when it is full.
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Target of log lines.
+/// Output to which log lines are written.
 pub(super) trait Target: Write {
-    /// Makes room for a line of this number of bytes. Returns `true` if the line begins a new file.
+    /// Ensures that a line of this number of bytes fits. Returns `true` if the line begins a new file.
     ///
     /// # Errors
     ///
@@ -19,7 +19,8 @@ pub(super) trait Target: Write {
 /// Current and previous file, which together stay within a limit.
 pub(super) struct Rotated {
     file: File,
-    /// Paths of the current and the previous file; `None` if it is not an ordinary file, which is never renamed.
+    /// Paths of the current and the previous file; `None` if the output is not an ordinary file, because only ordinary
+    /// files are renamed.
     names: Option<(PathBuf, PathBuf)>,
     length: u64,
     limit: u64,
@@ -31,7 +32,7 @@ impl Rotated {
         let file = append(path)?;
         let metadata = file.metadata()?;
         let names = if metadata.is_file() {
-            // If the name is a link, the target of the link is renamed.
+            // If the path is a symbolic link, the target of the link is renamed.
             let path = path.canonicalize()?;
             let before = before(&path);
             Some((path, before))
@@ -48,14 +49,14 @@ impl Target for Rotated {
         if self.length == 0 || self.length.saturating_add(line as u64) <= self.limit / 2 {
             return Ok(false);
         }
-        // A file larger than this limit is from an earlier version or another program and is not replaced.
+        // A file larger than this limit was written by an earlier version or another program, and is not replaced.
         if std::fs::metadata(before).is_ok_and(|found| found.is_file() && found.len() > self.limit) {
             let mut kept = before.clone().into_os_string();
             kept.push(format!(".kept-{}", host_kit::unix_time().as_secs()));
             std::fs::rename(before, kept)?;
         }
         match std::fs::rename(path, before) {
-            // The file was moved or removed by another program: the next line begins a new file.
+            // Another program has moved or removed the file, so the next line begins a new file.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             renamed => renamed.map_err(|error| {
                 let (path, before) = (path.display(), before.display());

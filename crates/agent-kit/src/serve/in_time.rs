@@ -1,4 +1,4 @@
-//! Time limits for connections and bodies: a client that sends or reads too slowly loses its place.
+//! Time limits for connections and bodies: a client that sends or reads too slowly loses its connection.
 use std::io::{self, IoSlice};
 use std::pin::Pin;
 use std::sync::Arc;
@@ -11,20 +11,20 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// Longest time in which a connection may take no bytes although some wait. The total waiting time may be longer by a
-/// second for each `TAKES_PER_S` bytes that the connection takes. Quick reading does not extend the longest time
-/// without bytes.
+/// Longest time for which a client may read no bytes although some are waiting. The total waiting time may be longer by
+/// a second for each `TAKES_PER_S` bytes that the client reads. Quick reading does not extend the longest time without
+/// bytes.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 
-/// Body that must be complete within a time.
+/// Body that must be complete within a time limit.
 pub(super) struct InTime {
     body: Incoming,
     end: Option<(Pin<Box<Sleep>>, Duration)>,
 }
 
 impl InTime {
-    /// Returns the body with the limit `within` from now; `None`: the time is limited elsewhere.
+    /// Returns the body with the limit `within` from now; with `None`, the time is limited elsewhere.
     pub(super) fn new(body: Incoming, within: Option<Duration>) -> Self {
         let end = |within| (Box::pin(sleep_until(Instant::now() + within)), within);
         Self { body, end: within.map(end) }
@@ -78,12 +78,12 @@ impl<S> Taken<S> {
         Self { stream, released, since: None, waited: Duration::ZERO, bytes: 0, timer }
     }
 
-    /// Returns the total waiting time that the bytes taken so far allow.
+    /// Returns the total waiting time that the number of bytes read so far allows.
     fn patience(&self) -> Duration {
         TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S)
     }
 
-    /// Handles the result of a write: bytes were written, or the write waits for the other end to read.
+    /// Handles the result of a write: either bytes were written, or the write waits until the other end reads.
     fn see<T>(
         &mut self,
         context: &mut Context<'_>,
@@ -162,8 +162,8 @@ mod tests {
 
     use super::*;
 
-    /// Returns the number of bytes taken by a reader that reads `piece` bytes every `pause`, and `true` if the whole
-    /// answer was taken.
+    /// Returns the number of bytes that a reader of `piece` bytes every `pause` received, and `true` if it received the
+    /// whole answer.
     fn taken(bytes: usize, piece: usize, pause: Duration) -> (usize, bool) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
         runtime.expect("a runtime").block_on(async {
@@ -201,11 +201,11 @@ mod tests {
             let (got, all) = taken(bytes, piece, pause);
             assert_eq!((got == bytes, all), (whole, whole), "{bytes} bytes, {piece} each {pause:?}: {got}");
         }
-        // The reader takes no bytes at all.
+        // The reader does not read any bytes.
         assert!(!taken(100_000, 1, Duration::from_secs(3600)).1);
     }
 
-    /// A reader that was quick before, and then takes no bytes, is closed as soon as any other.
+    /// A reader that read quickly before and then stops is closed as soon as any other reader.
     #[test]
     fn bytes_that_were_taken_quickly_give_no_time_to_take_nothing() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
@@ -225,7 +225,7 @@ mod tests {
         });
     }
 
-    /// A socket may be silent without limit.
+    /// A WebSocket may be silent without a time limit.
     #[test]
     fn a_connection_that_has_become_a_socket_is_not_closed() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();

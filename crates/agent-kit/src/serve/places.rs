@@ -1,4 +1,5 @@
-//! Places for connections: a number for all requests, and further places that are reserved for Stop and Pause.
+//! Limits of the number of connections: some for all requests, and further connections that are reserved for Stop and
+//! Pause.
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -10,18 +11,19 @@ use tokio::time::Instant;
 /// Largest number of connections from this computer. This number also applies to other computers, so that they cannot
 /// block local clients.
 pub(super) const CONNECTIONS_MAX: usize = 256;
-/// If fewer places than this are free, a connection serves only one request, which must be sent at once.
+/// If fewer connections than this number are free, each new connection serves only one request, which must be sent at
+/// once.
 const FEW: usize = CONNECTIONS_MAX / 2;
 /// Further connections from this computer for Stop and Pause only; the next constant applies to other computers. When
-/// these are in use as well, the oldest connection without a Stop is closed for a new one. So idle connections never
-/// block a Stop, however many there are. All connections together stay below the 1024 files that a program may open.
+/// all of these are used as well, a new connection replaces the oldest connection without a Stop. Idle connections
+/// therefore never block a Stop. All connections together stay below the 1024 files that a program may open.
 const KEPT_HERE: usize = 192;
 const KEPT_ELSEWHERE: usize = 64;
 /// Shortest time in which a local connection can send its request before it is closed for a new one. The new connection
 /// waits for this time.
 const ASKS_WITHIN: Duration = Duration::from_millis(20);
 
-/// Places for connections of one side.
+/// Connections from this computer, or from other computers.
 pub(super) struct Places {
     common: Arc<Semaphore>,
     kept: Mutex<Kept>,
@@ -29,7 +31,7 @@ pub(super) struct Places {
     asks_within: Duration,
 }
 
-/// Connections on reserved places, oldest first.
+/// Connections that are reserved for Stop and Pause, oldest first.
 #[derive(Default)]
 struct Kept {
     open: VecDeque<Open>,
@@ -40,14 +42,14 @@ struct Open {
     number: u64,
     since: Instant,
     abort: AbortHandle,
-    /// `true` if the connection has requested a Stop: it is served to its end.
+    /// `true` if the connection has requested a Stop: such a connection is not closed early.
     stops: bool,
 }
 
-/// Place of a connection; it is freed on drop.
+/// Reservation for one connection, which is released on drop.
 pub(super) struct Place {
     places: Arc<Places>,
-    /// `true` if few places were left when the connection was accepted.
+    /// `true` if few connections were free when this connection was accepted.
     pub(super) few: bool,
     kind: Kind,
 }
@@ -58,12 +60,12 @@ enum Kind {
 }
 
 impl Places {
-    /// Returns the places for connections of this computer.
+    /// Creates the limits for connections from this computer.
     pub(super) fn here() -> Arc<Self> {
         Self::new(KEPT_HERE, ASKS_WITHIN)
     }
 
-    /// Returns the places for connections of other computers; no local connection waits for them.
+    /// Creates the limits for connections from other computers, which never delay local connections.
     pub(super) fn elsewhere() -> Arc<Self> {
         Self::new(KEPT_ELSEWHERE, Duration::ZERO)
     }
@@ -73,8 +75,8 @@ impl Places {
         Arc::new(Self { common, kept: Mutex::default(), kept_max, asks_within })
     }
 
-    /// Runs a connection on a place. The connection is dropped, which closes it, if all places serve connections that
-    /// stop something.
+    /// Runs a connection if one is free or can be freed. If all reserved connections serve a Stop, the new connection
+    /// is dropped, which closes it.
     pub(super) async fn run<F: Future<Output = ()> + Send + 'static>(
         self: &Arc<Self>,
         connection: impl FnOnce(Place) -> F,
@@ -122,7 +124,7 @@ impl Places {
 }
 
 impl Place {
-    /// Returns `true` if few places are left now.
+    /// Returns `true` if few connections are free now.
     pub(super) fn are_few(&self) -> bool {
         self.few || self.places.are_few()
     }
@@ -155,7 +157,7 @@ mod tests {
 
     use super::*;
 
-    /// A new connection gets a place after any number of open ones, unless all reserved places serve Stops.
+    /// A new connection is served even if many are open, unless all reserved connections serve Stops.
     #[test]
     fn the_newest_connection_has_a_place() {
         let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
@@ -166,7 +168,7 @@ mod tests {
             let came = came.clone();
             runtime.block_on(places.run(move |place| async move {
                 let served = place.serves(stops);
-                // The test may have failed in the meantime.
+                // Another part of the test may have failed in the meantime.
                 let _ = came.send((number, place.few, served));
                 pending::<()>().await;
                 drop(place);
@@ -175,7 +177,7 @@ mod tests {
             comes.try_recv().ok()
         };
         for number in 0..CONNECTIONS_MAX {
-            // `open` takes the place of this connection before it counts the others.
+            // `open` reserves this connection before it counts the other connections.
             assert_eq!(open(number, false), Some((number, number + 1 > CONNECTIONS_MAX - FEW, true)));
         }
         for number in 0..10 * KEPT_ELSEWHERE {

@@ -6,7 +6,8 @@ use crate::{CanError, CanFrame, ControllerState};
 
 /// A member on a CAN bus.
 ///
-/// Implementations deliver the frames of all other members in the order of the bus, and none of their own frames.
+/// Implementations deliver the frames of all other members in the order of the bus, and never deliver the member's own
+/// frames.
 pub trait CanBus {
     /// Sends a frame. Waits while the transmit queue is full. Returns an error only if the queue stays full for
     /// seconds, for example because no other member acknowledges.
@@ -22,8 +23,8 @@ pub trait CanBus {
     }
 
     /// Returns how many times this member's CAN controller has been bus-off, as far as the frames received so far show
-    /// it. The controller may be active again, but frames sent in between are lost. Does not query the adapter; returns
-    /// 0 if the adapter does not report it.
+    /// it. The controller may be active again, but frames that were sent while it was bus-off are lost. Does not query
+    /// the adapter; returns 0 if the adapter does not report it.
     fn times_bus_off(&self) -> u64 {
         0
     }

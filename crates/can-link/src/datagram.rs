@@ -10,7 +10,7 @@ use crate::{CanFrame, Id};
 /// Longest datagram that python-can accepts, bytes.
 pub(crate) const MAX_DATAGRAM: usize = 4096;
 
-/// Map that is sent. python-can refuses maps with other keys.
+/// Map that is sent in a datagram. python-can refuses maps with other keys.
 #[derive(Serialize)]
 struct Sent<'a> {
     timestamp: f64,

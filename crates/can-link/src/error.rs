@@ -94,7 +94,7 @@ pub struct InterfaceError {
     pub source: io::Error,
 }
 
-/// Reasons why an open bus failed.
+/// Reasons why an operation on an open bus failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CanError {
     /// Sending or receiving failed.

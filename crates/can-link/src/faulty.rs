@@ -18,9 +18,9 @@ pub struct FaultConfig {
     pub duplication: f64,
     /// Probability that a frame is delayed so that later frames overtake it.
     pub reordering: f64,
-    /// Delay of such a frame, s.
+    /// Delay of a frame that later frames overtake, s.
     pub reordering_hold_s: f64,
-    /// Shortest delay of every frame, s; the order is kept.
+    /// Shortest delay of every frame, s; this delay does not change the order.
     pub delay_min_s: f64,
     /// Longest delay of every frame, s.
     pub delay_max_s: f64,
@@ -30,7 +30,7 @@ pub struct FaultConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultSchedule {
-    /// Seed. Equal seeds and frames give equal faults.
+    /// Seed. Seed of the faults; equal seeds and frames produce equal faults.
     pub seed: u64,
     /// Faults of frames that the member sends.
     pub send: FaultConfig,
@@ -59,7 +59,7 @@ pub(crate) struct Line {
     random: fastrand::Rng,
     /// Sorted by the time at which they are due. Frames with equal times are in the order of their arrival.
     under_way: Vec<(Duration, CanFrame)>,
-    /// Due time of the last frame. Frames that are not reordered do not overtake each other.
+    /// Time at which the last frame is due. Frames that are not reordered do not overtake each other.
     last_due: Duration,
     stats: FaultStats,
 }
@@ -125,7 +125,7 @@ impl Line {
         self.under_way.first().map(|(due, _)| *due)
     }
 
-    /// Returns the number of frames in transit.
+    /// Returns the number of frames that are in transit.
     pub(crate) fn len(&self) -> usize {
         self.under_way.len()
     }
@@ -176,7 +176,7 @@ impl<B: CanBus> Faulty<B> {
         self.received.stats
     }
 
-    /// Returns the underlying bus; frames in transit are lost.
+    /// Returns the underlying bus; frames that are still in transit are lost.
     pub fn into_inner(self) -> B {
         self.bus
     }
@@ -198,7 +198,7 @@ impl<B: CanBus> CanBus for Faulty<B> {
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let start = (self.clock)();
-        // The wait is counted as well as measured, because a virtual clock may not advance during the wait.
+        // The wait is counted in addition to being measured, because a virtual clock may not advance during the wait.
         let mut waited = Duration::ZERO;
         loop {
             let now = (self.clock)();
@@ -309,7 +309,7 @@ mod tests {
             bench.faulty.send(&frame(number)).unwrap();
             assert_eq!((numbers(&mut bench.peer)[0] ^ number).count_ones(), 1);
         }
-        // An empty frame has no bit to corrupt.
+        // An empty frame contains no bit that can be corrupted.
         let empty = CanFrame::classic(Id::standard(1).unwrap(), &[]).unwrap();
         bench.faulty.send(&empty).unwrap();
         assert_eq!(bench.peer.receive(Duration::ZERO).unwrap(), Some(empty));

@@ -1,4 +1,4 @@
-//! A CAN frame of any kind, always valid.
+//! CAN frame of any kind, which is always valid.
 
 use std::fmt;
 

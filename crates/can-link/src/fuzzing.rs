@@ -1,4 +1,4 @@
-//! Functions of the fuzz targets. Each panics if a guarantee is violated.
+//! Functions of the fuzz targets. Each function panics if a guarantee is violated.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use crate::socketcand::splitter::{LONGEST, Splitter};
 use crate::socketcand::text::{Reply, Request, push_frame, push_send};
 use crate::{CanFrame, SlcanAdapter};
 
-/// Parses a stream of the socketcand protocol in pieces of any length. The messages must be the same as those of the
+/// Parses a stream of the socketcand protocol in pieces of any length. The pieces must produce the same messages as the
 /// whole stream, and memory use must be bounded. A parsed frame that is written again must parse to the same frame.
 pub fn socketcand_stream(data: &[u8]) {
     let (cuts, stream) = parts(data);
@@ -40,7 +40,7 @@ fn inner(text: &str) -> &str {
     text.strip_prefix('<').and_then(|text| text.strip_suffix('>')).expect("a message in its brackets")
 }
 
-/// Finds the messages in a slow and simple way: each begins at the last `<` before a `>`.
+/// Finds the messages in a slow and simple way: each message begins at the last `<` before a `>`.
 fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
     let mut found = Vec::new();
     let mut rest = stream;
@@ -58,7 +58,7 @@ fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
 }
 
 /// Parses a stream of SLCAN lines in pieces of any length. For the line reader and for the adapter, the result must be
-/// the same as in one piece. A parsed frame that is written again must parse to the same frame.
+/// the same as for the whole stream. A parsed frame that is written again must parse to the same frame.
 pub fn slcan_stream(data: &[u8]) {
     let (cuts, stream) = parts(data);
     let lines = |pieces: &mut dyn Iterator<Item = &[u8]>| {
@@ -98,7 +98,7 @@ pub fn slcan_stream(data: &[u8]) {
     assert_eq!(adapter(&mut pieces(cuts, stream)), adapter(&mut std::iter::once(stream)));
 }
 
-/// Splits off the first bytes, which define how the rest is cut into pieces.
+/// Splits off the first bytes, which define how the other bytes are cut into pieces.
 fn parts(data: &[u8]) -> (&[u8], &[u8]) {
     data.split_at(data.len().min(4))
 }

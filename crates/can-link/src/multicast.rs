@@ -12,7 +12,7 @@ use crate::{AttachError, CanBus, CanError, CanFrame, CanUrl};
 /// Bytes that the system may buffer for this member, about 4,000 frames.
 const RECEIVE_BUFFER: usize = 2 << 20;
 
-/// Longest wait for space in the system's queue when sending.
+/// Longest time for which a send waits for space in the system's queue.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A member of a multicast group.
@@ -31,7 +31,7 @@ pub struct MulticastBus {
 }
 
 impl MulticastBus {
-    /// Joins a group. With `ttl` 0 frames stay on this computer; with 1 they can reach the local network.
+    /// Joins a group. With `ttl` 0, frames stay on this computer; with `ttl` 1, frames can reach the local network.
     pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, AttachError> {
         let failed = |(step, source)| AttachError::Join { group, port, step, source };
         // A computer without a network has no default interface, but can still communicate with itself by IPv4.
@@ -94,11 +94,11 @@ fn step<T>(what: &'static str, result: io::Result<T>) -> Step<T> {
     result.map_err(|error| (what, error))
 }
 
-/// Opens the listener and the sender. IPv4 groups use the given interface, IPv6 groups the default interface.
+/// Opens the listener and the sender. IPv4 groups use the interface in the argument, IPv6 groups the default interface.
 fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<(UdpSocket, UdpSocket)> {
     let listener = step("opening a socket", udp(group))?;
     step("sharing the port", share_port(&listener))?;
-    // A larger buffer is better but not necessary.
+    // A larger buffer is useful but not required.
     let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
     // If bound to the group, the listener receives no datagrams of other groups. Windows can only bind to its own
     // addresses.
@@ -214,7 +214,7 @@ mod tests {
     use super::*;
     use crate::Id;
 
-    /// Receives a frame. Only a broken transport reaches the timeout.
+    /// Receives a frame. The timeout is reached only if the transport does not work.
     fn received(bus: &mut MulticastBus) -> Option<CanFrame> {
         bus.receive(Duration::from_secs(60)).unwrap()
     }
@@ -250,7 +250,8 @@ mod tests {
         assert_eq!(b.receive(Duration::from_millis(2)).unwrap(), None);
     }
 
-    // Each test has its own ports, which differ from run to run, so that parallel runs do not use the same ports.
+    // Each test uses its own ports. The ports differ between test runs, so that parallel runs do not use the same
+    // ports.
     fn port(number: u16) -> u16 {
         20_000 + (std::process::id() % 10_000) as u16 * 4 + number
     }

@@ -32,7 +32,7 @@ pub struct SocketCanBus {
 }
 
 impl SocketCanBus {
-    /// Opens an interface. The interface must be up.
+    /// Opens an interface. The interface must be enabled (up).
     pub fn open(interface: &str) -> Result<Self, InterfaceError> {
         let failed = |source: io::Error| InterfaceError {
             url: CanUrl::SocketCan { interface: interface.to_owned() }.to_string(),
@@ -42,7 +42,7 @@ impl SocketCanBus {
         // First opens any interface, because a kernel without CAN gives another error than a wrong name.
         drop(CanFdSocket::open_iface(0).map_err(failed)?);
         let socket = CanFdSocket::open(interface).map_err(failed)?;
-        // The kernel reports here if the interface is down.
+        // The kernel reports a disabled interface (down) here.
         if let Some(error) = socket.as_raw_socket().take_error().map_err(failed)? {
             return Err(failed(error));
         }
@@ -69,7 +69,7 @@ impl SocketCanBus {
     }
 }
 
-/// Returns the likely cause and the command that helps.
+/// Returns the likely cause and the command that solves the problem.
 fn hint(error: &io::Error, interface: &str) -> String {
     let up = format!("sudo ip link set {interface} up type can bitrate 1000000");
     match error.raw_os_error() {
@@ -153,8 +153,8 @@ fn is_no_data(error: &io::Error) -> bool {
 mod tests {
     use super::*;
 
-    /// Runs on any computer: with a kernel without CAN, and with a kernel without this interface, the error contains
-    /// the command that helps.
+    /// This test runs on any computer. If the kernel lacks CAN or this interface, the error contains the command that
+    /// solves the problem.
     #[test]
     fn what_cannot_be_opened_names_the_cause_and_what_to_do() {
         let error = SocketCanBus::open("nocan17").err().expect("no such interface").to_string();

@@ -1,8 +1,8 @@
 //! CAN over TCP as the socketcand project defines it; python-can's `socketcand` interface and SavvyCAN also support it.
 //! Contains a [client](SocketcandBus) and a [server](SocketcandServer).
 //!
-//! The protocol transmits only classic data frames: it has no format for remote frames, and no generally supported
-//! format for CAN FD.
+//! The protocol transmits only classic data frames: it has no format for remote frames, and no CAN FD format that all
+//! programs support.
 
 mod client;
 mod gateway;

@@ -57,14 +57,15 @@ pub struct TimedBus {
 }
 
 struct Member {
-    /// Waiting frames, first in, first out.
+    /// Queue of waiting frames (first in, first out).
     queue: VecDeque<CanFrame>,
-    /// Simulated faults: of frames on the way to the queue, and of frames from the bus.
+    /// Simulated faults of frames between the member and its queue, and of frames from the bus.
     lines: Option<Box<(Line, Line)>>,
     counters: Counters,
-    /// Earliest time at which the member may start a frame. An error passive member lets others start first.
+    /// Earliest time at which the member may start a frame. An error passive member waits longer, so that other members
+    /// can start first.
     may_start: u64,
-    /// Recovery from bus-off, while it lasts.
+    /// State of the recovery from bus-off; `None` if no recovery is in progress.
     recovery: Option<Recovery>,
     one_shot: bool,
     /// `true` if the frame on the bus was already removed from the queue, so that it is not sent again.
@@ -116,15 +117,15 @@ impl TimedBus {
         }
     }
 
-    /// Sets whether controllers begin to recover as soon as they are bus-off, like `restart-ms` in Linux and the automatic
-    /// recovery of many controllers. Frames queued meanwhile wait. Without this setting, [`recover`](Self::recover)
-    /// begins the recovery.
+    /// Sets whether controllers begin to recover as soon as they are bus-off, like `restart-ms` in Linux and the
+    /// automatic recovery of many controllers. Frames that are queued during the recovery wait. Without this setting,
+    /// [`recover`](Self::recover) begins the recovery.
     pub fn set_recovers_by_itself(&mut self, recovers: bool) {
         self.recovers_by_itself = recovers;
     }
 
-    /// Adds a member. The member acknowledges frames, receives all frames that end from now on, and repeats a frame if
-    /// sending fails.
+    /// Adds a member. The new member acknowledges frames, receives all frames that end from now on, and repeats a frame
+    /// if sending fails.
     pub fn join(&mut self) -> MemberId {
         self.members.push(Member {
             queue: VecDeque::new(),
@@ -140,7 +141,7 @@ impl TimedBus {
         MemberId(self.members.len() - 1)
     }
 
-    /// Removes the member permanently, with its queued frames. A frame that it is sending is cut off.
+    /// Removes the member permanently, with its queued frames. A frame that the member is sending is cut off.
     pub fn leave(&mut self, member: MemberId) {
         let member = &mut self.members[member.0];
         member.queue.clear();
@@ -190,7 +191,7 @@ impl TimedBus {
         self.members[member.0].lines = Some(Box::new((send, receive)));
     }
 
-    /// Returns the counters of these faults, for frames that the member sent and for frames that it received.
+    /// Returns the counters of the simulated faults, for frames that the member sent and for frames that it received.
     pub fn fault_stats(&self, member: MemberId) -> (FaultStats, FaultStats) {
         let lines = self.members[member.0].lines.as_deref();
         lines.map_or_else(Default::default, |(send, receive)| (send.stats(), receive.stats()))
@@ -235,8 +236,8 @@ impl TimedBus {
         self.members[member.0].counters.state()
     }
 
-    /// Starts the recovery of a member that is bus-off. The member is back after it has seen 11 recessive bits 128
-    /// times (ISO 11898-1), which takes 1408 bit times on an idle bus.
+    /// Starts the recovery of a member that is bus-off. The member has recovered after it has seen 11 recessive bits
+    /// 128 times (ISO 11898-1), which takes 1408 bit times on an idle bus.
     pub fn recover(&mut self, member: MemberId) {
         let recessive_from = self.transfer.is_none().then_some(self.now);
         let member = &mut self.members[member.0];
@@ -273,8 +274,8 @@ impl TimedBus {
     }
 
     /// Advances to the next event, or to `at_ns` if no event comes before. Must be called until it returns `None`.
-    /// After it returns an event, the current time is the time of the event, and frames that are queued then take part
-    /// in arbitration from that time on.
+    /// After the call returns an event, the current time is the time of this event. Frames that are queued at that
+    /// point take part in arbitration from this time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {
@@ -339,7 +340,8 @@ impl TimedBus {
         }
     }
 
-    /// Called when a frame has ended. The first of the 11 recessive bits was the delimiter before the end of frame.
+    /// Updates the recovery when a frame has ended. The first of the 11 recessive bits was the delimiter before the end
+    /// of frame.
     fn wire_is_recessive(&mut self) {
         let from = self.free_from.saturating_sub(self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -347,7 +349,7 @@ impl TimedBus {
         }
     }
 
-    /// Called when a frame begins. A sequence of fewer than 11 recessive bits before it is not counted.
+    /// Updates the recovery when a frame begins. A sequence of fewer than 11 recessive bits before it is not counted.
     fn wire_is_taken(&mut self) {
         let (now, sequence) = (self.now, self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -365,7 +367,8 @@ impl TimedBus {
         };
         let starters: Vec<_> = self.members.iter().enumerate().filter_map(ready).collect();
         let Some(arbitration) = Arbitration::of(&starters) else { return };
-        // Drawn for every frame, so that the fault of one frame does not change the faults of others.
+        // A random number is drawn for every frame, so that the fault of one frame does not change the faults of
+        // others.
         let (luck, place) = (self.random.f64(), self.random.f64());
         let (bits, error) = if arbitration.senders.is_empty() {
             (arbitration.bits + ERROR_FRAME, None)

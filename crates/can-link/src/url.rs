@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use crate::{SOCKETCAND_PORT, SlcanOptions};
 
-/// URL forms that can be opened on every system, for error messages.
+/// Forms of URLs that every system can open, for error messages.
 pub(crate) const OPENABLE: &str =
     "slcan:DEVICE@RATE, socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME";
 

@@ -12,7 +12,7 @@ const QUEUE: usize = 4096;
 /// Default time for which a sender waits for a member whose queue is full.
 const TIMEOUT: Duration = Duration::from_millis(100);
 
-/// A bus without a name, joined through this handle.
+/// A bus without a name, which members join through this handle.
 ///
 /// ```
 /// use std::time::Duration;
@@ -31,7 +31,7 @@ pub struct VirtualHub {
 struct Shared {
     timeout: Duration,
     state: Mutex<State>,
-    /// Notified when an entry was put into or taken out of a queue.
+    /// Condition that is notified when an entry was added to or taken from a queue.
     changed: Condvar,
 }
 
@@ -60,8 +60,8 @@ struct Member {
     waiting: VecDeque<Received>,
     /// Maximum number of waiting frames.
     limit: usize,
-    /// `true` if no sender waits for the member: it is a guest, or a sender waited in vain and the member has taken no
-    /// entry since then.
+    /// `true` if no sender waits for the member: the member is a guest, or it has taken no entry since a sender waited
+    /// without success.
     stalled: bool,
     /// `true` if no sender ever waits for the member.
     guest: bool,
@@ -90,7 +90,7 @@ impl Member {
         }
     }
 
-    /// Adds a state to the queue. There are few states, so they are never dropped.
+    /// Adds a state to the queue. States are rare, so they are never dropped.
     fn becomes(&mut self, state: ErrorState) {
         if !self.deaf {
             self.waiting.push_back(Received::State(state));
@@ -100,7 +100,7 @@ impl Member {
 
 impl Shared {
     fn state(&self) -> MutexGuard<'_, State> {
-        // No code that can panic runs while the lock is held.
+        // While the lock is held, no code runs that can panic.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -116,13 +116,13 @@ impl VirtualHub {
     }
 
     /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames
-    /// is full. If the member takes no frame for that time, it misses frames until it takes one, so that a slow member
-    /// does not stop the bus for the others.
+    /// is full. A member that takes no frame for that time misses frames until it takes one. A slow member therefore
+    /// does not stop the bus for the other members.
     pub fn with_timeout(timeout: Duration) -> Self {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
-    /// Adds a member. The member receives all frames that are sent from now on.
+    /// Adds a member. Adds a member, which receives all frames that are sent from now on.
     pub fn join(&self) -> VirtualBus {
         self.add(Member::ORDINARY)
     }
@@ -195,7 +195,7 @@ impl VirtualBus {
         VirtualHub { shared }.join()
     }
 
-    /// Returns the number of frames that this member missed because it did not take them in time.
+    /// Returns the number of frames that this member missed because it did not read these frames in time.
     pub fn missed(&self) -> u64 {
         self.shared().state().members.get(&self.number()).map_or(0, |member| member.missed)
     }
@@ -281,7 +281,7 @@ impl CanBus for VirtualBus {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
-        // A timeout that the clock cannot represent is treated as no timeout.
+        // A timeout that the clock cannot represent is treated as an unlimited wait.
         let deadline = Instant::now().checked_add(timeout);
         let shared = self.shared();
         let mut state = shared.state();

@@ -1,4 +1,4 @@
-//! The adapter's side of the protocol, for tests and simulators.
+//! Adapter side of the SLCAN protocol, for tests and simulators.
 
 use std::io::{self, Read, Write};
 
@@ -6,9 +6,10 @@ use super::line::{BELL, Lines, Piece, flags, parse_frame, push_frame};
 use super::options::{BIT_RATES, DATA_RATES};
 use crate::{CanBus, CanError, CanFrame, ControllerState};
 
-/// Largest number of bytes that wait for a host that does not read. Further frames are lost, as in a small adapter.
+/// Largest number of bytes that wait for a host that does not read. Further frames are lost, as in a real adapter with
+/// little memory.
 const OUTPUT: usize = 256 * 1024;
-/// Largest number of frames taken from the bus in one turn.
+/// Largest number of frames that one exchange takes from the bus.
 const MOST: usize = 64;
 
 /// A simulated SLCAN adapter without a port and without a thread: it accepts bytes and returns bytes.
@@ -54,7 +55,7 @@ impl SlcanAdapter {
         self.lines = Some(lines);
     }
 
-    /// Reports a frame of the bus to the host.
+    /// Sends a frame from the bus to the host.
     pub fn received(&mut self, frame: &CanFrame) {
         if !self.open {
             return;
@@ -71,12 +72,12 @@ impl SlcanAdapter {
         self.output.extend_from_slice(line.as_bytes());
     }
 
-    /// Sets the state that the adapter reports in its flags.
+    /// Sets the state that the adapter reports in its status flags.
     pub fn set_state(&mut self, state: ControllerState) {
         self.state = state;
     }
 
-    /// Returns the bytes for the host, and removes them from the adapter.
+    /// Returns the bytes for the host and removes these bytes from the adapter.
     pub fn take_output(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.output)
     }
@@ -131,7 +132,7 @@ impl SlcanAdapter {
 
     fn execute(&mut self, line: &str, send: &mut impl FnMut(&CanFrame) -> bool) {
         let Some((command, rest)) = line.split_at_checked(1) else {
-            // An empty line, which hosts send to clear earlier input.
+            // Hosts send an empty line to clear earlier input.
             return self.reply("\r");
         };
         let digit = rest.parse::<usize>().ok().filter(|_| rest.len() == 1);
@@ -184,7 +185,7 @@ impl SlcanAdapter {
     }
 }
 
-/// Reasons why a turn of an adapter failed.
+/// Reasons why an exchange of an adapter failed.
 #[derive(Debug, thiserror::Error)]
 pub enum AdapterError {
     /// Reading from or writing to the host failed.

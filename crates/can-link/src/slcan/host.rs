@@ -1,4 +1,4 @@
-//! The host's side of the protocol: an adapter on a serial port as a bus.
+//! Host side of the SLCAN protocol: makes an adapter on a serial port available as a bus.
 
 use std::collections::VecDeque;
 use std::io;
@@ -12,17 +12,17 @@ use crate::{AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, Contro
 
 /// Longest wait for the answer to the first version request; the adapter may still be starting.
 const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
-/// Number of version requests.
+/// Number of version requests before the host assumes that no adapter answers.
 const VERSION_QUESTIONS: u32 = 3;
 /// Longest wait for other answers of an adapter.
 const ANSWER: Duration = Duration::from_millis(500);
-/// Time after which all data for an earlier user have arrived.
+/// Time after which all data that was sent for an earlier user has arrived.
 const QUIET: Duration = Duration::from_millis(30);
 /// Longest time for which an adapter may refuse a frame because its queue is full, or delay its answer.
 const SEND_TIMEOUT: Duration = Duration::from_secs(2);
 /// Pause before a refused frame is sent again.
 const RETRY: Duration = Duration::from_millis(1);
-/// Length of the slices in which a wait handles both directions.
+/// Duration of the intervals in which a wait handles both directions.
 const SLICE: Duration = Duration::from_millis(20);
 /// Largest number of received frames that are stored while waiting for an answer.
 const RECEIVE_QUEUE: usize = 100_000;
@@ -40,7 +40,7 @@ struct Outstanding {
     since: Instant,
     /// Time at which the frame was last written.
     written: Instant,
-    /// `true` if the adapter has refused the frame since then.
+    /// `true` if the adapter has refused the frame since it was last written.
     refused: bool,
 }
 
@@ -61,10 +61,10 @@ pub struct SlcanBus {
     last_answer: Option<Answer>,
     outstanding: Option<Outstanding>,
     state: ControllerState,
-    /// `true` if the adapter supports the command `F`; `None` before it was asked.
+    /// `true` if the adapter supports the command `F`; `None` before the host has sent this command.
     has_flags: Option<bool>,
     got_flags: bool,
-    /// `true` if a line was received that is of no other known kind, such as the version.
+    /// `true` if an unknown line was received, for example the version.
     got_text: bool,
     closed: bool,
 }
@@ -129,7 +129,7 @@ impl SlcanBus {
 
     /// Closes a channel that an earlier user left open, and checks that an adapter answers.
     fn check_presence(&mut self) -> Result<(), CanError> {
-        // The first carriage return ends earlier input.
+        // The first carriage return ends any earlier input.
         self.write(b"\rC\r")?;
         let end = Instant::now() + ANSWER;
         while self.take_in(QUIET)? && Instant::now() < end {}
@@ -140,12 +140,12 @@ impl SlcanBus {
             let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
-                // The version is a text, so it cannot be an answer to an earlier line.
+                // The version is a text, so the adapter cannot have sent it as an answer to an earlier line.
                 if self.got_text {
                     return Ok(());
                 }
             }
-            // The adapter does not know the request, but it is present.
+            // The adapter is connected, but does not know the request.
             if somebody {
                 return Ok(());
             }
@@ -188,7 +188,7 @@ impl SlcanBus {
         }
     }
 
-    /// Reads bytes that arrive within `timeout`; returns `true` if there were any.
+    /// Reads bytes that arrive within `timeout`; returns `true` if any bytes arrived.
     fn take_in(&mut self, timeout: Duration) -> Result<bool, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
@@ -212,7 +212,7 @@ impl SlcanBus {
                         self.state = state;
                     } else if let Some(state) = parse_flags(line) {
                         self.got_flags = true;
-                        // The counters that the adapter reported are kept as long as they agree with the state.
+                        // The counters that the adapter reported stay valid as long as they agree with the state.
                         if self.state.errors != state.errors {
                             self.state = state;
                         }
@@ -344,7 +344,7 @@ impl CanBus for SlcanBus {
         }
     }
 
-    /// Asks the adapter for its state with the command `F`, if the adapter supports it.
+    /// Requests the state of the adapter with the command `F`, if the adapter supports it.
     fn state(&mut self) -> ControllerState {
         if self.has_flags == Some(false) || !self.answers || self.wait_for_confirmation().is_err() {
             return self.state;

@@ -1,4 +1,4 @@
-//! Lines of the protocol: splitting, parsing and writing.
+//! Splitting, parsing and writing of the lines of the SLCAN protocol.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ pub(crate) const BELL: u8 = 7;
 /// Number of digits of the time stamp that some adapters append.
 const TIME_STAMP: usize = 4;
 
-/// A line or a bell.
+/// Received line or bell.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Piece<'a> {
     Line(&'a str),
@@ -23,9 +23,9 @@ pub(crate) enum Piece<'a> {
 /// Splits a stream into lines, with bounded memory. The stream may be cut at any position.
 pub(crate) struct Lines {
     line: Vec<u8>,
-    /// `true` if the line in `line` was returned.
+    /// `true` if the line in `line` was already returned.
     complete: bool,
-    /// `true` if the rest of the line is skipped.
+    /// `true` while the remainder of a line is skipped.
     too_long: bool,
 }
 
@@ -34,7 +34,7 @@ impl Lines {
         Self { line: Vec::with_capacity(LONGEST), complete: false, too_long: false }
     }
 
-    /// Returns the next line, and removes its bytes from `bytes`.
+    /// Returns the next line, and removes the bytes of this line from `bytes`.
     pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<Piece<'a>> {
         if self.complete {
             self.complete = false;
@@ -51,7 +51,7 @@ impl Lines {
                 CR if self.too_long || !self.line.is_ascii() => {
                     self.line.clear();
                     self.too_long = false;
-                    // The line must not be confused with the empty line, which means "accepted".
+                    // This line must not be treated as an empty line, which means "accepted".
                     return Some(Piece::Line("?"));
                 }
                 CR => {
@@ -141,8 +141,8 @@ pub(crate) fn flags(state: ControllerState) -> u8 {
     }
 }
 
-/// Parses a state change that newer adapters report without a request, in the form that Linux accepts: `s`, a letter,
-/// then the receive and the transmit error counter with three decimal digits each.
+/// Parses a state change that newer adapters report without a request, in the form that Linux accepts. The form is `s`,
+/// a letter, then the receive and the transmit error counter with three decimal digits each.
 pub(crate) fn parse_state(line: &str) -> Option<ControllerState> {
     let rest = line.strip_prefix('s').filter(|rest| rest.len() == 7 && rest.is_ascii())?;
     let errors = match rest.chars().next()? {

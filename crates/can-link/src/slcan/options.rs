@@ -1,7 +1,7 @@
 //! Options of an adapter, and the rates that have codes in the protocol.
 
-/// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 is as LAWICEL defines it; some CANable firmware interprets it as
-/// 750,000.
+/// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 has the rate that LAWICEL defines; some CANable firmware
+/// interprets it as 750,000 bit/s.
 pub(crate) const BIT_RATES: [u32; 9] =
     [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 

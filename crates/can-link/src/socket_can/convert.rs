@@ -9,7 +9,7 @@ use socketcan::{
 
 use crate::{CanFrame, ControllerState, ErrorState, Id};
 
-/// Data from the kernel.
+/// Data received from the kernel.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Received {
     Frame(CanFrame),
@@ -55,7 +55,8 @@ fn id(raw: &impl EmbeddedFrame) -> Option<Id> {
     }
 }
 
-/// Returns the state after an error frame. The frame may contain a new state, new counters, both or neither.
+/// Returns the state after an error frame. The frame may contain a new state, new counters, both of them or none of
+/// them.
 fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
     const WARNING: ControllerProblems = ControllerProblems::RX_WARNING.union(ControllerProblems::TX_WARNING);
@@ -84,8 +85,7 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
         (errors, Some((tec, rec))) => {
             let (tec, rec) = (u16::from(tec), u16::from(rec));
             let of_counters = ErrorState::of_counters(tec, rec);
-            // Eight-bit counters cannot express bus-off. A controller in bus-off stays there until it reports another
-            // state.
+            // Eight-bit counters cannot express bus-off. A controller stays bus-off until it reports another state.
             let kept = if before.errors == ErrorState::BusOff { before.errors } else { of_counters };
             ControllerState { errors: errors.unwrap_or(kept), tec: Some(tec), rec: Some(rec) }
         }

@@ -7,11 +7,11 @@ use std::time::Duration;
 const ENOBUFS: i32 = 105;
 /// Pause between two attempts: the duration of a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Time without space in the queue after which the bus is considered dead.
+/// Time without space in the queue after which the bus is considered as failed.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Writes, and repeats the attempt while the queue is full. Returns an error with the likely causes after 10 s without
-/// space.
+/// Calls the write function, and repeats the call while the queue is full. Returns an error with the likely causes
+/// after 10 s without space.
 pub(super) fn retry_while_full(
     mut write: impl FnMut() -> io::Result<()>,
     mut pause: impl FnMut(Duration),
@@ -51,7 +51,7 @@ mod tests {
         let mut tries = 0;
         let write = || {
             tries += 1;
-            // The last result in the list is repeated.
+            // After the end of the list, the last result is repeated.
             let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
             answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
         };
@@ -65,7 +65,7 @@ mod tests {
         let (result, waited, tries) = run(full);
         assert!(result.is_ok());
         assert_eq!((waited, tries), (PAUSE * 999, 1000));
-        // An interrupt by a signal causes no wait.
+        // If a signal interrupts the call, it is repeated without a wait.
         let (result, waited, _) = run(vec![Some(4), None]);
         assert!(result.is_ok() && waited.is_zero());
     }

@@ -11,13 +11,14 @@ use crate::{
     AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState, OpenError,
 };
 
-/// Longest time for the connection, and for each answer while opening.
+/// Longest wait for the connection, and for each answer while the bus is opened.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest time for which a send waits for a server that accepts no data.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time that a send waits for space before it reads received bytes, because the server may be waiting for that.
+/// Time that a send waits for space before it reads received bytes, because the server may wait until this client
+/// reads.
 const SEND_SLICE: Duration = Duration::from_millis(20);
-/// Longest time at the end for the server to accept the last frames.
+/// Longest time that the server has to accept the last frames when the bus is closed.
 const END_TIMEOUT: Duration = Duration::from_millis(250);
 /// Largest number of bytes per read.
 const READ: usize = 16 * 1024;
@@ -31,7 +32,7 @@ pub struct SocketcandBus {
     url: String,
     stream: TcpStream,
     splitter: Splitter,
-    /// Bytes that arrived together with an answer while opening.
+    /// Bytes that arrived together with an answer while the bus was opened.
     glued: Vec<u8>,
     receive_queue: VecDeque<CanFrame>,
     /// Timeout of the socket; with `None` it does not wait.
@@ -43,7 +44,7 @@ pub struct SocketcandBus {
 }
 
 impl SocketcandBus {
-    /// Connects to a server and opens one of its buses. An IPv6 address is given without brackets.
+    /// Connects to a server and opens one of its buses. An IPv6 address is written without brackets.
     pub fn connect(host: &str, port: u16, channel: &str) -> Result<Self, OpenError> {
         let url = CanUrl::Socketcand { host: host.to_owned(), port, channel: channel.to_owned() }.to_string();
         let stream = match connect(host, port) {
@@ -75,7 +76,7 @@ impl SocketcandBus {
     }
 
     fn set_up(&mut self) -> io::Result<()> {
-        // Frames are small, and must be sent without waiting for each other.
+        // Frames are small, and the system must send each frame without waiting for further frames.
         self.stream.set_nodelay(true)?;
         self.stream.set_read_timeout(self.timeout)?;
         self.stream.set_write_timeout(Some(SEND_SLICE))
@@ -91,7 +92,7 @@ impl SocketcandBus {
         self.expect(step, &Reply::Ok)
     }
 
-    /// Waits for an answer, and stores the bytes after it.
+    /// Waits for an answer, and stores the bytes after the answer.
     fn expect(&mut self, step: &'static str, answer: &Reply) -> Result<(), CanError> {
         let end = Instant::now() + TIMEOUT;
         let mut buffer = [0; READ];
@@ -123,14 +124,14 @@ impl SocketcandBus {
         }
     }
 
-    /// Waits up to `wait` (with `None`, not at all) for bytes; returns `None` if no byte arrived. The end of the stream
+    /// Waits up to `wait` (`None`: does not wait) for bytes; returns `None` if no byte arrived. The end of the stream
     /// is an error.
     fn read(&mut self, buffer: &mut [u8; READ], wait: Option<Duration>) -> Result<Option<usize>, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
         }
         if !self.glued.is_empty() {
-            // These are at most the bytes of one read.
+            // The stored bytes are at most the bytes of one read.
             let count = self.glued.len();
             buffer[..count].copy_from_slice(&self.glued);
             self.glued.clear();
@@ -172,7 +173,7 @@ impl SocketcandBus {
         }
     }
 
-    /// Reads the available bytes; returns `true` if there were any.
+    /// Reads the available bytes; returns `true` if any bytes were available.
     fn take_in(&mut self, wait: Option<Duration>) -> Result<bool, CanError> {
         let mut buffer = [0; READ];
         let Some(count) = self.read(&mut buffer, wait)? else { return Ok(false) };
@@ -205,7 +206,7 @@ impl SocketcandBus {
                     give_up = Instant::now() + SEND_TIMEOUT;
                 }
                 Err(error) if is_no_data(&error) && Instant::now() < give_up => {
-                    // The socket may be set not to wait.
+                    // The socket may be in the mode that does not wait.
                     if self.receive_queue.len() >= RECEIVE_QUEUE || !self.take_in(Some(SEND_SLICE))? {
                         std::thread::sleep(Duration::from_micros(200));
                     }
@@ -263,7 +264,7 @@ impl CanBus for SocketcandBus {
         }
     }
 
-    /// Returns the state. The protocol reports only bus-off and the return from it.
+    /// Returns the state. The protocol reports only bus-off and the recovery from bus-off.
     fn state(&mut self) -> ControllerState {
         ControllerState::without_counters(self.errors)
     }

@@ -8,7 +8,7 @@ use super::shared::{Channel, ClientAction, ClientId, Route};
 use super::{ServerStats, SocketcandServer};
 use crate::{CanFrame, ErrorState, ListenError, VirtualHub};
 
-/// Largest number of events that wait for the host program. If there are more, the connections wait.
+/// Largest number of events that wait for the host program. If more events arrive, the connections wait.
 const WAITING: usize = 1024;
 
 /// Action of a client.
@@ -37,7 +37,7 @@ pub struct FromClient {
 /// is on the bus, and then [delivers](Self::deliver) it. Bus order, arbitration and faults are simulated by the host
 /// program.
 pub struct SocketcandGateway {
-    // Dropped first, so that threads that wait for the host program end.
+    // This field is dropped first, so that threads that wait for the host program end.
     events: Receiver<FromClient>,
     server: SocketcandServer,
 }
@@ -62,13 +62,13 @@ impl SocketcandGateway {
         Ok(Self { events, server: SocketcandServer::listen(address, channels)? })
     }
 
-    /// Returns the next event of the clients, in order, or `None` if no event occurred within `timeout`.
+    /// Returns the next event of the clients, in their order, or `None` if no event occurred within `timeout`.
     pub fn next(&mut self, timeout: Duration) -> Option<FromClient> {
         // The server holds the other end and lives as long as this gateway, so the only possible error is a timeout.
         self.events.recv_timeout(timeout).ok()
     }
 
-    /// Delivers a frame of the bus to all clients of the channel except one (its sender). Never waits.
+    /// Delivers a frame of the bus to all clients of the channel except its sender. Never waits.
     pub fn deliver(&self, channel: usize, frame: &CanFrame, except: Option<ClientId>) {
         self.server.deliver(channel, frame, except);
     }
@@ -79,9 +79,9 @@ impl SocketcandGateway {
         self.server.deliver_to(client, frame);
     }
 
-    /// Reports to a client that its own controller is bus-off ([`ErrorState::BusOff`]) or back on the bus
-    /// ([`ErrorState::Active`]), as an error frame in order with the other frames. Other states are not reported,
-    /// because the protocol's error frames have no data that could express them. Never waits.
+    /// Reports to a client that its own controller is bus-off ([`ErrorState::BusOff`]) or has recovered
+    /// ([`ErrorState::Active`]). The report is an error frame in order with the other frames. Other states are not
+    /// reported, because the protocol's error frames have no data that could express them. Never waits.
     pub fn report_state(&self, client: ClientId, state: ErrorState) {
         self.server.report_state(client, state);
     }

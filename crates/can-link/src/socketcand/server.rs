@@ -13,7 +13,7 @@ use crate::{CanFrame, CanUrl, ErrorState, ListenError, VirtualHub};
 
 /// Largest number of clients at the same time.
 const MOST_CLIENTS: usize = 64;
-/// Longest wait at the end for the clients' threads.
+/// Longest time for which a drop of the server waits for the clients' threads.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Counters of a server.
@@ -23,7 +23,7 @@ pub struct ServerStats {
     pub clients: usize,
     /// Number of accepted connections.
     pub accepted: u64,
-    /// Number of connections closed at once because there were 64 clients.
+    /// Number of connections closed at once because 64 clients were already connected.
     pub turned_away: u64,
     /// Number of frames received from clients.
     pub received: u64,
@@ -145,7 +145,7 @@ impl SocketcandServer {
 impl Drop for SocketcandServer {
     fn drop(&mut self) {
         self.inner.closing.store(true, Ordering::SeqCst);
-        // The accepting thread waits in a system call; a connection wakes it.
+        // The accepting thread waits in a system call; a new connection ends this call.
         let woken = TcpStream::connect_timeout(&reachable(self.address), END_TIMEOUT).is_ok();
         if let Some(acceptor) = self.acceptor.take().filter(|_| woken) {
             let _ = acceptor.join();

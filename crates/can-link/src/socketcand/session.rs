@@ -17,7 +17,7 @@ use crate::{CanBus, VirtualBus};
 const HELD_BACK: Duration = Duration::from_millis(20);
 /// Largest number of frames that wait for a client: some seconds of a fully loaded bus.
 const WAITING: usize = 65_536;
-/// Largest number of bytes that the system buffers for a client. More would only delay its frames.
+/// Largest number of bytes that the system buffers for a client. A larger buffer would only delay the client's frames.
 const SEND_BUFFER: usize = 128 * 1024;
 /// Largest number of frames in one write.
 const BATCH: usize = 64;
@@ -33,7 +33,7 @@ struct Out {
 
 struct Output {
     stream: TcpStream,
-    /// Frames are not sent before this time.
+    /// Earliest time at which frames are sent.
     frames_from: Instant,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn serve(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) {
 struct Session<'a> {
     inner: &'a Arc<Inner>,
     client: ClientId,
-    /// Channel, and membership of its bus.
+    /// Channel of the client, and its membership of the bus.
     opened: Option<(usize, VirtualBus)>,
     writer: Option<std::thread::JoinHandle<()>>,
 }
@@ -65,7 +65,7 @@ impl Session<'_> {
         stream.set_nodelay(true)?;
         // Detects that a client's computer was switched off.
         socket2::SockRef::from(&stream).set_keepalive(true)?;
-        // This is only a request; the system may have its own limits.
+        // The system may change this value to its own limits.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(OPEN_TIMEOUT))?;
@@ -99,7 +99,7 @@ impl Session<'_> {
         self.inner.not_understood.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// Executes a request. Returns `false` to end the connection.
+    /// Executes a request. Returns `false` if the connection must end.
     fn execute(&mut self, request: Request, out: &Arc<Out>) -> io::Result<bool> {
         match (request, &mut self.opened) {
             (Request::Echo, _) => reply(out, "< echo >")?,
@@ -178,7 +178,7 @@ fn reply(out: &Out, text: &str) -> io::Result<()> {
     out.lock().stream.write_all(text.as_bytes())
 }
 
-/// Writes frames in its own thread until the member leaves the bus or the client accepts no more.
+/// Writes frames in its own thread until the member leaves the bus or the client no longer accepts data.
 fn write_frames(
     inner: &Arc<Inner>,
     member: VirtualBus,

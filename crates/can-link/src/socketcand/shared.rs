@@ -25,11 +25,11 @@ pub(super) enum ClientAction {
     Left,
 }
 
-/// Destination of the frames from a channel's clients.
+/// Destination of the frames that the clients of a channel send.
 pub(super) enum Route {
-    /// Directly to the other members of the hub.
+    /// Hub: frames go directly to its other members.
     Hub,
-    /// To the host program, which puts them on its bus and delivers them.
+    /// Host program: it puts the frames on its bus and delivers them.
     Host(Box<dyn Fn(ClientId, ClientAction) -> bool + Send + Sync>),
 }
 
@@ -59,13 +59,13 @@ pub(super) struct Inner {
 /// A connection, for threads that close it or deliver frames to it.
 pub(super) struct Client {
     pub(super) stream: TcpStream,
-    /// Channel, and membership of its hub.
+    /// Channel of the connection, and its membership of the hub.
     pub(super) opened: Option<(usize, VirtualBus)>,
 }
 
 impl Inner {
     pub(super) fn clients(&self) -> MutexGuard<'_, BTreeMap<ClientId, Client>> {
-        // No code that can panic runs while the lock is held.
+        // While the lock is held, no code runs that can panic.
         self.clients.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -9,7 +9,7 @@ pub(crate) struct Splitter {
     /// Bytes after the last `<`.
     message: Vec<u8>,
     inside: bool,
-    /// `true` if the message in `message` was returned.
+    /// `true` if the message in `message` was already returned.
     complete: bool,
     noise: u64,
 }
@@ -19,7 +19,7 @@ impl Splitter {
         Self { message: Vec::with_capacity(LONGEST), inside: false, complete: false, noise: 0 }
     }
 
-    /// Returns the number of messages so far that were too long, not ASCII, or without an end.
+    /// Returns the number of invalid messages so far: too long, not ASCII, or without an end.
     pub(crate) fn noise(&self) -> u64 {
         self.noise
     }
@@ -30,7 +30,7 @@ impl Splitter {
         self.message.capacity()
     }
 
-    /// Returns the text between `<` and `>` of the next message, and removes its bytes from `bytes`.
+    /// Returns the text between `<` and `>` of the next message, and removes the bytes of this message from `bytes`.
     pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<&'a str> {
         if self.complete {
             self.complete = false;

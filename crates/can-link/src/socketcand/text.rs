@@ -1,4 +1,4 @@
-//! Texts of the protocol, `< WORD WORD … >`: parsing and writing.
+//! Parsing and writing of the texts of the socketcand protocol, `< WORD WORD … >`.
 
 use std::fmt::Write;
 use std::time::Duration;
@@ -96,7 +96,7 @@ fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     Some(CanFrame::fd(id, &bytes::<64>(words)?).ok()?.with_brs(flags & 1 != 0))
 }
 
-/// Parses `CLASS TIME` or only `CLASS`; any other text is for display.
+/// Parses `CLASS TIME` or only `CLASS`; any other text is only for display.
 fn error_class<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<u32> {
     let class = words.next().filter(|word| word.len() <= 8 && is_hex(word))?;
     if let Some(time) = words.next() {
@@ -161,8 +161,8 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     written.expect("a String takes everything");
 }
 
-/// Appends `< error CLASS TIME >` for a controller that has gone bus-off or is back. Other states would need the data
-/// of an error frame, which the protocol does not transmit.
+/// Appends `< error CLASS TIME >` for a controller that became bus-off or has recovered. Other states would need the
+/// data of an error frame, which the protocol does not transmit.
 pub(crate) fn push_state(text: &mut String, state: ErrorState, time: Duration) {
     let class = match state {
         ErrorState::BusOff => CLASS_BUS_OFF,

@@ -19,9 +19,9 @@ pub(super) struct Arbitration {
     pub(super) senders: Vec<MemberId>,
     /// Frame on the bus.
     pub(super) frame: CanFrame,
-    /// Number of bits from the start to the CRC; if the frame is destroyed, up to the error.
+    /// Number of bits from the start of the frame to the CRC, or to the error if the frame is destroyed.
     pub(super) bits: u32,
-    /// All members that sent the winning identifier, if the rest of their frames differs.
+    /// All members that sent the winning identifier, if their frames differ after the identifier.
     pub(super) collision: Vec<MemberId>,
     /// Members in a collision that failed to send.
     pub(super) failed: Vec<MemberId>,
@@ -33,7 +33,7 @@ impl Arbitration {
         self.senders.contains(&member) || self.failed.contains(&member)
     }
 
-    /// Arbitrates between the starters. Returns `None` without starters.
+    /// Arbitrates between the starters. Returns `None` if no member starts.
     pub(super) fn of(starters: &[Starter]) -> Option<Self> {
         let best = starters.iter().map(|starter| arbitration(&starter.frame)).min()?;
         let mut sending: Vec<(Starter, WireBits)> = starters

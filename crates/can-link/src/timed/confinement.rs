@@ -50,9 +50,9 @@ impl Counters {
 
 /// Recovery from bus-off: number of sequences of 11 recessive bits for which the member must still wait.
 ///
-/// On an idle bus these sequences follow each other. On a busy bus there is one at the end of each frame: the delimiter
-/// of its acknowledgement or of its error frame, the end of frame, and the intermission. There a member is back after
-/// 128 frames at the earliest.
+/// On an idle bus these sequences follow each other. On a busy bus, each frame ends with one such sequence: the
+/// delimiter of its acknowledgement or of its error frame, the end of frame, and the intermission. On a busy bus, a
+/// member therefore recovers after at least 128 frames.
 pub(crate) struct Recovery {
     pub left: u32,
     /// Time since which the bus has been recessive, ns; `None` while a frame is on the bus.

@@ -7,7 +7,7 @@ use crate::{CanFrame, ControllerState};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MemberId(pub(super) usize);
 
-/// An event with its time.
+/// Event and the time at which it occurred.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimedEvent {
     /// Virtual time, ns.
@@ -102,7 +102,7 @@ pub struct BusStats {
     pub collisions: u64,
     /// Number of frames that no member acknowledged.
     pub not_acknowledged: u64,
-    /// Number of disturbed frames.
+    /// Number of frames in which a bit was disturbed.
     pub disturbed: u64,
 }
 

@@ -18,7 +18,7 @@ impl TimedBus {
         let frame = arbitration.frame;
         let mut senders = arbitration.senders;
         let destroyed = senders.is_empty();
-        // A sender that has left the bus has cut its frame off.
+        // If a sender has left the bus, its frame was cut off.
         senders.retain(|member| !self.members[member.0].left);
         if senders.is_empty() && !destroyed && error.is_none() {
             error = Some(BusError::Disturbed);

@@ -1,4 +1,4 @@
-//! Classic frames as bits on the bus (ISO 11898-1): arbitration, stuffing, length.
+//! Classic frames as bits on the bus (ISO 11898-1), with their arbitration key, stuff bits and length.
 
 use crate::CanFrame;
 
@@ -6,13 +6,13 @@ use crate::CanFrame;
 pub(crate) const DOMINANT: bool = false;
 const RECESSIVE: bool = true;
 
-/// Bits after the CRC: its delimiter, acknowledge slot, acknowledge delimiter, and end of frame.
+/// Bits after the CRC: CRC delimiter, acknowledge slot, acknowledge delimiter, and end of frame.
 const TAIL: u32 = 1 + 1 + 1 + 7;
 /// Number of bits from the end of the CRC to the end of the acknowledge slot.
 pub(crate) const TO_ACKNOWLEDGE: u32 = 2;
-/// Number of bits between frames.
+/// Number of bits of the intermission between two frames.
 pub(crate) const INTERMISSION: u32 = 3;
-/// Longest error frame: an error flag, the echo of the others, and the delimiter.
+/// Longest error frame: an error flag, the error flags of the other members, and the delimiter.
 pub(crate) const ERROR_FRAME: u32 = 6 + 6 + 8;
 /// Bits that an error passive member waits after the intermission that follows its own frame.
 pub(crate) const SUSPENDED: u32 = 8;
@@ -71,7 +71,7 @@ impl WireBits {
 struct Writer {
     out: WireBits,
     crc: u16,
-    /// Number of equal bits in a row so far.
+    /// Number of consecutive equal bits so far.
     same: u32,
     last: bool,
 }
@@ -133,7 +133,7 @@ mod tests {
             (0..0x800_u32).prop_map(|id| Id::standard(id).unwrap()),
             (0..0x2000_0000_u32).prop_map(|id| Id::extended(id).unwrap()),
         ];
-        // Runs of equal bits, which need stuffing, are made more likely than in random bytes.
+        // Groups of equal bits, which need stuff bits, occur more often than in random bytes.
         let byte = prop_oneof![any::<u8>(), Just(0), Just(0xFF), Just(0x0F), Just(0xF0)];
         (id, prop::collection::vec(byte, 0..=8), any::<bool>()).prop_map(|(id, data, remote)| match remote {
             true => CanFrame::remote(id, data.len()).unwrap(),
@@ -157,7 +157,7 @@ mod tests {
                 run = if pair[0] == pair[1] { run + 1 } else { 0 };
                 prop_assert!(run < 5, "never six alike");
             }
-            // The stuff bit of the last run may be after the CRC.
+            // The stuff bit of the last group of equal bits may be after the CRC.
             let mut logical = destuff(wire.bits());
             let crc = logical.split_off(logical.len() - 15);
             // Leading zeros do not change a CRC that starts at 0.
@@ -182,10 +182,10 @@ mod tests {
             prop_assert_eq!(&data[..], frame.data());
         }
 
-        /// The bus decides bit by bit; the keys must give the same order of frames.
+        /// The bus arbitrates bit by bit; the keys must produce the same order of frames.
         #[test]
         fn keys_order_frames_as_the_wire_does(a in any_classic(), b in any_classic(), near in any::<bool>()) {
-            // Equal base identifiers are the critical case.
+            // The most critical case is that the base identifiers are equal.
             let b = if near { with_base_of(&a, &b) } else { b };
             let (wa, wb) = (WireBits::of(&a).unwrap(), WireBits::of(&b).unwrap());
             let first = wa.bits().iter().zip(wb.bits()).find(|(a, b)| a != b);
@@ -215,7 +215,7 @@ mod tests {
         }
     }
 
-    /// Removes stuff bits like a receiver: drops the bit after five equal ones.
+    /// Removes stuff bits like a receiver: drops the bit after five equal bits.
     fn destuff(bits: &[bool]) -> Vec<bool> {
         let (mut found, mut run, mut last, mut skip) = (Vec::new(), 0, None, false);
         for bit in bits {

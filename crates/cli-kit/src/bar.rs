@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar}
 
 use crate::view::LEAST;
 
-/// The last bar that was created.
+/// Progress bar that was created last.
 static LAST: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
 /// Prints while the bar is hidden; the bar is drawn again afterwards.
@@ -33,7 +33,7 @@ impl Write for Stderr {
     }
 }
 
-/// Returns the columns of the terminal on stderr; `None` if stderr is not a terminal.
+/// Returns the number of columns of the terminal on stderr; `None` if stderr is not a terminal.
 pub(crate) fn stderr_width() -> Option<u16> {
     std::io::stderr()
         .is_terminal()
@@ -42,8 +42,8 @@ pub(crate) fn stderr_width() -> Option<u16> {
         .map(|(columns, _)| columns)
 }
 
-/// Returns `Ok` if stderr is a terminal with room for bars. Otherwise the error is the size of the terminal, if stderr
-/// is one.
+/// Returns `Ok` if stderr is a terminal that is wide enough for bars. Otherwise the error is the size of the terminal,
+/// or `None` if stderr is not a terminal.
 pub fn draws_bars() -> Result<(), Option<(u16, u16)>> {
     if !std::io::stderr().is_terminal() {
         return Err(None);
@@ -64,21 +64,22 @@ fn made(total: u64, template: &str) -> ProgressBar {
     bar
 }
 
-/// Creates a bar that counts steps.
+/// Creates a bar that shows a number of steps.
 pub(crate) fn of_steps(total: u64, what: &str) -> ProgressBar {
     let bar = made(total, "{msg:8} {wide_bar:.cyan/dim} {pos:>5}/{len} {elapsed:>5}");
     bar.set_message(what.to_owned());
     bar
 }
 
-/// Creates a bar that counts bytes, with the text of its owner below it, so that it fits on narrow terminals.
+/// Creates a bar that shows a number of bytes. The text of its owner is below it, so that the bar fits on narrow
+/// terminals.
 pub(crate) fn of_bytes(total: u64, what: &str) -> ProgressBar {
     let bar = made(total, "{prefix:9} {wide_bar:.cyan/dim} {bytes:>9} of {total_bytes}\n  {msg}");
     bar.set_prefix(what.to_owned());
     bar
 }
 
-/// Creates a bar that counts milliseconds of a motion.
+/// Creates a bar that shows the milliseconds of a motion.
 pub(crate) fn of_motion(total_ms: u64, what: &str, keys: &str) -> ProgressBar {
     let below = if keys.is_empty() { "" } else { "\n{prefix}" };
     let of = total_ms as f64 * 1e-3;

@@ -1,13 +1,13 @@
-//! Single keys from the terminal. The terminal is restored after any end of the command.
+//! Input of single keys from the terminal. The terminal is restored when the command ends for any reason.
 //!
-//! Ctrl-C still sends a signal. Ctrl-Z is disabled meanwhile, because a suspended command would leave a machine
-//! running without supervision. Ctrl-S is disabled because it would block the command at its next output, and the
-//! command could not read the stop key.
+//! Ctrl-C still sends a signal. Ctrl-Z is disabled while keys are read, because a suspended command would leave a
+//! machine running without supervision. Ctrl-S is disabled because it would block the command at its next output, and
+//! the command could not read the stop key.
 
 /// A key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
-    /// A letter or sign.
+    /// Letter or other character.
     Char(char),
     /// Arrow up.
     Up,
@@ -21,21 +21,21 @@ pub enum Key {
     PageUp,
     /// A page on.
     PageDown,
-    /// To the first row.
+    /// Key that scrolls to the first row.
     Home,
-    /// To the last row.
+    /// Key that scrolls to the last row.
     End,
     /// Esc.
     Escape,
 }
 
-/// Returns the keys in the bytes of a terminal, and the remaining bytes, which may be the start of a key.
+/// Converts bytes of a terminal to keys, and returns the remaining bytes, which may be the start of a key.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
     let (mut keys, mut rest) = (Vec::new(), bytes);
     while let [first, more @ ..] = rest {
         if *first != 0x1B {
-            // Characters beyond ASCII are not keys here; each of their bytes would give a wrong key.
+            // Characters beyond ASCII are not keys here; each of their bytes would produce a wrong key.
             if first.is_ascii() {
                 keys.push(Key::Char(char::from(*first)));
             }
@@ -97,7 +97,7 @@ mod terminal {
         }
     }
 
-    /// Keys from stdin, if stdin is a terminal with this process in the foreground.
+    /// Key input from stdin, if stdin is a terminal and this process is in the foreground.
     pub struct Keys {
         /// Bytes of a key that has not arrived completely.
         begun: Vec<u8>,
@@ -105,12 +105,12 @@ mod terminal {
     }
 
     impl Keys {
-        /// Starts to read single keys without echo; `None` without a terminal.
+        /// Starts to read single keys without echo; returns `None` without a terminal.
         pub fn listen() -> Option<Self> {
             if !std::io::stdin().is_terminal() {
                 return None;
             }
-            // In the background, changing the terminal would put this process to sleep.
+            // In the background, changing the terminal would suspend this process.
             if tcgetpgrp(stdin()).is_ok_and(|foreground| foreground != getpgrp()) {
                 return None;
             }
@@ -138,7 +138,7 @@ mod terminal {
                 return Vec::new();
             }
             if !matches!(waited, Ok(1..)) {
-                // The rest of a longer key would have arrived with its start.
+                // If the key had more bytes, they would have arrived together with the first byte.
                 return if std::mem::take(&mut self.begun).is_empty() {
                     Vec::new()
                 } else {
@@ -153,7 +153,7 @@ mod terminal {
             keys
         }
 
-        /// Returns `true` if the terminal has hung up: no further key will arrive.
+        /// Returns `true` if the terminal was closed (hang-up), so that no further key will arrive.
         pub fn gone(&self) -> bool {
             self.gone
         }
@@ -181,7 +181,7 @@ mod console {
     /// Does nothing, because a console needs no other mode for single keys.
     pub fn restore() {}
 
-    /// Keys from the console.
+    /// Key input from the console.
     pub struct Keys(());
 
     impl Keys {
@@ -214,7 +214,7 @@ mod console {
             keys
         }
 
-        /// Returns `false`: a console does not hang up before its processes end.
+        /// Returns `false`, because a console does not close before its processes end.
         pub fn gone(&self) -> bool {
             false
         }

@@ -1,4 +1,5 @@
-//! Lines printed by a thread: a blocked reader (`ucom run --json | less`) must not block the control loop.
+//! Lines that a separate thread prints, so that a blocked reader (`ucom run --json | less`) does not block the control
+//! loop.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -10,7 +11,7 @@ use crate::stdout;
 
 /// Largest number of waiting lines.
 const WAITING: usize = 1000;
-/// Longest wait for a blocked reader at the end.
+/// Longest wait for a blocked reader when the command ends.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A queue of lines and the thread that prints them.
@@ -29,11 +30,11 @@ struct Shared {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<String>,
-    /// A line has been taken from the queue and is not written yet.
+    /// `true` while a line was taken from the queue but is not written yet.
     writing: bool,
     written: u64,
     dropped: u64,
-    /// The reader has disconnected.
+    /// `true` if the reader has disconnected.
     gone: bool,
     closed: bool,
 }
@@ -64,12 +65,12 @@ impl Lines {
         Ok(Self { shared, is_stdout, finished: false })
     }
 
-    /// Prints a line when its turn comes; drops the line if too many wait.
+    /// Adds a line to the queue, which is printed in order; drops the line if too many lines wait.
     pub fn push(&self, line: String) {
         self.add(line, WAITING);
     }
 
-    /// Like [`Self::push`], for a rare line that must not be dropped.
+    /// Like [`Self::push`], for a rare line that is never dropped.
     pub fn push_always(&self, line: String) {
         self.add(line, usize::MAX);
     }
@@ -88,7 +89,7 @@ impl Lines {
         self.shared.changed.notify_all();
     }
 
-    /// Returns `true` if the reader has disconnected (`ucom so | head`), or the output accepts no more.
+    /// Returns `true` if the reader has disconnected (`ucom so | head`), or the output no longer accepts data.
     pub fn gone(&self) -> bool {
         self.shared.lock().gone
     }
@@ -159,7 +160,7 @@ mod tests {
 
     use super::*;
 
-    /// Takes a line only on command; fails after the other side has disconnected.
+    /// Accepts a line only when the test permits it; fails after the other side has disconnected.
     struct Slow(SyncSender<Vec<u8>>);
 
     impl Write for Slow {
@@ -177,7 +178,7 @@ mod tests {
         (Lines::to(Slow(sender), false).unwrap(), receiver)
     }
 
-    /// With a blocked reader, pushing continues, excess lines are counted, and the end does not wait for ever.
+    /// With a blocked reader, lines can still be pushed and excess lines are counted. The wait at the end is limited.
     #[test]
     fn a_reader_that_does_not_read_stops_nothing() {
         let (mut lines, _reader) = slow();
@@ -188,7 +189,7 @@ mod tests {
         assert_eq!(unseen, 3 * WAITING as u64 + 1);
     }
 
-    /// A slow reader gets every line that was taken, in order.
+    /// A slow reader receives every accepted line, in order.
     #[test]
     fn lines_come_whole_and_in_order() {
         let (mut lines, reader) = slow();

@@ -1,8 +1,8 @@
 //! Output: results to stdout as text or JSON, progress and logs to stderr.
 //!
-//! With JSON, a long command prints events to stderr while it works, one object per line with the key `event`; stdout
-//! has only its result. A blocked reader does not block a command: events wait in a queue, and excess events are
-//! dropped.
+//! With JSON, a long command prints events to stderr while it works, one object per line with the key `event`. Stdout
+//! contains only the result of the command. A blocked reader does not block a command: events wait in a queue, and
+//! excess events are dropped.
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -17,10 +17,10 @@ use crate::lines::Lines;
 use crate::stdout;
 use crate::{Failure, error_object};
 
-/// Events of this process that wait for their reader; empty if the process streams no events.
+/// Events of this process that wait until they are read; empty if the process does not stream events.
 static STREAM: OnceLock<Mutex<Stream>> = OnceLock::new();
 
-/// Lines of a stream, and its start time.
+/// Lines of an event stream, and the start time of the stream.
 struct Stream {
     lines: Lines,
     began: Instant,
@@ -44,7 +44,8 @@ impl Output {
         self.json
     }
 
-    /// Starts to print events as they occur, and notes as events. Does nothing unless JSON was requested.
+    /// Starts the event stream: events are printed as they occur, and notes are printed as events. Does nothing unless
+    /// JSON was requested.
     pub fn stream(&self) -> std::io::Result<()> {
         if self.json && STREAM.get().is_none() {
             let _ = STREAM.set(Mutex::new(Stream { lines: Lines::stderr()?, began: Instant::now() }));
@@ -97,24 +98,25 @@ impl Output {
         });
     }
 
-    /// Stores the reason why output for stdout was lost. A reader that has disconnected (`… | head`) has read enough,
-    /// so this is not stored as a loss.
+    /// Stores the reason why output to stdout was lost. A reader that has disconnected (`… | head`) has read enough, so
+    /// this is not stored as a loss.
     pub fn lose(why: &std::io::Error) {
         stdout::lose(why);
     }
 
-    /// Returns `true` if nothing reads further output; a command that only prints may then end.
+    /// Returns `true` if no reader accepts further output; a command that only prints may then end.
     pub fn gone() -> bool {
         stdout::is_gone()
     }
 
-    /// Returns the reason why a result could not be printed, if that happened: the command did its work, but the user
-    /// cannot read the result.
+    /// Returns the reason why a result could not be printed, or `None` if it was printed. In the first case the command
+    /// was successful, but the user cannot read the result.
     pub fn lost() -> Option<&'static str> {
         stdout::lost()
     }
 
-    /// Prints one line of a log. A lost terminal must not abandon a machine: unprintable text is dropped.
+    /// Prints one line of a log. Text that cannot be printed is dropped, because a lost terminal must not leave a
+    /// machine without control.
     pub fn note(&self, text: impl std::fmt::Display) {
         if STREAM.get().is_some() {
             self.event("note", json!({ "text": text.to_string().trim() }));
@@ -134,7 +136,7 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{event}")));
     }
 
-    /// Creates a bar on stderr; invisible if stderr is not a terminal.
+    /// Creates a bar on stderr, which is invisible if stderr is not a terminal.
     pub fn bar(&self, total: u64, what: &str) -> ProgressBar {
         bar::of_steps(total, what)
     }
@@ -144,13 +146,13 @@ impl Output {
         bar::of_bytes(total, what)
     }
 
-    /// Creates a bar on stderr for a motion of `total_ms` milliseconds. The text of its owner is below it, and the
-    /// keys below that.
+    /// Creates a bar on stderr for a motion of `total_ms` milliseconds. The text of its owner is below the bar, and the
+    /// keys are below this text.
     pub fn motion_bar(&self, total_ms: u64, what: &str, keys: &str) -> ProgressBar {
         bar::of_motion(total_ms, what, keys)
     }
 
-    /// Prints the reason of a failed command.
+    /// Prints the reason why a command failed.
     pub fn failure(&self, failure: &Failure) {
         if self.json {
             let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error_object(failure) }));
@@ -184,7 +186,8 @@ fn within(text: &str, width: Option<u16>) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Formats text after a head, with its further lines aligned to its first one; unchanged if the width is unknown.
+/// Formats text after a heading. Further lines are aligned with the start of the first line; the text is unchanged if
+/// the width is unknown.
 fn hanging(head: &str, text: &str, width: Option<u16>) -> String {
     let Some(room) = width.and_then(|w| w.checked_sub(head.len() as u16 + 1)).filter(|room| *room >= 16)
     else {
@@ -203,14 +206,14 @@ pub fn figure(value: f64, digits: usize) -> String {
     }
 }
 
-/// Returns the columns of the terminal on stdout; `None` if stdout is not a terminal.
+/// Returns the number of columns of the terminal on stdout; `None` if stdout is not a terminal.
 fn stdout_width() -> Option<u16> {
     std::io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten().map(|size| size.0)
 }
 
-/// Formats rows as a text table. Words are aligned to the left; columns whose head begins with `>` (figures) to the
-/// right. On a terminal that is too narrow for all columns, the remaining columns follow below, with the first column
-/// repeated.
+/// Formats rows as a text table. Words are aligned to the left; columns whose heading begins with `>` (numbers) are
+/// aligned to the right. On a terminal that is too narrow for all columns, the remaining columns follow below, with the
+/// first column repeated.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     table_within(head, rows, stdout_width())
 }
@@ -219,7 +222,7 @@ fn table_within(head: &[&str], rows: &[Vec<String>], width: Option<u16>) -> Stri
     let text = whole_table(head, rows);
     let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
     let Some(width) = width.filter(|width| usize::from(*width) < widest) else { return text };
-    // Takes as many columns as fit next to the first one, but at least one.
+    // Selects as many columns as fit next to the first column, but at least one.
     for count in (2..head.len()).rev() {
         let rest: Vec<usize> = (count..head.len()).collect();
         let pick = |columns: &[usize]| {
@@ -276,7 +279,7 @@ mod tests {
         assert_eq!(within("one two three four five", None), "one two three four five");
     }
 
-    /// On a narrow terminal no column is cut.
+    /// Columns are never truncated on a narrow terminal.
     #[test]
     fn columns_without_room_come_below() {
         let rows = [vec!["joint 1".into(), "0.201".into(), "0.773".into(), "12".into()]];

@@ -1,4 +1,4 @@
-//! Output files of a command: opened before any frame is sent, never overwritten without a request.
+//! Output files of a command. Each is opened before any frame is sent, and is overwritten only on request.
 
 use std::fmt;
 use std::fs::{File, OpenOptions};
@@ -69,7 +69,7 @@ impl Diagnose for OutputError {
     }
 }
 
-/// Outputs that this process has created and not written yet.
+/// Outputs that this process has created but not written yet.
 static UNWRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Removes outputs that were created and never written, before the process ends without any `Drop`.
@@ -84,7 +84,7 @@ fn settled(path: &Path) {
     UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).retain(|p| p != path);
 }
 
-/// Open output that is still empty or unchanged. If it is dropped before it is written, it leaves no trace.
+/// Open output that is still empty or unchanged. If the output is dropped before it is written, a new file is removed.
 pub struct OutputFile {
     path: PathBuf,
     file: File,
@@ -95,8 +95,8 @@ pub struct OutputFile {
 
 impl OutputFile {
     /// Opens `path` for writing. An existing file is refused without `overwrite`. A file of `others` (inputs of the
-    /// command, and its other outputs) is always refused. Commands that send must report themselves that nothing was
-    /// sent.
+    /// command, and its other outputs) is always refused. Commands that send frames must themselves report that they
+    /// sent no frames.
     pub fn open(path: &Path, overwrite: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             return Err(OutputError::SameFile { path: path.to_owned(), other: other.to_path_buf() });
@@ -118,7 +118,7 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), file, made: false, written: false })
     }
 
-    /// Returns the name for users.
+    /// Returns the name of the output for users.
     pub fn name(&self) -> String {
         self.path.display().to_string()
     }
@@ -157,7 +157,8 @@ impl OutputFile {
         settled(&self.path);
     }
 
-    /// Marks the content as useless: if dropped in this state, the output leaves no trace, unless it existed before.
+    /// Marks the content as useless. If the output is dropped in this state, its file is removed, unless the file
+    /// existed before.
     pub fn is_worthless(&mut self) {
         self.written = false;
     }
@@ -177,17 +178,17 @@ impl Drop for OutputFile {
     }
 }
 
-/// Waits until the bytes are on the disk, because a full disk may be reported only then.
+/// Waits until the bytes are on the disk, because some systems report a full disk only at that time.
 pub fn settle(file: &File) -> io::Result<()> {
     if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
 }
 
-/// Returns `true` if both names lead to the same existing file.
+/// Returns `true` if both paths refer to the same existing file.
 fn same(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b) || one_inode(a, b)
 }
 
-/// Returns `true` for two names (hard links) of one file.
+/// Returns `true` if two names are hard links of one file.
 #[cfg(unix)]
 fn one_inode(a: &Path, b: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -195,7 +196,7 @@ fn one_inode(a: &Path, b: &Path) -> bool {
     number(a).is_some_and(|n| number(b) == Some(n))
 }
 
-/// The standard library has file numbers on Unix only.
+/// The standard library provides file numbers only on Unix.
 #[cfg(not(unix))]
 fn one_inode(_: &Path, _: &Path) -> bool {
     false

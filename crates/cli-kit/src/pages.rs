@@ -1,4 +1,4 @@
-//! Shell completions and manual pages, made from the command line's definition.
+//! Shell completions and manual pages, generated from the definition of the command line.
 
 use std::io::Result;
 use std::path::Path;
@@ -16,7 +16,7 @@ pub fn completions<Cli: CommandFactory>(shell: clap_complete::Shell) {
     Output::bytes(&text);
 }
 
-/// Writes a page for each command into a directory, or prints the main one.
+/// Writes a manual page for each command into a directory, or prints the main page.
 pub fn man<Cli: CommandFactory>(dir: Option<&Path>) -> Result<()> {
     let Some(dir) = dir else {
         let mut page = Vec::new();

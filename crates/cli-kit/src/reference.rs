@@ -1,4 +1,4 @@
-//! The reference page of a command line in Markdown, made from its definition.
+//! The reference page of a command line in Markdown, generated from the definition of the command line.
 
 use std::fmt::Write as _;
 
@@ -22,7 +22,7 @@ fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|sub| !sub.is_hide_set() && sub.get_name() != "help" || has_options(sub))
 }
 
-/// Returns `true` for the program's own `help`, which has arguments. The `help` that clap adds has none.
+/// Returns `true` for the program's own `help`, which has arguments. The `help` that clap adds has no arguments.
 fn has_options(command: &Command) -> bool {
     command.get_name() == "help"
         && command.get_subcommands().next().is_none()
@@ -45,12 +45,12 @@ fn one(command: &Command, top: bool, page: &mut String) {
     if let Some(about) = command.get_long_about().filter(|_| command.get_about().is_none()) {
         let _ = write!(page, "{}\n\n", text(&about.to_string()));
     }
-    // Uses the usage as clap prints it on the screen, without its margins.
+    // Uses the usage text that clap prints on the screen, without its margins.
     let usage = command.clone().render_usage().to_string();
     let usage = usage.trim_start_matches("Usage:").trim();
     let lines: Vec<&str> = usage.lines().map(str::trim).collect();
     let _ = write!(page, "```text\n{}\n```\n\n", lines.join("\n"));
-    // Options of every command are shown once, at the top.
+    // Options of every command are listed once, at the top of the page.
     let shown = |arg: &&Arg| {
         !arg.is_hide_set()
             && !["help", "version"].contains(&arg.get_id().as_str())
@@ -74,7 +74,7 @@ fn one(command: &Command, top: bool, page: &mut String) {
     }
 }
 
-/// Returns an argument as typed.
+/// Returns an argument in the form that the user types.
 fn names(arg: &Arg) -> String {
     let takes = arg.get_action().takes_values();
     let values: Vec<String> = match arg.get_value_names() {
@@ -115,7 +115,7 @@ fn meaning(arg: &Arg) -> String {
     words
 }
 
-/// Converts text of the help to a line of Markdown: characters are escaped, except in code.
+/// Converts a help text to a line of Markdown. Special characters are escaped, except in code.
 fn text(help: &str) -> String {
     let mut out = String::new();
     for (n, part) in help.replace("\n\n", " ").replace('\n', " ").split('`').enumerate() {

@@ -1,4 +1,4 @@
-//! The whole terminal as a live view, restored after any end of the command.
+//! Live view on the whole terminal, which is restored when the command ends for any reason.
 
 use std::io::{IsTerminal, Stdout, Write};
 use std::mem::ManuallyDrop;
@@ -25,17 +25,17 @@ pub fn restore_terminal() {
     crate::keys::restore();
 }
 
-/// Terminal of a view, with the keys of its user.
+/// Terminal of a view, with the key input.
 pub struct Screen {
-    /// Never dropped: it would print, and panic if the terminal is lost.
+    /// This value is never dropped, because its drop would print, and would panic if the terminal is lost.
     terminal: ManuallyDrop<Terminal<CrosstermBackend<Stdout>>>,
     keys: Keys,
     gone: bool,
 }
 
 impl Screen {
-    /// Takes the terminal; `None` if stdin or stdout is not a terminal, or this process is in the background: the
-    /// caller then prints lines.
+    /// Opens a view on the terminal. Returns `None` if stdin or stdout is not a terminal, or if this process is in the
+    /// background; the caller then prints lines.
     pub fn take() -> std::io::Result<Option<Self>> {
         if !std::io::stdout().is_terminal() {
             return Ok(None);
@@ -60,7 +60,7 @@ impl Screen {
         self.keys.pressed()
     }
 
-    /// Draws a view. After a failure no further view is drawn.
+    /// Draws a view. After a failure, the view is not drawn again.
     pub fn draw(&mut self, picture: impl FnOnce(&mut Frame<'_>)) {
         self.gone |= self.terminal.draw(picture).is_err();
     }

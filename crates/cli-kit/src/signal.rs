@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Returns the signals that end a command: Ctrl-C, `kill`, and SIGHUP when its terminal closes. SIGHUP is left out if
+/// Returns the signals that end a command: Ctrl-C, `kill`, and SIGHUP when its terminal closes. SIGHUP is omitted if
 /// the command was started with `nohup`.
 fn signals() -> impl Iterator<Item = i32> {
     use signal_hook::consts::{SIGINT, SIGTERM};
@@ -23,17 +23,17 @@ fn hangup_ignored() -> bool {
     mask.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok()).is_some_and(|mask| mask & 1 != 0)
 }
 
-/// Period at which the thread of [`Stop::listen_with`] checks for signals.
+/// Interval at which the thread of [`Stop::listen_with`] checks for signals.
 const LOOK: Duration = Duration::from_millis(10);
 /// Signals within this time are treated as one.
 const ONE_PRESS: Duration = Duration::from_millis(100);
 
-/// Set by SIGINT, SIGTERM or SIGHUP.
+/// Flag that SIGINT, SIGTERM or SIGHUP sets.
 #[derive(Clone, Debug)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Starts to listen: SIGINT, SIGTERM and SIGHUP only set the flag; the second one ends the process.
+    /// Starts to handle signals. The first SIGINT, SIGTERM or SIGHUP sets the flag; the second ends the process.
     pub fn listen() -> std::io::Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         for signal in signals() {
@@ -45,12 +45,12 @@ impl Stop {
         Ok(Self(flag))
     }
 
-    /// Starts to listen: the first SIGINT, SIGTERM or SIGHUP sets the flag. The second one ends the process in every
-    /// state, with the exit code that `last_words` returns and with the terminal restored; `last_words` runs in a
-    /// separate thread and may print.
+    /// Starts to handle signals. The first SIGINT, SIGTERM or SIGHUP sets the flag. The second signal ends the process
+    /// in every state, with the terminal restored. The exit code comes from `last_words`, which runs in a separate
+    /// thread and may print.
     ///
-    /// Signals that follow each other within 0.1 s are treated as one, because a terminal and a wrapper may both send
-    /// theirs.
+    /// Signals that follow each other within 0.1 s are treated as one, because a terminal and a wrapper program may
+    /// both send a signal.
     pub fn listen_with(last_words: impl Fn() -> u8 + Send + 'static) -> std::io::Result<Self> {
         let came = Arc::new(AtomicBool::new(false));
         for signal in signals() {

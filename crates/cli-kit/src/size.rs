@@ -1,4 +1,4 @@
-//! Parser for sizes of files and folders in options.
+//! Parser for options that specify the size of a file or folder.
 
 /// Parses a number of bytes such as `500MB`, `2 GB`, `1GiB` or a plain number. The number must be at least `least`.
 ///

@@ -1,4 +1,4 @@
-//! State of stdout: blocked by a reader, closed, or the reason why a result was lost.
+//! State of stdout: blocked, closed, or the reason why a result was lost.
 
 use std::io::{Error, ErrorKind};
 use std::sync::OnceLock;
@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static LOST: OnceLock<String> = OnceLock::new();
 /// `true` after a failed write to stdout, for any reason.
 static GONE: AtomicBool = AtomicBool::new(false);
-/// `true` while stdout is blocked by a line without a reader.
+/// `true` while stdout is blocked by a line that is not read.
 static STUCK: AtomicBool = AtomicBool::new(false);
 
 /// Records a failed write. A reader that has disconnected has read enough, so this is not recorded as a loss.
@@ -25,17 +25,17 @@ pub(crate) fn is_gone() -> bool {
     GONE.load(Ordering::Relaxed)
 }
 
-/// Returns the reason why a result was lost, if it was.
+/// Returns the reason why a result was lost, or `None` if no result was lost.
 pub(crate) fn lost() -> Option<&'static str> {
     LOST.get().map(String::as_str)
 }
 
-/// Marks stdout as blocked. From now on, code that prints would wait for a reader that does not read.
+/// Marks stdout as blocked. After this call, code that prints would wait for a reader that does not read.
 pub(crate) fn set_stuck() {
     STUCK.store(true, Ordering::Relaxed);
 }
 
-/// Returns `true` if printing to stdout would now wait for ever.
+/// Returns `true` if printing to stdout would now wait without end.
 pub fn stdout_is_stuck() -> bool {
     STUCK.load(Ordering::Relaxed)
 }

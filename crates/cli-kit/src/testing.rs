@@ -1,4 +1,4 @@
-//! For tests: runs a command as a user does, with or without a terminal.
+//! Test support that runs a command as a user does, with or without a terminal.
 
 #[cfg(unix)]
 mod screen;
@@ -15,8 +15,8 @@ pub use screen::Picture;
 #[cfg(unix)]
 pub use terminal::Terminal;
 
-/// Checks that each paragraph of prose below the help of a command is one line, because clap wraps it to the
-/// terminal. Lines that begin with a space are examples or tables.
+/// Checks that each paragraph of prose below the help of a command is one line, because clap wraps each line to the
+/// width of the terminal. Lines that begin with a space are examples or tables.
 ///
 /// # Panics
 ///
@@ -35,7 +35,7 @@ pub fn check_help_is_wrapped_once(command: &clap::Command) {
 
 /// Output of a command and its exit code.
 pub struct CommandOutput {
-    /// Its exit code; −1 when a signal ended it.
+    /// Exit code of the command; −1 if a signal ended the command.
     pub code: i32,
     /// Its stdout.
     pub out: String,
@@ -44,13 +44,13 @@ pub struct CommandOutput {
 }
 
 impl CommandOutput {
-    /// Returns its result: the last line of its stdout as one JSON object; panics if the line is not JSON.
+    /// Returns the result of the command: the last line of stdout as one JSON object. Panics if the line is not JSON.
     pub fn json(&self) -> Value {
         let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
         serde_json::from_str(self.out.trim().lines().last().unwrap_or_default()).unwrap_or_else(error)
     }
 
-    /// Returns the lines of its stderr as JSON objects; panics if a line is not JSON.
+    /// Returns the lines of stderr as JSON objects; panics if a line is not JSON.
     pub fn events(&self) -> Vec<Value> {
         let parse = |line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line:?}"));
         self.err.lines().map(parse).collect()
@@ -72,7 +72,7 @@ pub fn program(path: &str, prefix: &str) -> Command {
     command
 }
 
-/// Runs a command with these words and this stdin to its end.
+/// Runs a command with these arguments and this stdin until it ends.
 pub fn run(mut command: Command, words: &[&str], stdin: &str) -> CommandOutput {
     let pipes = command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = pipes.spawn().expect("it starts");
@@ -81,7 +81,7 @@ pub fn run(mut command: Command, words: &[&str], stdin: &str) -> CommandOutput {
     ended(child)
 }
 
-/// Returns the output of a started command, after it has ended.
+/// Waits for the end of a started command and returns its output.
 pub fn ended(child: Child) -> CommandOutput {
     let output = child.wait_with_output().expect("it ends");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

@@ -1,4 +1,4 @@
-//! Command-line parsing, with a JSON answer for wrong usage if a program requested JSON.
+//! Command-line parsing, with a JSON error for wrong usage if JSON was requested.
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
@@ -11,7 +11,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use crate::variables::{Variables, on_off};
 use crate::{Failure, Output, error_object, exit, print_within};
 
-/// Longest wait of a command for the reader of text that is printed before it begins.
+/// Longest wait until text that is printed before the command begins is read.
 const PRINT_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Parses the command line of this process; otherwise prints help, version or wrong usage, and returns the exit code.
@@ -81,14 +81,14 @@ fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
     }
 }
 
-/// Returns `true` if the words contain the option, or the variable has a value that means yes.
+/// Returns `true` if the words contain the option, or if the variable has a value that means "on".
 fn json_is_asked<'a>(words: impl Iterator<Item = &'a OsString>, variable: Option<&OsStr>) -> bool {
     let by_variable = variable.is_some_and(|v| on_off(&v.to_string_lossy()) == Ok(true));
     let mut options = words.take_while(|word| *word != "--");
     by_variable || options.any(|word| word == "--json")
 }
 
-/// Returns the error and the hint, from the parser's words.
+/// Extracts the error and the hint from the parser's message.
 fn words(e: &clap::Error, program: &str) -> (String, String) {
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return ("a command is missing".into(), format!("`{program} --help` lists the commands"));

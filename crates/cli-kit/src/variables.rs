@@ -1,9 +1,10 @@
-//! Environment variables that set options: the values for on and off, a line about variables in effect, and notes about
-//! retired variables.
+//! Environment variables that set options: the values for "on" and "off", a line about the variables that are set, and
+//! notes about retired variables.
 //!
-//! Only options for a place, a file or a format have a variable, and a few options with harmless numbers. Options
-//! that move, reset, number, program, enable outputs, set bits, answer a question or override a check have none,
-//! because a shell keeps a variable for later commands. `audit` checks this for all options of a command line.
+//! Variables exist only for options that name a port, address, folder, file or format, and for a few options with
+//! harmless numbers. Options that move, reset, number, program, enable outputs, set bits, confirm a question or
+//! override a check have no variable, because a variable stays set for later commands in the shell. `audit` checks this
+//! for all options of a command line.
 
 #[cfg(feature = "trial")]
 pub mod audit;
@@ -26,14 +27,14 @@ pub fn on_off(text: &str) -> Result<bool, String> {
     }
 }
 
-/// The variables of a program.
+/// Environment variables of a program.
 #[derive(Clone, Copy, Debug)]
 pub struct Variables {
-    /// The variable of `--json`.
+    /// Environment variable of `--json`.
     pub json: &'static str,
     /// Retired variables.
     pub retired: &'static [Retired],
-    /// Commands without a device: they do not use the global options of the link.
+    /// Commands that do not use a device, and therefore do not use the global options of the connection.
     pub offline: &'static [&'static str],
 }
 
@@ -44,28 +45,29 @@ pub struct Retired {
     pub variable: &'static str,
     /// Words of the command that has the option; empty if all commands that have the option are meant.
     pub command: &'static str,
-    /// The long name of the option.
+    /// Long name of the option.
     pub option: &'static str,
-    /// Consequence of ignoring it.
+    /// Consequence of ignoring the variable.
     pub without: Without,
 }
 
 /// Effect of an ignored variable on the command.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Without {
-    /// The command does less than the variable requested: it continues, with a note.
+    /// Without the variable the command does less: it continues, with a note.
     Less,
-    /// The command does more, or something else, such as a motion at another speed: it is refused.
+    /// Without the variable the command does more or something else, such as a motion at another speed: the command is
+    /// refused.
     Other,
 }
 
 impl Retired {
-    /// Creates a variable that made a command do more.
+    /// Creates a retired variable that made a command do more.
     pub const fn less(variable: &'static str, command: &'static str, option: &'static str) -> Self {
         Self { variable, command, option, without: Without::Less }
     }
 
-    /// Creates a variable that limited or changed the work of a command.
+    /// Creates a retired variable that limited or changed the work of a command.
     pub const fn other(variable: &'static str, command: &'static str, option: &'static str) -> Self {
         Self { variable, command, option, without: Without::Other }
     }
@@ -82,19 +84,19 @@ impl Retired {
 /// Notes about the variables that are set.
 #[derive(Debug, Default)]
 pub(crate) struct Report {
-    /// A line for the variables that set an option of this command.
+    /// Line about the variables that set an option of this command.
     pub in_effect: Option<String>,
-    /// A line for each variable that is ignored.
+    /// Lines about ignored variables, one per variable.
     pub ignored: Vec<String>,
-    /// Failure of a command that would do something else without a variable.
+    /// Failure if the command would do something else because a variable is ignored.
     pub refused: Option<Failure>,
 }
 
-/// Command of the command line.
+/// Command in the parsed command line.
 struct Chosen<'a> {
     program: &'static str,
     command: &'a Command,
-    /// Its words, `traj run`.
+    /// Words of the command, for example `traj run`.
     words: String,
 }
 
@@ -106,7 +108,8 @@ impl Chosen<'_> {
 }
 
 impl Variables {
-    /// Returns the notes about the variables of a parsed command line. `value` is the environment.
+    /// Returns the notes about the variables of a parsed command line. `value` returns the value of an environment
+    /// variable.
     pub(crate) fn report(
         &self,
         program: &'static str,
@@ -243,7 +246,8 @@ impl Unread {
     }
 }
 
-/// Returns `true` if the option is set by its variable: it is not typed, and an on/off variable is on.
+/// Returns `true` if the option is set by its variable: the user has not typed the option, and an on/off variable has
+/// the value "on".
 fn is_set_by_variable(arg: &Arg, matches: &ArgMatches) -> bool {
     let id = arg.get_id().as_str();
     arg.get_env().is_some()

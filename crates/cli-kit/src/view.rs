@@ -1,4 +1,4 @@
-//! Parts of live views: errors first, rows that scroll, and a line of keys that is always visible.
+//! Parts of live views: the errors at the top, rows that scroll, and a line with the keys that is always visible.
 
 use ratatui::Frame;
 use ratatui::style::{Color, Style, Stylize};
@@ -9,10 +9,10 @@ use crate::keys::Key;
 
 /// Smallest number of columns and rows of a view.
 pub const LEAST: (u16, u16) = (40, 12);
-/// Smallest number of columns and rows of a view with frames around its parts.
+/// Smallest number of columns and rows of a view that has frames around its parts.
 pub const FRAMED: (u16, u16) = (80, 24);
 
-/// Returns a frame around a part.
+/// Returns a frame to draw around a part of a view.
 pub fn panel(title: &str) -> Block<'static> {
     let title: String = if title.is_empty() { String::new() } else { format!(" {title} ") };
     Block::bordered()
@@ -39,8 +39,8 @@ pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     lines
 }
 
-/// If the terminal is too small, draws one sentence with the required size and the key that stops. The keys still
-/// work. Returns `true` if the terminal is too small.
+/// If the terminal is too small, draws one sentence with the required size and the key for Stop. The keys still work.
+/// Returns `true` if the terminal is too small.
 pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     let area = frame.area();
     if area.width >= LEAST.0 && area.height >= LEAST.1 {
@@ -55,22 +55,22 @@ pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     true
 }
 
-/// Errors and the next command.
+/// Errors, and the next command that is recommended.
 #[derive(Clone, Debug, Default)]
 pub struct Trouble {
-    /// Texts of the causes. A cause that leads to others comes first.
+    /// Texts of the causes. A cause that produces other causes comes first.
     pub causes: Vec<String>,
     /// Defects that do not stop the operation.
     pub warnings: Vec<String>,
-    /// Next command; empty: none.
+    /// Next command; empty if none is recommended.
     pub next: String,
-    /// Result of the last key.
+    /// Result of the last key press.
     pub message: String,
 }
 
 impl Trouble {
     /// Returns the lines for the head of a view, at most about `most`: as many complete causes as fit, the next
-    /// command, and the result of the last key. The causes that do not fit are returned as the first rows of the
+    /// command, and the result of the last key press. The causes that do not fit are returned as the first rows of the
     /// scrolled part.
     pub fn lines(&self, width: u16, most: usize) -> (Vec<Line<'static>>, Vec<Line<'static>>) {
         let red = |text: String| Line::from(text).style(Style::new().fg(Color::Red).bold());
@@ -121,13 +121,14 @@ pub struct Scroll {
 }
 
 impl Scroll {
-    /// Sets how many of all rows are visible. No line below the last one stays empty.
+    /// Sets how many of all rows are visible. The scroll position is limited so that no line below the last row stays
+    /// empty.
     pub fn fit(&mut self, room: usize, rows: usize) {
         (self.room, self.rows) = (room, rows);
         self.at = self.at.min(rows.saturating_sub(room));
     }
 
-    /// Returns the first visible row.
+    /// Returns the index of the first visible row.
     pub fn first(&self) -> usize {
         self.at
     }
@@ -171,7 +172,7 @@ mod tests {
         lines.iter().map(ToString::to_string).collect()
     }
 
-    /// No cause is cut. Causes that do not fit are counted, and are the first rows of the scrolled part.
+    /// Causes are never truncated. Causes that do not fit are counted, and are the first rows of the scrolled part.
     #[test]
     fn causes_are_shown_whole_or_scroll() {
         let trouble = Trouble {

@@ -1,9 +1,9 @@
-//! Output that may have no reader: printed with a timeout.
+//! Output with a timeout, for text that may never be read.
 
 use std::time::Duration;
 
-/// Prints in a separate thread, and waits no longer than `timeout`: a pipe without a reader (`2>&1 | less`) does not
-/// keep the process from ending.
+/// Prints in a separate thread, and waits at most `timeout`, so that the process can end even if a pipe is not read
+/// (`2>&1 | less`).
 pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
     let (done, printed) = std::sync::mpsc::channel();
     let spawned = std::thread::Builder::new().name("last words".into()).spawn(move || {
@@ -19,7 +19,7 @@ pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
 mod tests {
     use super::*;
 
-    /// Output without a reader does not keep the process.
+    /// Output that is not read does not prevent the end of the process.
     #[test]
     fn words_without_a_reader_are_not_waited_for() {
         let (never, reader) = std::sync::mpsc::channel::<()>();

@@ -10,23 +10,23 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Creates an empty picture.
+    /// Creates an empty screen.
     pub fn new(columns: u16, rows: u16) -> Self {
         let cells = vec![vec![' '; columns.into()]; rows.into()];
         Self { cells, at: (0, 0), begun: Vec::new() }
     }
 
-    /// Returns its rows, without trailing spaces.
+    /// Returns the rows of the screen, without trailing spaces.
     pub fn rows(&self) -> Vec<String> {
         self.cells.iter().map(|row| row.iter().collect::<String>().trim_end().to_owned()).collect()
     }
 
-    /// Returns its rows as one text.
+    /// Returns the rows of the screen as one text.
     pub fn text(&self) -> String {
         self.rows().join("\n")
     }
 
-    /// Processes the bytes of a program.
+    /// Processes output bytes of a program.
     pub fn take(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.begun.push(*byte);

@@ -1,4 +1,4 @@
-//! A terminal with a user, and a command that runs there.
+//! Simulated terminal with a user, and a command that runs on it.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -36,7 +36,7 @@ fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
 
 /// A pseudo-terminal.
 pub struct Terminal {
-    /// Input typed by the user; when closed, the terminal hangs up.
+    /// Input that the user types; when it is closed, the terminal hangs up.
     person: Option<File>,
     slave: Option<OwnedFd>,
     closed: Arc<AtomicBool>,
@@ -57,7 +57,7 @@ impl Terminal {
         let slave = rustix::fs::open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).expect("it opens");
         tcsetwinsize(&slave, Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
             .expect("its size");
-        // If the command inherited the user's end, the terminal could not hang up.
+        // The command must not inherit the user's side of the terminal, because the terminal could then not hang up.
         for end in [&master, &slave] {
             fcntl_setfd(end, FdFlags::CLOEXEC).expect("its flags");
         }
@@ -83,7 +83,7 @@ impl Terminal {
         self.slave.as_ref().expect("it has not hung up").try_clone().expect("a handle")
     }
 
-    /// Starts a command with this terminal as its controlling terminal, stdin and output, as a shell does.
+    /// Starts a command with this terminal as controlling terminal, stdin and output, as a shell does.
     pub fn start(&self, command: &Command) -> Child {
         let mut own = Command::new("setsid");
         own.arg("--ctty").arg(command.get_program()).args(command.get_args());
@@ -106,8 +106,8 @@ impl Terminal {
         self.person.as_mut().expect("it has not hung up").write_all(keys.as_bytes()).expect("it takes keys");
     }
 
-    /// Processes the command's output until the picture fulfils the condition; panics with the picture if that never
-    /// happens.
+    /// Processes the command's output until the screen fulfils the condition; panics with the screen if the condition
+    /// is not met in time.
     pub fn until(&mut self, what: &str, reached: impl Fn(&Picture) -> bool) {
         let mut patience = Patience::begin();
         while !reached(&self.picture) {
@@ -118,7 +118,7 @@ impl Terminal {
         }
     }
 
-    /// Like [`Self::until`], for words.
+    /// Like [`Self::until`], with words that must appear as the condition.
     pub fn until_it_shows(&mut self, words: &str) {
         self.until(words, |picture| picture.text().contains(words));
     }
@@ -128,15 +128,17 @@ impl Terminal {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Hangs up, as a closed window does: afterwards no process has the user's end open.
+    /// Closes the terminal, as when a user closes the window. After the call, no process has the user's side of the
+    /// terminal open.
     pub fn hang_up(&mut self) {
         (self.person, self.slave) = (None, None);
-        // The reading thread has the last handle.
+        // The reading thread owns the last handle.
         self.closed.store(true, Ordering::Relaxed);
         self.reader.take().map(JoinHandle::join);
     }
 
-    /// Waits for the end of the command and returns its exit code. Its last output is in the picture.
+    /// Waits for the end of the command and returns its exit code. The screen then contains the last output of the
+    /// command.
     pub fn ends(&mut self, child: &mut Child) -> i32 {
         let mut patience = Patience::begin();
         let code = loop {
@@ -153,7 +155,7 @@ impl Terminal {
         code
     }
 
-    /// Returns `true` if lines are read as before, and keys are shown.
+    /// Returns `true` if the terminal again reads whole lines and shows typed keys.
     pub fn is_as_before(&self) -> bool {
         let modes = tcgetattr(self.end()).expect("its modes").local_modes;
         modes.contains(LocalModes::ICANON | LocalModes::ECHO)

@@ -17,17 +17,17 @@ pub enum Kind {
     Output,
     /// Format of the output.
     Format,
-    /// Rate of the line.
+    /// Bit rate of the serial line.
     Line,
-    /// Limit of time or disk space of one command, which changes no motion.
+    /// Limit of time or disk space of one command, which does not change a motion.
     Limit,
     /// A setting of a simulator.
     Simulator,
-    /// Caution: makes a command send less.
+    /// Safety option that makes a command send less.
     Caution,
 }
 
-/// Value names of options for a place or a file.
+/// Value names of options that name a port, address, folder or file.
 const PLACES: [&str; 11] = [
     "FILE",
     "FILE.mcap",
@@ -42,9 +42,9 @@ const PLACES: [&str; 11] = [
     "ORIGIN",
 ];
 
-/// Returns all faults of the variables of a command line; empty without faults. `allowed` lists each variable with
-/// the reason why it may exist. `without` lists options that name a file and still have no variable, for example
-/// `update --data`.
+/// Returns all faults of the variables of a command line; an empty list if there are none. `allowed` lists each
+/// variable with the reason why it may exist. `without` lists options that name a file and still have no variable, for
+/// example `update --data`.
 pub fn faults<Cli: CommandFactory>(
     prefix: &str,
     variables: &Variables,
@@ -138,7 +138,7 @@ fn lists(
     faults
 }
 
-/// Returns the reason why an option is not of this kind.
+/// Returns the reason why an option does not belong to this kind.
 fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::SetFalse);
     match kind {

@@ -89,7 +89,7 @@ fn variables_of_options_that_act_are_named_and_ignored_or_refused() {
         (2, "use --speed, or unset TRY_SPEED")
     );
     assert!(refused.message.contains("TRY_SPEED=9") && refused.message.contains("`try go`"), "{refused:?}");
-    // Typed, off, empty, or of another command.
+    // Cases: option typed, variable off, variable empty, or variable of another command.
     for (words, environment) in [
         (&["go", "--speed", "2"][..], &[("TRY_SPEED", "9")][..]),
         (&["go", "--active"], &[("TRY_ACTIVE", "1")]),
@@ -109,7 +109,7 @@ fn where_a_command_line_is_wrong_the_variable_behind_it_is_named() {
         let typed: Vec<OsString> = words.iter().map(OsString::from).collect();
         VARIABLES.report_error("try", &root, &error, &typed, of(environment))
     };
-    // The test sets no variable of its own process, so clap does not read one. The words cause the error, and the
+    // The test sets no variable of its own process, so clap does not read one. The typed words cause the error, and the
     // report finds the variable.
     assert_eq!(lines(&["go", "--sped", "3"], &[("TRY_ACTIVE", "1")]).len(), 1);
     assert!(lines(&["go", "--bus"], &[("TRY_BUS", "x")]).is_empty(), "it is typed");

@@ -32,7 +32,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Returns the end of a chain of links, even if no file exists there yet.
+/// Returns the final target of a chain of links, even if this file does not exist yet.
 fn end_of_links(path: &Path) -> PathBuf {
     let mut at = path.to_path_buf();
     for _ in 0..40 {

@@ -1,4 +1,4 @@
-//! Errors with a kind, a short name, a next step and facts.
+//! Errors with a kind, a short name, a next step and details for programs.
 
 use std::error::Error;
 use std::io;
@@ -12,7 +12,7 @@ pub struct Diagnosis {
     pub kind: ErrorKind,
     /// A short name for programs.
     pub code: &'static str,
-    /// Next step; empty if no step helps.
+    /// Next step for the user; empty if no step helps.
     pub next: Next,
 }
 
@@ -28,7 +28,7 @@ pub trait Diagnose: Error {
     /// Returns kind, name and next step.
     fn diagnosis(&self) -> Diagnosis;
 
-    /// Returns the place of the error, its value and its limit.
+    /// Returns the board or joint of the error, the value and the limit.
     fn facts(&self) -> Facts {
         Facts::default()
     }
@@ -43,7 +43,7 @@ pub trait Diagnose: Error {
         self.diagnosis().code
     }
 
-    /// Returns the next step in words of the command line; empty if no step helps.
+    /// Returns the next step in the words of the command line; empty if no step helps.
     fn hint(&self) -> String {
         self.diagnosis().next.to_string()
     }

@@ -1,13 +1,13 @@
-//! Place of an error, its value and its limit: the parts of its message that programs read.
+//! Details of an error for programs: board, joint or point, with the value and its limit.
 
-/// Facts of an error. A part is `None` if it does not apply.
+/// Details of an error. A field is `None` if it does not apply.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
     /// Number of the board.
     pub board: Option<u8>,
     /// Joint, 1 to 6 from the base.
     pub joint: Option<u8>,
-    /// Point of the trajectory, from 0; in motion the 1 ms point.
+    /// Index of the trajectory point, from 0; during a motion, index of the 1 ms point.
     pub point: Option<u32>,
     /// Value that was found, in the unit of the message.
     pub value: Option<f64>,
@@ -15,11 +15,11 @@ pub struct Facts {
     pub limit: Option<f64>,
     /// Usual cause.
     pub cause: Option<&'static str>,
-    /// Cause of a held stop, if the controller reports it.
+    /// Cause of a held Stop, if the controller reports the cause.
     pub held_stop: Option<Box<HeldStopFacts>>,
 }
 
-/// Cause of a held stop.
+/// Cause of a held Stop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldStopFacts {
     /// Name of the cause, with hyphens.
@@ -31,7 +31,7 @@ pub struct HeldStopFacts {
 }
 
 impl Facts {
-    /// Returns the facts of a value beyond its limit.
+    /// Creates the details of a value that exceeds its limit.
     pub fn beyond(value: f64, limit: f64) -> Self {
         Self { value: Some(value), limit: Some(limit), ..Self::default() }
     }

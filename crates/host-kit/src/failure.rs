@@ -1,24 +1,25 @@
-//! The common type of a failure. Commands, agents and the Python package render it.
+//! Common failure type of all front ends. Commands, agents and the Python package show failures of this type.
 
 use crate::{Diagnose, Diagnosis, ErrorKind, Facts, Next};
 
-/// Reason why a request was not done.
+/// Reason why a request was not carried out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
-    /// Kind: a command turns it into its exit code, an agent into its HTTP status, Python into its exception.
+    /// Kind of the failure. It determines the exit code of a command, the HTTP status of an agent and the exception in
+    /// Python.
     pub kind: ErrorKind,
     /// Short name for programs.
     pub code: &'static str,
-    /// Sentence for people: request, place, value and limit.
+    /// Sentence for the user, with request, board or joint, value and limit.
     pub message: String,
-    /// Next step; empty if no step helps.
+    /// Next step for the user; empty if no step helps.
     pub next: Next,
-    /// Place of the failure, its value and its limit.
+    /// Board or joint of the failure, with the value and its limit.
     pub facts: Box<Facts>,
 }
 
 impl Failure {
-    /// Creates a failure without a next step and without facts.
+    /// Creates a failure without a next step and without details.
     pub fn new(kind: ErrorKind, code: &'static str, message: impl ToString) -> Self {
         Self { kind, code, message: message.to_string(), next: Next::default(), facts: Box::default() }
     }
@@ -44,17 +45,18 @@ impl Failure {
         Self { facts: Box::new(facts), ..self }
     }
 
-    /// Creates a failure whose reason is already in the printed result. The failure has a kind and no code.
+    /// Creates a failure whose reason is already in the printed result. The failure has a kind but no code.
     pub fn shown(kind: ErrorKind) -> Self {
         Self::new(kind, "", "")
     }
 
-    /// Returns `true` if the printed result already has the reason.
+    /// Returns `true` if the printed result already contains the reason.
     pub fn is_shown(&self) -> bool {
         self.code.is_empty()
     }
 
-    /// Adds to the message that the port or the bus was not used. A shown failure stays as it is.
+    /// Adds to the message that the port or the bus was not used. A failure whose reason is already printed stays
+    /// unchanged.
     pub fn nothing_sent(failure: impl Into<Self>) -> Self {
         let failure = failure.into();
         if failure.is_shown() {

@@ -9,9 +9,9 @@ use crate::Next;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Problem that must be solved before anything works.
+    /// Problem that must be solved before the system can work.
     Problem,
-    /// Deviation that the system still works with.
+    /// Deviation that does not prevent operation.
     Warning,
     /// Correct state.
     Good,
@@ -75,12 +75,12 @@ impl Findings {
         self.add(Severity::Problem, what, why, next);
     }
 
-    /// Adds a deviation that the system still works with.
+    /// Adds a deviation that does not prevent operation.
     pub fn warn(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<Next>) {
         self.add(Severity::Warning, what, why, next);
     }
 
-    /// Adds a correct state.
+    /// Adds a check that found no problem.
     pub fn good(&mut self, what: impl Into<String>) {
         self.add(Severity::Good, what, "", "");
     }
@@ -90,7 +90,7 @@ impl Findings {
         self.0.iter().any(|finding| finding.severity == Severity::Problem)
     }
 
-    /// Returns all findings, the worst first, otherwise in the order in which they were added.
+    /// Returns all findings, the worst first. Findings of equal severity stay in the order in which they were added.
     pub fn worst_first(mut self) -> Vec<Finding> {
         self.0.sort_by_key(|finding| finding.severity);
         self.0

@@ -1,4 +1,4 @@
-//! Kinds of failure, on which a caller can act without knowing each error.
+//! Kinds of failure, so that a caller can react without knowing each error.
 
 /// Kind of failure of an error or a report, from the least to the most serious.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -9,7 +9,7 @@ pub enum ErrorKind {
     Refused,
     /// The controller or a board reported an error.
     Device,
-    /// No port or bus, or no answer.
+    /// Port or bus not available, or no answer.
     NoLink,
     /// An error or a cancellation during the operation.
     Fault,

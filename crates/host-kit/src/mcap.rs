@@ -9,15 +9,15 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 /// missing bytes are detected.
 const MAX_RECORD: usize = 1 << 26;
 
-/// Passes the channels, messages and metadata of a file to `see`, including those in chunks. Returns `true` if the
-/// file was completed. Reads the file from beginning to end in small pieces, so memory holds at most one record.
-/// Attachments and indices are skipped unread, because the library panics at damaged ones. Errors after the data are
-/// ignored, because only the index follows.
+/// Passes the channels, messages and metadata of a file to `see`, including those in chunks. Returns `true` if the file
+/// was completed. Reads the file from beginning to end in small pieces, so that memory contains at most one record.
+/// Attachments and indices are skipped without reading them, because the library panics if they are damaged. Errors
+/// after the data are ignored, because only the index follows.
 ///
 /// # Errors
 ///
-/// The first record that cannot be read, or that `see` refuses; the records before it were shown. An error of `file`
-/// itself.
+/// The first record that cannot be read, or that `see` refuses. `see` has already received the records before it. Also
+/// an error of `file` itself.
 pub fn each_record<E: From<McapError>>(
     mut file: impl Read,
     mut see: impl FnMut(Record<'_>) -> Result<(), E>,
@@ -61,7 +61,7 @@ mod tests {
 
     use super::*;
 
-    /// A file with `n` messages in chunks of their own.
+    /// Returns a file with `n` messages, each in its own chunk.
     fn written(n: u32) -> Vec<u8> {
         let mut out = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
         let channel = out.add_channel(0, "topic", "json", &BTreeMap::new()).unwrap();

@@ -1,4 +1,4 @@
-//! Next steps: sentences with actions. Each front end has its own name for an action.
+//! Next steps for the user: sentences that contain actions. Each front end uses its own name for an action.
 use std::borrow::Cow;
 use std::fmt;
 
@@ -30,7 +30,7 @@ macro_rules! actions {
 
             /// Returns the name of the action in a front end: a command, a request with the button of the dashboard, or a Python expression.
             ///
-            /// An action that a front end does not have is named as the command.
+            /// If a front end does not have the action, the name is the command.
             pub const fn name(self, front_end: FrontEnd) -> &'static str {
                 match (self, front_end) {
                     $(
@@ -45,31 +45,31 @@ macro_rules! actions {
 }
 
 actions! {
-    /// Give the controller an arm.
+    /// Upload an arm to the controller.
     ArmPush: "jtc arm push FILE", "PUT /api/arm", "robot.push_arm(arm)";
-    /// Give the controller an arm and store it there.
+    /// Upload an arm to the controller and store it there.
     ArmStore: "jtc arm push --store", "PUT /api/arm with store: true", "robot.push_arm(arm, store=True)";
     /// Check an arm file.
     ArmCheck: "jtc arm check FILE", "jtc arm check FILE", "openjtc.Arm.load(…).findings()";
-    /// Show the values of the arm in use.
+    /// Show the values of the arm that the controller uses.
     ArmShow: "jtc arm show", "GET /api/arm/model", "jtc arm show";
-    /// Compare an arm file with the arm in use.
+    /// Compare an arm file with the arm that the controller uses.
     ArmDiff: "jtc arm diff FILE", "jtc arm diff FILE", "jtc arm diff FILE";
     /// Use the arm that is built into the controller.
     UseDefaults: "jtc params use-defaults", "POST /api/arm/defaults", "robot.use_defaults()";
-    /// Give the controller friction and gains.
+    /// Upload friction and gains to the controller.
     ParamsPush: "jtc params push FILE", "Recover (POST /api/recover with arm)", "robot.recover(arm=…)";
     /// List the joints that are set absent.
     BenchShow: "jtc bench show", "GET /api/absent", "jtc bench show";
     /// Set all joints present.
     BenchPresent: "jtc bench present", "PUT /api/absent with absent: []", "jtc bench present";
-    /// Acknowledge a held stop and clear errors whose cause is gone.
+    /// Acknowledge a held Stop and clear errors whose cause no longer exists.
     Clear: "jtc clear", "Acknowledge (POST /api/clear)", "robot.recover()";
-    /// Take the torque off all joints.
+    /// Switch off the torque of all joints.
     Disable: "jtc disable", "Take the torque off (POST /api/disable)", "robot.disable()";
-    /// Look for what is wrong.
+    /// Find the cause of a problem.
     Doctor: "jtc doctor", "Look for what is wrong (GET /api/doctor)", "robot.doctor()";
-    /// Look for what is wrong, at the rate of the controller.
+    /// Find the cause of a problem, at the bit rate of the controller.
     DoctorAtRate: "jtc doctor --baud RATE", "jtc serve --baud RATE", "openjtc.connect(…, baud=…)";
     /// Explain states and errors.
     Explain: "jtc explain", "Explain (GET /api/explain)", "jtc explain";
@@ -77,15 +77,15 @@ actions! {
     ExplainCode: "jtc explain CODE", "Explain (GET /api/explain/{code})", "jtc explain CODE";
     /// Show versions and memory of the controller.
     Info: "jtc info", "GET /api/info", "robot.info";
-    /// Move one joint while it is asked for.
+    /// Move one joint while the motion is requested.
     Jog: "jtc jog", "Jog (POST /api/jog)", "robot.jog(…)";
-    /// Accept limits that the controller has otherwise.
+    /// Accept that the controller has other limits.
     AcceptDeviceLimits: "--accept-device-limits", "accept_device_limits: true", "accept_device_limits=True";
-    /// Give positions in degrees.
+    /// Specify positions in degrees.
     Degrees: "--deg", "degrees: true", "degrees=True";
-    /// Choose the rate of the serial line.
+    /// Choose the bit rate of the serial line.
     Baud: "--baud", "jtc serve --baud", "baud=";
-    /// Watch state and link.
+    /// Monitor the state and the connection.
     Monitor: "jtc monitor", "GET /metrics", "robot.doctor()";
     /// Show the payload.
     PayloadShow: "jtc payload show", "GET /api/payload", "robot.payload";
@@ -93,11 +93,11 @@ actions! {
     PayloadSet: "jtc payload set", "Payload (PUT /api/payload)", "robot.payload = …";
     /// Remove the payload.
     PayloadClear: "jtc payload clear", "Payload (PUT /api/payload with mass_kg: 0 and com_m: [0, 0, 0])", "robot.payload = None";
-    /// Return to a held arm from any state.
+    /// Return to position hold from any state.
     Recover: "jtc recover", "Recover (POST /api/recover with {})", "robot.recover()";
-    /// Return to a held arm and give the controller this arm.
+    /// Return to position hold and upload this arm to the controller.
     RecoverWithArm: "jtc recover --arm FILE", "Recover (POST /api/recover with arm)", "robot.recover(arm=…)";
-    /// Return to a held arm and use the arm that is built into the controller.
+    /// Return to position hold and use the arm that is built into the controller.
     RecoverWithDefaults:
         "jtc recover --defaults", "Recover (POST /api/recover with defaults: true)", "robot.recover(defaults=True)";
     /// Restart a drive.
@@ -130,17 +130,17 @@ actions! {
 /// Part of a next step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Part {
-    /// Words for all front ends. Commands are enclosed in backticks.
+    /// Words that all front ends show. Commands are enclosed in backticks.
     Words(Cow<'static, str>),
-    /// Action. Each front end shows its own name for it. The command line shows this command instead, if there is
-    /// one.
+    /// Action. Action, for which each front end shows its own name. The command line shows the command instead, if one
+    /// is set.
     Action(Action, Option<String>),
 }
 
 /// Sentence about the next step, without a full stop; empty if no step helps.
 ///
-/// [`next!`](crate::next!) makes a sentence with actions. Its [`Display`](fmt::Display) form is the sentence of the
-/// command line.
+/// [`next!`](crate::next!) creates a sentence that contains actions. The [`Display`](fmt::Display) form is the sentence
+/// for the command line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Next(Vec<Part>);
 
@@ -150,7 +150,7 @@ impl Next {
         self.0.is_empty()
     }
 
-    /// Counts the places `{}` in a sentence.
+    /// Counts the placeholders `{}` in a sentence.
     #[doc(hidden)]
     pub const fn places(sentence: &str) -> usize {
         let bytes = sentence.as_bytes();
@@ -162,7 +162,7 @@ impl Next {
         count
     }
 
-    /// Fills the places `{}` of a sentence.
+    /// Replaces the placeholders `{}` of a sentence.
     #[doc(hidden)]
     pub fn filled(sentence: &'static str, actions: &[Action]) -> Self {
         let mut pieces = sentence.split("{}").map(Self::from);
@@ -195,7 +195,7 @@ impl Next {
         self
     }
 
-    /// Makes a next step of an action and its command with all arguments.
+    /// Creates a next step from an action and its command with all arguments.
     pub fn typed(action: Action, command: impl Into<String>) -> Self {
         Self(vec![Part::Action(action, Some(command.into()))])
     }
@@ -258,7 +258,7 @@ impl From<Cow<'static, str>> for Next {
     }
 }
 
-/// Makes a [`Next`] from a sentence. Each `{}` in it is replaced by one of the [`Action`]s that follow, in their
+/// Creates a [`Next`] from a sentence. Each `{}` in it is replaced by one of the [`Action`]s that follow, in their
 /// order.
 #[macro_export]
 macro_rules! next {

@@ -1,10 +1,11 @@
-//! Requests to the thread that owns a device, and the Stops that overtake them.
+//! Requests to the thread that owns a device, and Stops, which overtake these requests.
 //!
-//! A single thread owns a device: only this thread calls the device's functions. Other threads put requests into the [`Queue`] of this
-//! thread, which takes them one at a time. A request begins when the owner takes it.
+//! A single thread owns a device: only this thread calls the device's functions. Other threads put requests into the
+//! [`Queue`] of this thread, which takes them one at a time. A request begins when the owner takes it from the queue.
 //!
-//! Stops are numbered. A Stop cancels the request that is being done, unless it is an update. A command or an update that was requested
-//! before a Stop and has not begun is refused. So nothing that was requested before a Stop begins after it.
+//! Stops are numbered. A Stop cancels the current request, unless the current request is an update. A command or an
+//! update that was requested before a Stop and has not begun is refused. Therefore no command or update that was
+//! requested before a Stop begins after this Stop.
 //!
 //! A front end stores its own data about a request in a tag, such as the client and the number of a job.
 use std::collections::VecDeque;
@@ -13,42 +14,42 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Command. A Stop refuses it while it waits, and cancels it once begun.
+    /// Command. Command. A Stop refuses a waiting command, and cancels a command that has begun.
     Command,
-    /// Update of a device's program. A Stop refuses it while it waits. Once begun it is not cancelled by a Stop, because a device with a
-    /// half-written program could not work afterwards.
+    /// Update of a device's program. A Stop refuses a waiting update. A Stop does not cancel an update that has begun,
+    /// because a device with a half-written program would not work.
     Update,
-    /// Question, which changes nothing. A Stop cancels it once begun; while it waits it stays. A question is taken after all commands and
-    /// updates.
+    /// Query, which does not change anything. A Stop cancels a query that has begun; a waiting query stays in the
+    /// queue. The owner takes a query after all commands and updates.
     Question,
 }
 
-/// Reason why a request is not done.
+/// Reason why a request is not carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// A Stop was requested after it.
+    /// A Stop was requested after this request.
     Stopped,
-    /// Its requester has cancelled it.
+    /// The requester has cancelled the request.
     Cancelled,
     /// The owner has closed the queue.
     Closed,
 }
 
-/// Function of a request: it is called once, with the device `D` or with the reason why the request is not done.
+/// Function of a request: it is called once, with the device `D` or with the reason why the request is not carried out.
 ///
-/// A refusal is passed on in the thread that refuses: that of the owner, or one that cancels, stops or puts a request. No thread may hold
-/// a lock meanwhile that the function needs.
+/// A refusal calls the function in the thread that refuses: the owner's thread, or a thread that cancels a request,
+/// requests a Stop or adds a request. During the call, no thread may hold a lock that the function needs.
 pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 
-/// For [`Request::after`]: no Stop refuses the request.
+/// Value of [`Request::after`] for a request that no Stop refuses.
 pub const NEVER_LATE: u64 = u64::MAX;
 
 /// Request to the owner of a device `D`, with a tag of the front end.
 pub struct Request<D, T> {
     /// Kind of the request.
     pub kind: Kind,
-    /// Number of the last Stop before the request: see [`Queue::stops`]. [`NEVER_LATE`]: no Stop refuses the request. This number does not
-    /// matter for questions.
+    /// Number of the last Stop before the request: see [`Queue::stops`]. With [`NEVER_LATE`], no Stop refuses the
+    /// request. Queries do not use this number.
     pub after: u64,
     /// Data of the front end about the request.
     pub tag: T,
@@ -63,7 +64,7 @@ impl<D, T> Request<D, T> {
     }
 }
 
-/// Request that is being done.
+/// Request that the owner currently carries out.
 struct Current<T> {
     tag: T,
     is_cancelled_by_stop: bool,
@@ -91,7 +92,7 @@ impl<D, T> Default for Queue<D, T> {
 
 impl<D, T: Clone> Queue<D, T> {
     fn lock(&self) -> MutexGuard<'_, State<D, T>> {
-        // If another thread panicked, an incomplete state matters less than a Stop.
+        // If another thread panicked, the state may be incomplete, but a Stop must still work.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -100,22 +101,23 @@ impl<D, T: Clone> Queue<D, T> {
         self.lock().stops
     }
 
-    /// Requests a Stop: cancels the current request, unless that is an update or a Stop, and puts `act` before all others. Returns the
-    /// number of the Stop. [`Queue::refuse_late`] should follow.
+    /// Requests a Stop. Cancels the current request, unless it is an update or a Stop, and puts `act` before all other
+    /// requests. Returns the number of the Stop. [`Queue::refuse_late`] should follow.
     ///
-    /// The owner must watch [`Queue::stops`] or [`Queue::is_cancelled`] while it does a request: `act` has its turn only when the current
-    /// request has ended.
+    /// The owner must watch [`Queue::stops`] or [`Queue::is_cancelled`] while it carries out a request, because `act`
+    /// begins only when the current request has ended.
     pub fn stop(&self, tag: T, act: Act<D>) -> u64 {
         self.overtake(tag, act, false)
     }
 
-    /// Like [`Queue::stop`], for Stops whose functions all do the same: `act` is dropped if another Stop has not begun.
+    /// Like [`Queue::stop`], for Stops that all have an equivalent function: `act` is dropped if another Stop already
+    /// waits.
     pub fn stop_alike(&self, tag: T, act: Act<D>) -> u64 {
         self.overtake(tag, act, true)
     }
 
-    /// Like [`Queue::stop`], for a Stop that needs no turn, for example because another program has stopped the device.
-    /// [`Queue::refuse_late`] should follow.
+    /// Like [`Queue::stop`], for a Stop that needs no function, for example because another program has already stopped
+    /// the device. [`Queue::refuse_late`] should follow.
     pub fn count_stop(&self) -> u64 {
         self.lock().count_stop()
     }
@@ -132,7 +134,8 @@ impl<D, T: Clone> Queue<D, T> {
         number
     }
 
-    /// Refuses all waiting commands and updates from before the last Stop. The owner refuses them too, but only at their turn.
+    /// Refuses all waiting commands and updates from before the last Stop. The owner would also refuse them, but only
+    /// later, when it takes them from the queue.
     pub fn refuse_late(&self) {
         let late = {
             let state = &mut *self.lock();
@@ -142,18 +145,18 @@ impl<D, T: Clone> Queue<D, T> {
             state.waiting = waiting;
             late
         };
-        // Without the lock, because the function of a request may use the queue.
+        // The lock is not held here, because the function of a request may use the queue.
         late.into_iter().for_each(|request| (request.act)(Err(Refused::Stopped)));
     }
 
-    /// Returns the right to put one request. `None`: the queue is closed.
+    /// Returns the permission to add one request. Returns `None` if the queue is closed.
     ///
-    /// The place is the lock of the queue: its holder must not call other functions of the queue.
+    /// The permission holds the lock of the queue, so its owner must not call other functions of the queue.
     pub fn place(&self) -> Option<Place<'_, D, T>> {
         Some(Place(self.lock())).filter(|place| !place.0.closed)
     }
 
-    /// Puts a request; refuses it at once if the queue is closed.
+    /// Adds a request to the queue; refuses it at once if the queue is closed.
     pub fn put(&self, request: Request<D, T>) {
         match self.place() {
             Some(place) => place.put(request),
@@ -161,7 +164,8 @@ impl<D, T: Clone> Queue<D, T> {
         }
     }
 
-    /// Takes the next request, which is the current one until [`Queue::done`]: Stops first, then commands and updates, then questions.
+    /// Takes the next request, which is the current one until [`Queue::done`]: Stops first, then commands and updates,
+    /// then queries.
     pub fn take(&self) -> Option<Turn<D, T>> {
         let mut state = self.lock();
         let (tag, act, refused, is_cancelled_by_stop) = match state.stopping.pop_front() {
@@ -172,13 +176,15 @@ impl<D, T: Clone> Queue<D, T> {
                 (request.tag, request.act, refused, request.kind != Kind::Update)
             }
         };
-        // A refused request is never the current one: when its requester learns of the refusal, nothing is being done for it.
+        // A refused request never becomes the current request. When the requester receives the refusal, no work is in
+        // progress for this request.
         let current = Current { tag: tag.clone(), is_cancelled_by_stop, cancelled: false };
         state.current = refused.is_none().then_some(current);
         Some(Turn { tag, refused, act })
     }
 
-    /// Marks the current request as done. The owner calls this before the requester gets its answer, and after [`Turn::run`] in any case.
+    /// Marks the current request as completed. The owner calls this function before the requester receives its answer,
+    /// and always after [`Turn::run`].
     pub fn done(&self) {
         self.lock().current = None;
     }
@@ -188,17 +194,18 @@ impl<D, T: Clone> Queue<D, T> {
         self.lock().current.as_ref().is_some_and(|current| current.cancelled)
     }
 
-    /// Returns `true` if a Stop has not begun.
+    /// Returns `true` if a Stop waits that has not begun.
     pub fn stop_waits(&self) -> bool {
         !self.lock().stopping.is_empty()
     }
 
-    /// Returns `true` if a request with such a tag is being done or waits.
+    /// Returns `true` if a request with a matching tag is current or waits.
     pub fn has(&self, is_it: impl Fn(&T) -> bool) -> bool {
         self.lock().tags().any(is_it)
     }
 
-    /// Cancels the request with such a tag: the current one must end, a waiting one is refused. Returns `false` if no such request exists.
+    /// Cancels the request with a matching tag: a current request must end, a waiting request is refused. Returns
+    /// `false` if no such request exists.
     pub fn cancel(&self, is_it: impl Fn(&T) -> bool) -> bool {
         let request = {
             let mut state = self.lock();
@@ -209,16 +216,17 @@ impl<D, T: Clone> Queue<D, T> {
             let at = state.waiting.iter().position(|request| is_it(&request.tag));
             at.and_then(|at| state.waiting.remove(at))
         };
-        // Without the lock, because the function of the request may use the queue.
+        // The lock is not held here, because the function of the request may use the queue.
         request.map(|request| (request.act)(Err(Refused::Cancelled))).is_some()
     }
 
-    /// Closes the queue: all waiting requests and all later ones are refused. Only the owner calls this, when it ends.
+    /// Closes the queue: all waiting and all later requests are refused. Only the owner calls this function, when it
+    /// ends.
     pub fn close(&self) {
         let (stopping, waiting) = {
             let mut state = self.lock();
             state.closed = true;
-            // The owner may have panicked in the middle of it.
+            // The owner may have panicked during the current request.
             state.current = None;
             (std::mem::take(&mut state.stopping), std::mem::take(&mut state.waiting))
         };
@@ -244,24 +252,26 @@ impl<D, T> State<D, T> {
     }
 }
 
-/// Right to put one request into a queue: its lock.
+/// Permission to add one request to a queue; it holds the lock of the queue.
 pub struct Place<'a, D, T>(MutexGuard<'a, State<D, T>>);
 
 impl<D, T> Place<'_, D, T> {
-    /// Returns the tags of the current request and of all that wait, without those of Stops that have not begun.
+    /// Returns the tags of the current request and of all waiting requests, except the tags of Stops that have not
+    /// begun.
     pub fn tags(&self) -> impl Iterator<Item = &T> {
         self.0.tags()
     }
 
-    /// Returns the number of waiting requests of these kinds.
+    /// Returns the number of waiting requests of the kinds in the argument.
     pub fn waiting(&self, is_it: impl Fn(Kind) -> bool) -> usize {
         self.0.waiting.iter().filter(|request| is_it(request.kind)).count()
     }
 
-    /// Puts the request: a command or an update before all questions. A command or an update from before the last Stop is refused.
+    /// Adds the request to the queue: a command or an update before all queries. A command or an update from before the
+    /// last Stop is refused.
     pub fn put(mut self, request: Request<D, T>) {
         if request.is_late(self.0.stops) {
-            // Without the lock, because the function of the request may use the queue.
+            // The lock is not held here, because the function of the request may use the queue.
             drop(self);
             return (request.act)(Err(Refused::Stopped));
         }
@@ -273,7 +283,7 @@ impl<D, T> Place<'_, D, T> {
     }
 }
 
-/// Request whose turn has come.
+/// Request that the owner has taken from the queue.
 pub struct Turn<D, T> {
     /// Tag of the request.
     pub tag: T,
@@ -282,7 +292,7 @@ pub struct Turn<D, T> {
 }
 
 impl<D, T> Turn<D, T> {
-    /// Does the request, or refuses it.
+    /// Carries out the request, or refuses it.
     pub fn run(self, device: &mut D) {
         (self.act)(match self.refused {
             Some(refused) => Err(refused),
@@ -297,7 +307,7 @@ mod tests {
 
     use super::*;
 
-    /// Device that keeps the tags of the requests that were done.
+    /// Device that stores the tags of the requests that were carried out.
     type Done = Vec<u32>;
     type Log = Arc<Mutex<Vec<(u32, Option<Refused>)>>>;
 
@@ -328,7 +338,7 @@ mod tests {
             self.queue.stop(tag, self.act(tag))
         }
 
-        /// Does all that waits.
+        /// Carries out all waiting requests.
         fn serve(&mut self) {
             while let Some(turn) = self.queue.take() {
                 turn.run(&mut self.device);
@@ -361,7 +371,7 @@ mod tests {
         let stop = |bench: &Bench, tag| bench.queue.stop_alike(tag, bench.act(tag));
         assert_eq!((stop(&bench, 1), stop(&bench, 2)), (1, 2));
         let turn = bench.queue.take().expect("the first waits");
-        // The first has begun, and may have looked before the third was requested.
+        // The first request has begun, and may have checked for a Stop before the third request was made.
         assert_eq!(stop(&bench, 3), 3);
         turn.run(&mut bench.device);
         bench.serve();
@@ -376,7 +386,7 @@ mod tests {
         bench.request(Kind::Update, before, 2);
         bench.request(Kind::Question, before, 3);
         assert_eq!(bench.stop(6), before + 1);
-        // Requested before, put later: its way to the queue was long.
+        // The request was made before the Stop but was added to the queue after it.
         bench.request(Kind::Command, before, 4);
         bench.request(Kind::Command, bench.queue.stops(), 5);
         bench.serve();
@@ -469,7 +479,7 @@ mod tests {
         assert!(bench.queue.has(|tag| *tag == 1) && bench.queue.has(|tag| *tag == 2));
         assert!(bench.queue.cancel(|tag| *tag == 2));
         assert!(!bench.queue.is_cancelled() && !bench.queue.has(|tag| *tag == 2));
-        // A person may end an update.
+        // A user may cancel an update.
         assert!(bench.queue.cancel(|tag| *tag == 1));
         assert!(bench.queue.is_cancelled());
         turn.run(&mut bench.device);
@@ -482,7 +492,7 @@ mod tests {
     fn a_closed_queue_refuses_all_requests() {
         let mut bench = Bench::default();
         bench.request(Kind::Command, 0, 1);
-        // Its owner breaks off in the middle of it.
+        // The owner drops the request before it is complete.
         drop(bench.queue.take());
         bench.request(Kind::Command, 0, 2);
         bench.stop(3);

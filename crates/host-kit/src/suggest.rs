@@ -1,12 +1,12 @@
 //! Similarity of names, for “did you mean …?” hints after a typing error.
 
-/// Returns the similarity of two names, 0 to 1, by Jaro and Winkler, who give more weight to the beginning.
+/// Returns the similarity of two names, 0 to 1, by the Jaro-Winkler method, which gives more weight to the beginning.
 pub fn similarity(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(a, b)
 }
 
 /// Returns the known name that is most similar to `name`, if its similarity is at least `least`, 0 to 1; upper and
-/// lower case are equal.
+/// lower case count as equal.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, least: f64) -> Option<&'a str> {
     let name = name.to_lowercase();
     let all = known.into_iter().map(|known| (similarity(&known.to_lowercase(), &name), known));

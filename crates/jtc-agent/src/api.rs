@@ -1,4 +1,4 @@
-//! API of the agent: HTTP requests, and a socket that connects a client to the line.
+//! API of the agent: HTTP requests, and a WebSocket that connects a client to the serial line.
 mod absent;
 mod arm;
 mod body;
@@ -79,7 +79,7 @@ const CHECKS_AT_ONCE: usize = 2;
 /// Longest duration of a request.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
 
-/// Longest duration of a plan, or of reading the log of a flight recorder, which takes some 40 s at 115,200 Bd.
+/// Longest duration of a plan or of reading a flight recorder log. Reading the log takes about 40 s at 115,200 Bd.
 const LONG_TIME: Duration = Duration::from_secs(120);
 
 /// State that every handler receives.
@@ -94,20 +94,20 @@ pub struct Agent {
     simulated: bool,
     sockets: Sockets,
     bodies: Arc<Semaphore>,
-    /// Limit of simultaneous checks of trajectories.
+    /// Limit for trajectory checks that run at the same time.
     checks: Arc<Semaphore>,
-    /// Limit of simultaneous plans.
+    /// Limit for plans that are computed at the same time.
     plans: Arc<Semaphore>,
-    /// Limit of reports that are generated at the same time.
+    /// Limit for reports that are generated at the same time.
     reports: Arc<Semaphore>,
-    /// Limit of flight recorder logs that are read at the same time.
+    /// Limit for flight recorder logs that are read at the same time.
     logs: Arc<Semaphore>,
     events: Arc<Events>,
     identity: Arc<tokio::sync::Mutex<Identity>>,
 }
 
 impl Agent {
-    /// Creates the agent of a line. `port` is the port's name for people.
+    /// Creates the agent of a serial line. `port` is the name of the port that users see.
     ///
     /// # Errors
     ///
@@ -141,7 +141,7 @@ impl Agent {
         })
     }
 
-    /// Returns the router with all requests.
+    /// Returns the router for all requests.
     pub fn router(self) -> Router {
         let (router, mut description) = described().split_for_parts();
         let (slow, of_slow) = slow().split_for_parts();
@@ -165,13 +165,13 @@ impl Agent {
         self.gate.note(what, facts);
     }
 
-    /// Returns the number of lines that the log of commands lost.
+    /// Returns the number of lines that the command log has lost.
     fn lost_lines(&self) -> u64 {
         self.gate.lost_lines()
     }
 
-    /// Sends a Stop or a Pause of an HTTP client. The line always treats the sender as another client than the lease
-    /// holder, because requests of the lease holder may have been sent before the Stop.
+    /// Sends a Stop or a Pause of an HTTP client. The line never treats the sender as the lease holder, because the
+    /// holder may have sent requests before the Stop.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
         // The identity of the client matters only for its later requests.
@@ -183,7 +183,8 @@ impl Agent {
         });
         match client {
             Some(_) => self.note("halt", facts),
-            // A client without a lease can send any number of such requests, so repeated ones are logged together.
+            // A client without a lease can send any number of Stops and Pauses, so repeated requests are logged
+            // together.
             None => self.gate.note_repeated("halt", caller.peer, facts),
         }
         if let Some(lost) = lost {

@@ -1,5 +1,5 @@
-//! Work of an agent for clients without a connection to the line: keeps connections for them, runs their jobs, and writes a journal that a
-//! client can read when it returns.
+//! Work of an agent for clients without a connection to the line: maintains connections for these clients, runs their
+//! jobs, and writes a journal that a client can read when it reconnects.
 mod event;
 mod http_session;
 mod poses;
@@ -33,14 +33,14 @@ use crate::line::{Introduction, Policy, Role};
 use crate::owner::{ClientPort, Line};
 pub use task::{STOPPED, Task, stopped};
 
-/// Number of jobs that are kept.
+/// Number of jobs that are stored.
 const KEPT: usize = 256;
 /// Largest number of clients without a connection to the line.
 const COMMANDERS_MAX: usize = 32;
 /// Time from the end of a silent client's lease until the client is removed.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Shortest interval between events for Stops and Pauses; the last one is always written. Repeated Stops must not push
-/// other events out.
+/// Shortest interval between events for Stops and Pauses; the last one is always written. Repeated Stops must not
+/// displace other events from the journal.
 const HALTS_APART: Duration = Duration::from_millis(200);
 /// Interval at which the watcher checks for changes that the line does not announce.
 const LOOK: Duration = Duration::from_millis(200);
@@ -58,20 +58,20 @@ pub enum Stage {
     Failed,
 }
 
-/// Job, while it runs and afterwards.
+/// Job that runs or has ended.
 #[derive(Clone, Debug)]
 pub struct Job {
     /// Number of the job.
     pub number: u64,
     /// Description of the job.
     pub what: String,
-    /// Name of the client that requested it.
+    /// Name of the client that requested the job.
     pub client: String,
     /// Stage of the job.
     pub stage: Stage,
     /// Progress and results.
     pub done: Done,
-    /// Reason of a failure.
+    /// Reason why the job failed.
     pub error: Option<Problem>,
 }
 
@@ -102,15 +102,15 @@ pub struct Jobs {
     /// Store of trajectories by number.
     pub store: Store,
     arm: Arm,
-    /// Session that asks questions for all clients.
+    /// Session that sends queries for all clients.
     asker: Arc<HttpSession>,
-    /// Held stops and their causes.
+    /// Held Stops and their causes.
     pub stops: Stops,
     kept: Mutex<Kept>,
 }
 
 impl Jobs {
-    /// Returns the jobs of a line. `arm` is used if the controller cannot return its own arm.
+    /// Creates the jobs of a serial line. `arm` is used if the controller cannot return its own arm.
     pub fn new(line: Line, store: Store, arm: Arm) -> Arc<Self> {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
@@ -129,7 +129,7 @@ impl Jobs {
         jobs
     }
 
-    /// Returns the session that asks questions for all clients.
+    /// Returns the session that sends queries for all clients.
     pub fn asker(&self) -> &Arc<HttpSession> {
         &self.asker
     }
@@ -139,14 +139,14 @@ impl Jobs {
         &self.arm
     }
 
-    /// Registers a client that sends its requests with `key`. Its lease lapses if it sends none for `lasts`. Returns
-    /// `None` if too many clients are registered.
+    /// Registers a client that sends its requests with `key`. The lease of the client lapses if the client sends no
+    /// request for `lasts`. Returns `None` if too many clients are registered.
     pub fn admit(&self, key: &str, introduction: Introduction, lasts: Duration) -> Option<Arc<HttpSession>> {
         let http_session = HttpSession::new(&self.line, introduction);
         let mut kept = self.lock();
         if kept.http_sessions.len() >= COMMANDERS_MAX {
-            // Removes a client without lease and job. Otherwise a program that restarts repeatedly would use up all
-            // places.
+            // Removes a client without lease and job. Without this, a program that restarts repeatedly would fill the
+            // list of clients.
             let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
             let idle = kept
                 .http_sessions
@@ -171,7 +171,7 @@ impl Jobs {
         self.lock().http_sessions.remove(key);
     }
 
-    /// Begins a job for a client, in its turn.
+    /// Begins a job for a client, with the permit to use the client's session.
     ///
     /// # Errors
     ///
@@ -189,7 +189,7 @@ impl Jobs {
             kept.last += 1;
             Job { number: kept.last, what, client, stage: Stage::Running, done: Done::default(), error: None }
         };
-        // Stored before the job can end.
+        // The job is stored before it can end.
         self.remember(job.clone());
         let (own, begun, whose) = (self.clone(), job.clone(), Arc::downgrade(http_session));
         let unfinished = Unfinished { jobs: self.clone(), number: job.number };
@@ -213,12 +213,12 @@ impl Jobs {
         self.lock().jobs.iter().find(|job| job.number == number).cloned()
     }
 
-    /// Returns the kept jobs, oldest first.
+    /// Returns the stored jobs, oldest first.
     pub fn list(&self) -> Vec<Job> {
         self.lock().jobs.iter().cloned().collect()
     }
 
-    /// Returns the number of running jobs, and the outcomes of the ended ones.
+    /// Returns the number of running jobs, and the outcomes of the jobs that ended.
     pub fn counts(&self) -> (usize, Ended) {
         let kept = self.lock();
         (kept.jobs.iter().filter(|job| job.stage == Stage::Running).count(), kept.ended)
@@ -285,7 +285,7 @@ impl Drop for Unfinished {
 }
 
 impl Stage {
-    /// Returns a word for the stage.
+    /// Returns the name of the stage.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -296,7 +296,7 @@ impl Stage {
     }
 }
 
-/// State of the line that the journal has reported.
+/// State of the serial line that was last written to the journal.
 #[derive(Default)]
 struct Seen {
     holder: Option<String>,
@@ -307,7 +307,7 @@ struct Seen {
     lost: Option<String>,
 }
 
-/// Writes changes on the line to the journal, and forgets clients that do not return, until the agent ends.
+/// Until the agent ends, writes changes on the line to the journal, and removes clients that do not reconnect.
 fn watch(jobs: &Weak<Jobs>) {
     let (mut seen, mut looked) = (Seen::default(), Instant::now());
     loop {

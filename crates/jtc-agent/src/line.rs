@@ -1,15 +1,15 @@
-//! Shares the line of one controller between many clients. The module does no I/O: its functions take received bytes
-//! and the time, and return the bytes to write.
+//! Shares the serial line of one controller between many clients. The module does not do I/O: its functions take the
+//! received bytes and the time, and return the bytes to write.
 //!
 //! Each client speaks the protocol of the line as if no other client existed, and receives every status with the
-//! records of its own frames only. So every program that can use a serial port can use a shared line. The shared line
-//! decides which client may send which frame:
+//! records of its own frames only. Every program that can use a serial port can therefore use a shared line. The shared
+//! line decides which client may send which frame:
 //!
-//! - every client may send questions, and a Stop or a Pause, which overtakes all other frames;
-//! - only the holder of the [`Lease`] may send everything else.
+//! - every client may send queries, and a Stop or a Pause, which overtakes all other frames;
+//! - only the holder of the [`Lease`] may send all other frames.
 //!
-//! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last one
-//! moves nothing, even if its frames arrive later.
+//! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last Stop or
+//! Pause does not move the arm, even if its frames arrive later.
 mod client;
 mod device;
 mod event;
@@ -44,31 +44,32 @@ use tx_queue::TxQueue;
 
 /// Longest wait for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(2);
-/// Longest wait, after the record, for the frame that the request returns.
+/// Longest wait after the record until the controller sends the requested frame.
 const RETURN_TIME: Duration = Duration::from_millis(500);
-/// Hold-off after a Stop or a Pause of another client: a request for a motion that arrives in this time may have been sent before the Stop.
+/// Hold-off after a Stop or a Pause of another client. A motion request that arrives in this time may have been sent
+/// before the Stop.
 const CALM: Duration = Duration::from_secs(3);
-/// Shortest hold-off after a refused attempt.
+/// Shortest hold-off after a refused motion request.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
 
-/// A written frame whose record has not arrived yet.
+/// Written frame whose record has not arrived yet.
 struct Sent {
     client: ClientId,
     kind: u8,
-    /// Set if the frame was abandoned halfway. The controller then answers with an error record.
+    /// `true` if the frame was aborted before its end. The controller then answers with an error record.
     abandoned: bool,
     /// Time at which the line finishes the last byte.
     at: Duration,
 }
 
-/// A frame that the controller returns in addition to a record.
+/// Frame that the controller sends in addition to a record.
 struct Return {
     client: ClientId,
     kind: FrameType,
     until: Duration,
 }
 
-/// The line of one controller, and its clients.
+/// Serial line of one controller, with its clients.
 pub struct SharedLine {
     clients: BTreeMap<ClientId, Client>,
     next_id: u64,
@@ -81,12 +82,12 @@ pub struct SharedLine {
     halts: StopQueue,
     /// Last Stop or Pause: its number, the name of its client, and the command.
     halted: (u64, String, ExecCommand),
-    /// End of the hold-off. Until then only the client of the last Stop or Pause may begin a motion.
+    /// End of the hold-off. Until this time, only the client of the last Stop or Pause may begin a motion.
     calm_until: Duration,
     motion_tracker: MotionTracker,
     /// Name and policy of the last lease holder. While no client holds the lease, this policy applies to the motion.
     left: (String, Policy),
-    /// Will that was reported last.
+    /// Last will that was most recently reported.
     will: Option<Will>,
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
@@ -101,7 +102,7 @@ pub const OWNER: ClientId = ClientId(0);
 const HALTS: ClientId = ClientId(u64::MAX);
 
 impl SharedLine {
-    /// Creates a line with this rate in Bd; `None` for a line without a rate.
+    /// Creates a line with this bit rate in Bd; `None` means that the line has no bit rate.
     pub fn new(baud: Option<u32>) -> Self {
         Self {
             clients: BTreeMap::new(),
@@ -130,13 +131,15 @@ impl SharedLine {
         let id = ClientId(self.next_id);
         self.next_id += 1;
         let mut client = Client::new(introduction);
-        // Earlier Stops do not block a new client. But its user may have decided before the Stop, so the hold-off applies.
+        // Earlier Stops do not block a new client. The user of this client may have decided before the Stop, however,
+        // so the hold-off applies.
         (client.asked_after, client.calm_until) = (self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
     }
 
-    /// Removes a client. Drops those of its frames that are not written yet, and applies its policy to its motion.
+    /// Removes a client. Drops the client's frames that are not written yet, and applies the client's policy to its
+    /// motion.
     pub fn leave(&mut self, client: ClientId, now: Duration) {
         let Some(gone) = self.clients.remove(&client) else { return };
         if let Some((outgoing, _)) = self.tx_queue.writing()
@@ -174,8 +177,8 @@ impl SharedLine {
     }
 
     /// Sends a Stop or a Pause of a client before all other frames, and repeats it until the controller confirms it.
-    /// Drops all frames that need the lease and are not written yet. The clients of these frames are told that `name`
-    /// stopped the arm.
+    /// Drops all frames that need the lease and are not written yet. The clients of these frames receive a notice that
+    /// `name` stopped the arm.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(client, client, name, command, now);
     }
@@ -185,7 +188,7 @@ impl SharedLine {
         self.halt_by(OWNER, client.unwrap_or(OWNER), name, command, now);
     }
 
-    /// Sends a Stop or a Pause whose record goes to `asker`. The hold-off does not apply to `own`.
+    /// Sends a Stop or a Pause, and delivers its record to `asker`. The hold-off does not apply to `own`.
     fn halt_by(&mut self, asker: ClientId, own: ClientId, name: &str, command: ExecCommand, now: Duration) {
         let name = name.to_owned();
         self.halted = (self.halted.0 + 1, name.clone(), command);
@@ -196,8 +199,8 @@ impl SharedLine {
             other.halts.stops += u64::from(command == ExecCommand::Stop);
         }
         self.halts.ask(asker, command);
-        // After a Stop the arm must hold its position. In Teaching it would be compliant. Teaching may also begin as soon as the
-        // arm is at rest, so it is ended in both cases.
+        // After a Stop, the arm must hold its position. In Teaching, the arm would be compliant. Teaching may also
+        // begin as soon as the arm is at rest. Teaching is therefore ended in both cases.
         if self.motion_tracker.may_teach(self.status.as_ref()) {
             self.motion_tracker.end_teaching(now);
         }
@@ -218,7 +221,7 @@ impl SharedLine {
         }
     }
 
-    /// Takes bytes that a client has sent, in pieces of any length.
+    /// Processes bytes that a client has sent, in pieces of any length.
     pub fn from_client(&mut self, id: ClientId, mut bytes: &[u8], now: Duration) {
         loop {
             let Some(client) = self.clients.get_mut(&id) else { return };
@@ -274,7 +277,7 @@ impl SharedLine {
     fn may_send(&mut self, id: ClientId, frame: &HostFrame, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         let motion = frame.class == FrameClass::Motion;
-        // If a client stopped the motion, its upload ends at once.
+        // If a client stopped the motion, the upload of the motion ends at once.
         if (motion || frame.frame_type == FrameType::Trajectory) && self.is_halted(id) {
             return Err(self.stopped(id));
         }
@@ -284,8 +287,8 @@ impl SharedLine {
         self.may_command(id, now)
     }
 
-    /// Returns an error during the hold-off after a Stop or a Pause of another client. Each refused attempt extends the hold-off to
-    /// `again` from now.
+    /// Returns an error during the hold-off after a Stop or a Pause of another client. Each refused request extends the
+    /// hold-off to at least `again` from now.
     fn is_calm(&mut self, id: ClientId, now: Duration, again: Duration) -> Result<(), Denied> {
         match self.clients.get_mut(&id) {
             Some(client) if now < client.calm_until => {
@@ -317,7 +320,7 @@ impl SharedLine {
     }
 
     /// Like [`ask_to_move`](Self::ask_to_move), for a request that is repeated while a key is pressed. Each refused
-    /// repetition extends the hold-off, so the arm moves again only after the key was released.
+    /// repetition extends the hold-off, so that the arm moves again only after the key was released.
     ///
     /// # Errors
     ///
@@ -327,7 +330,7 @@ impl SharedLine {
     }
 
     /// Returns an error if the lease or a Stop of another client prevents a jog of this client now. Each refused
-    /// attempt extends the hold-off.
+    /// request extends the hold-off.
     ///
     /// # Errors
     ///
@@ -375,7 +378,7 @@ impl SharedLine {
         self.clients.get(&id).map(|client| client.halts).unwrap_or_default()
     }
 
-    /// Number of the last Stop or Pause.
+    /// Returns the number of the last Stop or Pause.
     pub fn last_halt(&self) -> u64 {
         self.halted.0
     }
@@ -385,15 +388,15 @@ impl SharedLine {
         (&self.halted.1, self.halted.2)
     }
 
-    /// Stops the arm because the agent ends. Prevents the motions that clients still prepare.
+    /// Stops the arm because the agent ends. Also prevents motions that clients still prepare.
     pub fn end(&mut self, now: Duration) {
         self.halt(OWNER, "the agent, which ended", ExecCommand::Stop, now);
         self.motion_tracker.end_teaching(now);
     }
 
-    /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to be at rest, because the
-    /// last status is older than the last command. In this case the controller may refuse the command, and other
-    /// clients are not affected. Returns true if the arm may have been moving.
+    /// Stops or pauses every motion on behalf of the owner. Sends the command even if the arm seems to be at rest,
+    /// because the last status is older than the last command. In this case the controller may refuse the command, and
+    /// other clients are not affected. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.motion_tracker.may_move(self.status.as_ref(), now);
         if moved {
@@ -410,7 +413,7 @@ impl SharedLine {
         self.motion_tracker.may_move(self.status.as_ref(), now)
     }
 
-    /// Returns true if no frame waits for the line and no Stop waits for its record.
+    /// Returns true if no frame waits for the line and no Stop waits for the record of the controller.
     pub fn is_idle(&self) -> bool {
         self.halts.are_done() && self.motion_tracker.due().is_none() && self.tx_queue.is_free()
     }
@@ -442,12 +445,12 @@ impl SharedLine {
         self.leave(client, now);
     }
 
-    /// Takes the deliveries that are queued for a client. `None`: the client is disconnected.
+    /// Removes and returns the deliveries that are queued for a client. Returns `None` if the client is disconnected.
     pub fn take_deliveries(&mut self, client: ClientId) -> Option<Vec<Delivery>> {
         self.clients.get_mut(&client).map(Client::take_deliveries)
     }
 
-    /// Takes the events since the last call.
+    /// Removes and returns the events since the last call.
     pub fn take_events(&mut self) -> Vec<LineEvent> {
         let events: Vec<LineEvent> = self.events.drain(..).collect();
         events.iter().for_each(|event| self.counts.count(event));
@@ -464,7 +467,7 @@ impl SharedLine {
         self.receiver.counters()
     }
 
-    /// Returns the approximate time: the arrival time of the last status.
+    /// Returns the approximate present time, which is the arrival time of the last status.
     fn now(&self) -> Duration {
         self.status.map_or(Duration::ZERO, |(at, _)| at)
     }

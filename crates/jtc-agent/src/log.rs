@@ -1,4 +1,4 @@
-//! Entries of a line in the log of commands.
+//! Entries for the events of a serial line in the command log.
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value, json};
@@ -8,13 +8,13 @@ pub use agent_kit::log::{CommandLog, LIMIT};
 use crate::line::LineEvent;
 use crate::owner::Observer;
 
-/// Returns an observer that writes the events of a line to a log of commands.
+/// Returns an observer that writes the events of a line to a command log.
 pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     Box::new(move |_, event| {
         let Some((what, facts)) = logged(event) else { return };
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
         match event {
-            // This includes frames of clients with read-only access.
+            // Refused frames of clients with read-only access are included.
             LineEvent::Denied { client, .. } => {
                 log.write_repeated(what, &format!("client {}", client.0), facts)
             }
@@ -24,7 +24,7 @@ pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     })
 }
 
-/// Returns the log entry of an event: its name and facts. `None`: the event is logged elsewhere.
+/// Returns the log entry for an event, with name and data. Returns `None` if the event is logged elsewhere.
 fn logged(event: &LineEvent) -> Option<(&'static str, Value)> {
     Some(match event {
         LineEvent::Sent { client, frame_type, .. } => {

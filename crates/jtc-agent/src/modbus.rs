@@ -1,4 +1,4 @@
-//! Modbus TCP for a PLC: the arm as a map of registers.
+//! Modbus TCP server, through which a PLC accesses the arm as a map of registers.
 //!
 //! [`pdu`] contains the protocol and [`map`] the registers. [`handshake`] turns register writes into commands, and each
 //! command is executed once. [`plc`] decides which of several connections may command. `act` executes the commands with
@@ -24,8 +24,8 @@ pub use server::Server;
 
 use crate::access::TokenError;
 
-/// Returns a random first sequence number for a new agent, so that a PLC that repeats old writes does not send the next
-/// valid number by chance.
+/// Returns a random first sequence number for a new agent, so that a PLC that repeats old writes does not by chance
+/// send the next valid number.
 ///
 /// # Errors
 ///

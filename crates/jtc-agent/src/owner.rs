@@ -1,4 +1,4 @@
-//! Owner of a port: one thread that reads and writes it for all clients.
+//! Owner of a serial port: one thread that reads and writes the port for all clients.
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -12,14 +12,14 @@ use tokio::sync::watch;
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
 use crate::upload::Upload;
 
-/// Longest wait for bytes of the controller before the owner checks the requests of clients. A Stop waits no longer
-/// than this.
+/// Longest wait for bytes of the controller before the owner checks the requests of clients. This is also the longest
+/// time for which a Stop waits.
 const TURN: Duration = Duration::from_millis(2);
 
 /// Longest time that the owner waits for data in flight before it ends.
 const LAST_TURNS: Duration = Duration::from_secs(1);
 
-/// Callback for each event, on the owner's thread; it must return soon.
+/// Callback for each event, on the owner's thread; the callback must return quickly.
 pub type Observer = Box<dyn FnMut(Duration, &LineEvent) + Send>;
 
 struct State {
@@ -30,7 +30,7 @@ struct State {
 
 struct Shared {
     state: Mutex<State>,
-    /// Signals deliveries to blocking callers. Asynchronous callers use the channel.
+    /// Condition that signals deliveries to blocking callers. Asynchronous callers use the channel instead.
     delivered: Condvar,
     changed: watch::Sender<()>,
     /// Trajectory that was sent to the controller.
@@ -45,7 +45,8 @@ struct Shared {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // The lock is used even after a panic of another thread: a Stop is more important than a complete state.
+        // The lock is used even after a panic of another thread, because a Stop is more important than a complete
+        // state.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -74,17 +75,17 @@ impl Drop for Gone<'_> {
 pub struct Line(Arc<Shared>);
 
 impl Line {
-    /// Returns the time of the line, counted from the start of its owner.
+    /// Returns the time of the line since the start of its owner thread.
     pub fn now(&self) -> Duration {
         self.0.now()
     }
 
-    /// Calls a function with the line and its present time.
+    /// Calls a function with the line and the present time of the line.
     pub fn with<T>(&self, act: impl FnOnce(&mut SharedLine, Duration) -> T) -> T {
         act(&mut self.0.lock().line, self.0.now())
     }
 
-    /// Returns the rate of the line, Bd, if it has one.
+    /// Returns the bit rate of the line in Bd, or `None` if it has no bit rate.
     pub fn baud(&self) -> Option<u32> {
         self.0.baud
     }
@@ -101,7 +102,7 @@ impl Line {
 
     /// Waits for a delivery, at most for `timeout`.
     pub fn wait(&self, timeout: Duration) {
-        // The caller itself checks why it was woken.
+        // The caller itself checks the reason for the end of the wait.
         drop(self.0.delivered.wait_timeout(self.0.lock(), timeout));
     }
 
@@ -115,7 +116,7 @@ impl Line {
         self.0.lock().lost.clone()
     }
 
-    /// Returns the values of a status. Adds the commanded values, which a status does not contain, if the executed
+    /// Returns the values in a status. Adds the commanded values, which a status does not contain, if the executed
     /// trajectory was seen on the line. `delay_ticks` is the age of the measurements in ticks (J-62).
     pub fn sample(&self, status: &Status, delay_ticks: u8) -> Sample {
         let given = self.0.upload.lock().unwrap_or_else(PoisonError::into_inner).trajectory(false);
@@ -153,7 +154,7 @@ impl Line {
     }
 }
 
-/// Guard that keeps a client on the line and removes it on drop.
+/// Guard of a client on the line, which removes the client on drop.
 pub struct Joined {
     line: Line,
     client: ClientId,
@@ -210,7 +211,7 @@ impl Owner {
     fn join(&mut self) {
         self.line.0.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of that thread has been printed.
+            // A panic of the owner thread was already printed.
             drop(thread.join());
         }
     }
@@ -222,7 +223,7 @@ impl Drop for Owner {
     }
 }
 
-/// Reads and writes until the port is lost, or the owner was ended and no data is in flight.
+/// Reads and writes until the port is lost, or until the owner must end and no data is in flight.
 fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     let mut gone = Gone(shared, "internal error of the agent".to_owned());
     let mut last_turns = None;
@@ -242,7 +243,7 @@ fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     }
 }
 
-/// Writes the waiting bytes, reads the received ones, and calls the observer.
+/// Writes the waiting bytes, reads the received bytes, and calls the observer.
 fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Result<(), PortError> {
     let (now, bytes, due) = {
         let mut state = shared.lock();
@@ -279,7 +280,7 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
 /// Connection of a client to the line.
 pub struct ClientPort {
     joined: Joined,
-    /// Bytes that were delivered and not read yet.
+    /// Bytes that were delivered but not read yet.
     read: Vec<u8>,
     denied: Option<Denied>,
 }
@@ -299,7 +300,7 @@ impl ClientPort {
         &self.joined.line.0
     }
 
-    /// Returns the deliveries; waits for them at most for `timeout`.
+    /// Returns the deliveries; waits at most `timeout` for deliveries.
     ///
     /// # Errors
     ///

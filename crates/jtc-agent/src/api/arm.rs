@@ -85,7 +85,7 @@ impl From<Given> for GivenObject {
     }
 }
 
-/// Returns the usual text form of a hash.
+/// Returns a hash as text.
 pub(super) fn in_words(hash: u64) -> String {
     format!("{hash:016x}")
 }
@@ -138,7 +138,7 @@ pub(super) async fn put_arm(
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }
 
-/// Returns the arm in a text. Returns an error if a controller would not accept the arm.
+/// Parses an arm from a text. Returns an error if a controller would not accept the arm.
 pub(super) fn taken(text: &str) -> Result<Arm, Problem> {
     let arm = Arm::parse(text).map_err(|error| {
         let error = error.in_file("text".as_ref());

@@ -1,4 +1,5 @@
-//! Long request bodies. Only a limited number is read at the same time, outside the threads that serve requests.
+//! Long request bodies. Only a limited number of large bodies is read at the same time, outside the threads that serve
+//! requests.
 use agent_kit::api::Problem;
 use axum::Json;
 use axum::body::Bytes;
@@ -22,7 +23,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
     }
 }
 
-/// Reads a JSON body and converts it with `understand`. Completes even if the client disconnects.
+/// Reads a JSON body and converts it with `understand`. The conversion completes even if the client disconnects.
 pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     agent: &Agent,
     request: Request,
@@ -42,7 +43,7 @@ pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     .await?
 }
 
-/// Runs a slow function on a separate thread, so that other requests are served meanwhile.
+/// Runs a slow function on a separate thread, so that other requests are served at the same time.
 pub(super) async fn blocking<T: Send + 'static>(
     act: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Problem> {

@@ -102,7 +102,7 @@ impl Agent {
         loop {
             tokio::select! {
                 done = &mut acting => return done?,
-                // A client that waits for an answer is alive, so its lease is renewed.
+                // A client that waits for an answer is still connected, so its lease is renewed.
                 () = tokio::time::sleep(RENEWED) => self.line.with(|line, now| line.renew(client, now)),
             }
         }

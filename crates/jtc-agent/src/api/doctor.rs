@@ -1,4 +1,4 @@
-//! Diagnosis of link, bus and set-up, like `jtc doctor`.
+//! Diagnosis of connection, bus and set-up, like `jtc doctor`.
 use std::time::Duration;
 
 use agent_kit::api::{Problem, Refusals};
@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 use super::Agent;
 use super::error::Denials;
 
-/// Listening time: 50 statuses.
+/// Time for which the agent listens: the duration of 50 statuses.
 const LISTEN: Duration = Duration::from_secs(2);
 
 /// Result of a diagnosis.
@@ -76,7 +76,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
         Some(status) => absent(&agent, status).await?,
         None => Vec::new(),
     };
-    // A held stop and an encoder jump exist only under torque.
+    // Held Stops and encoder jumps exist only while joints have torque.
     let reactions = match &status {
         Some(status) if labels::has_torque(status) => agent.ask(|session| Ok(session.reactions())).await?,
         _ => None,
@@ -99,8 +99,8 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     Ok(Json(DoctorObject { healthy, listened_s: time_s, statuses, findings }))
 }
 
-/// Returns the joints that the user has declared absent. Asks the controller for them, because the status has no bit
-/// for an absent joint whose drive answers (J-53).
+/// Returns the joints that the user has declared absent. Requests this list from the controller, because the status has
+/// no bit for an absent joint whose drive answers (J-53).
 async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
         return Ok(labels::absent(status));

@@ -1,4 +1,4 @@
-//! Error answers of the API. All errors use one type of object.
+//! Errors that the API returns. All errors use one type of object.
 use std::collections::BTreeMap;
 
 use agent_kit::api::Problem;

@@ -51,7 +51,7 @@ pub(super) async fn list() -> Json<Vec<PageObject>> {
     )
 )]
 pub(super) async fn explain(Number(code): Number<String>) -> Result<Json<PageObject>, Problem> {
-    // The page with exactly this name takes precedence over pages that contain the same words.
+    // The page with exactly this name comes before pages that contain the same words.
     let fitting = named(&code).map_or_else(|| find(&code), |page| vec![page]);
     let (first, others) = fitting.split_first().ok_or_else(|| {
         let message = format!("no page explains \"{}\"", agent_kit::gate::plain(&code));

@@ -1,9 +1,9 @@
 //! Live data for Foxglove, Lichtblick and PlotJuggler: the Foxglove WebSocket protocol, with the messages of
 //! recordings.
 //!
-//! A client gets the latest values at most 25 times a second. Pings show how far the client has read. While a ping is
-//! unanswered no values are sent, so a slow client loses messages but always sees recent data. A client that does not
-//! read at all is disconnected.
+//! A client receives the latest values at most 25 times a second. Pings show how far the client has read. While a ping
+//! is unanswered, no values are sent. A slow client therefore loses messages but always sees recent data. A client that
+//! does not read at all is disconnected.
 mod channels;
 mod protocol;
 
@@ -35,7 +35,7 @@ use super::{Agent, Caller};
 
 /// Longest message of a client, bytes.
 const MESSAGE_MAX: usize = 64 << 10;
-/// Largest number of messages that a client may send: per second, and in one burst.
+/// Largest number of messages that a client may send, per second and in one burst.
 const MESSAGES_PER_S: f64 = 50.0;
 const MESSAGES_AT_ONCE: f64 = 500.0;
 /// Largest number of answers that wait for a client.
@@ -116,7 +116,8 @@ impl Shared {
 async fn serve(agent: &Agent, caller: &Caller, socket: WebSocket) {
     let shared = Shared { wanted: Mutex::default(), wake: Notify::new(), read: AtomicU64::new(0) };
     let (to, from) = socket.split();
-    // The two directions do not wait for each other. So a Stop is accepted even from a client that does not read.
+    // The two directions of the connection do not wait for each other. A Stop is therefore accepted even from a client
+    // that does not read.
     tokio::select! {
         () = receive(agent, caller, &shared, from) => {}
         () = Sender { agent, caller, shared: &shared, to, pinged: 0, pinged_at: Instant::now() }.run() => {}
@@ -194,7 +195,7 @@ fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
     })
 }
 
-/// Direction to the client.
+/// Connection state for messages to the client.
 struct Sender<'a> {
     agent: &'a Agent,
     caller: &'a Caller,
@@ -205,12 +206,12 @@ struct Sender<'a> {
     pinged_at: Instant,
 }
 
-/// Error: the client has disconnected, or the agent disconnects it.
+/// Reason why the connection ends: the client has disconnected, or the agent disconnects the client.
 struct Gone;
 
 impl Sender<'_> {
     async fn run(mut self) {
-        // Any error only ends the connection.
+        // Every error has the same effect: the connection ends.
         let _ = self.deliver().await;
     }
 
@@ -251,7 +252,7 @@ impl Sender<'_> {
         }
     }
 
-    /// Sends the first messages, which every client gets.
+    /// Sends the first messages, which every client receives.
     async fn greet(&mut self) -> Result<(), Gone> {
         let services: &[&str] = if self.caller.looks_only { &[] } else { &["services"] };
         let simulated = if self.agent.simulated { " (SIMULATED)" } else { "" };
@@ -290,7 +291,7 @@ impl Sender<'_> {
         Ok(())
     }
 
-    /// Sends the values of a status to all subscriptions. For an old status, sends only the text.
+    /// Sends the values of a status to all subscriptions. For an old status, sends only the text message.
     async fn values(
         &mut self,
         writer: &mut MessageWriter,
@@ -369,7 +370,7 @@ impl Sender<'_> {
     }
 }
 
-/// Returns the time `ago` before now, in ns since 1970.
+/// Returns the time that was `ago` before now, in ns since 1970.
 fn unix_ns(ago: Duration) -> u64 {
     u64::try_from(host_kit::unix_time().saturating_sub(ago).as_nanos()).unwrap_or(u64::MAX)
 }

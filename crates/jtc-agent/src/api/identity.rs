@@ -1,4 +1,4 @@
-//! Identity of the controller and its arm. The agent reads it when needed, and all clients share the answer.
+//! Identity of the controller and its arm. The agent reads it when needed, and uses the answer for all clients.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -8,24 +8,24 @@ use tokio::time::{Instant, timeout};
 
 use super::Agent;
 
-/// Time for which an answer is used before the controller is asked again.
+/// Time for which an answer is used before the agent queries the controller again.
 const FRESH: Duration = Duration::from_secs(10);
-/// Longest wait for the controller.
+/// Longest wait for an answer of the controller.
 const ASK_TIME: Duration = Duration::from_secs(3);
-/// Silence after which the controller is not asked.
+/// Duration of silence after which the agent does not query the controller.
 const SILENT: Duration = Duration::from_secs(1);
 
 /// Known identity of the controller.
 #[derive(Clone)]
 pub(super) struct Identity {
     asked: Option<Instant>,
-    /// Identity as the controller reports it; `None` without extensions, or before its first answer.
+    /// Identity that the controller reports; `None` if the controller has no extensions, or before its first answer.
     pub info: Option<Info>,
     /// Arm of the controller, or the agent's arm if the controller cannot return its own.
     pub arm: Arc<Arm>,
     /// Hash of the controller's arm.
     hash: Option<u64>,
-    /// Number of frames that may have changed the arm and were sent before the controller was asked.
+    /// Number of frames that may have changed the arm and were sent before the query.
     changes: u64,
 }
 
@@ -36,17 +36,17 @@ impl Identity {
         Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash, changes: 0 }
     }
 
-    /// Returns the identity that the controller reports, if the known arm is its arm in use.
+    /// Returns the identity that the controller reports, if the known arm is the arm that the controller uses.
     pub(super) fn of_controller(&self) -> Option<&Info> {
         self.info.as_ref().filter(|info| Some(info.hash) == self.hash)
     }
 }
 
 impl Agent {
-    /// Returns the identity of the controller. Asks the controller if the last answer is older than 10 s, or if its arm
-    /// may have changed since.
+    /// Returns the identity of the controller. Queries the controller if the last answer is older than 10 s, or if the
+    /// arm may have changed since then.
     pub(super) async fn identity(&self) -> Identity {
-        // Concurrent requests wait for the answer to the first one.
+        // Concurrent requests wait for the answer to the first request.
         let mut known = self.identity.lock().await;
         let changes = self.line.arm_changes();
         let old = known.asked.is_none_or(|asked| asked.elapsed() >= FRESH) || known.changes != changes;

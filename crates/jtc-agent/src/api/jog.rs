@@ -1,4 +1,4 @@
-//! Jogging by the lease holder: the arm moves while the user holds a key down and sees current statuses.
+//! Jogging by the lease holder. The arm moves only while the user holds a key down and sees current statuses.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Body, Problem, Refusals};
@@ -43,8 +43,8 @@ pub(super) struct KnownToJog {
     as_of_ms: Option<u64>,
 }
 
-/// Knowledge of the client. If the client does not send the number of the last Stop or Pause, it is filled in before
-/// the body is read, because the body may arrive slowly.
+/// Data that the client knew when it sent the request. If the client does not send the number of the last Stop or
+/// Pause, the agent sets this number before it reads the body, because the body may arrive slowly.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JogAsked {
     after: AskedAfter,
@@ -111,7 +111,7 @@ pub(super) async fn jog(
     // The arrival time is taken now, because the body may have arrived later than the head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
-        // After a Stop the user must release the key. So late requests of the key also extend the hold-off.
+        // After a Stop the user must release the key. Late requests of this key therefore also extend the hold-off.
         agent.line.with(|line, now| line.could_jog(http_session.client, now))?;
         return Err(late);
     }

@@ -1,4 +1,4 @@
-//! Lease of clients without a connection of their own. Each request shows that the holder is alive.
+//! Lease of clients without a connection of their own. Each request of the holder renews the lease.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -65,9 +65,10 @@ impl Agent {
         Ok(http_session)
     }
 
-    /// Like [`http_session`](Self::commander), for requests that may move the arm. Refuses requests that were made before
-    /// the last Stop or Pause, and all requests within three seconds after a Stop or Pause of another client. The turn
-    /// is taken first, so that this permission does not apply to requests that still wait for their turn.
+    /// Like [`http_session`](Self::commander), for requests that may move the arm. Refuses requests that were sent
+    /// before the last Stop or Pause, and all requests within three seconds after a Stop or Pause of another client.
+    /// The session of the client is reserved first, so that the permission to move does not apply to requests that
+    /// cannot begin yet.
     pub(super) fn mover(
         &self,
         asker: &Asker,
@@ -167,11 +168,11 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
     let (http_session, _) = agent.client(&asker)?;
     let turn = match http_session.turn() {
         Ok(turn) => Some(turn),
-        // The thread of the client has ended, so no job of it runs.
+        // The thread of the client has ended, so the client has no running job.
         Err(Unable::Gone) => None,
         Err(busy) => return Err(busy.into()),
     };
-    // If the client only waits for the lease, this has no effect.
+    // If the client only waits for the lease, this call has no effect.
     let _ = agent.line.with(|line, now| line.release_lease(http_session.client, now));
     agent.line.wake();
     agent.note("left", json!({ "client": http_session.client.0, "name": http_session.name }));

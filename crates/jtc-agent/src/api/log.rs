@@ -22,7 +22,7 @@ use crate::jobs::HttpSession;
 use crate::line::{Introduction, Policy};
 use crate::owner::ClientPort;
 
-/// Name of the file.
+/// Name of the log file.
 const FILE: &str = "flight-recorder.mcap";
 
 /// State of the flight recorder.
@@ -67,7 +67,7 @@ pub(super) struct LogJoint {
 }
 
 impl LogValues {
-    /// Returns the samples since the last start of the controller that are at most `last_s` older than the last one.
+    /// Returns the samples since the last start of the controller that are at most `last_s` older than the last sample.
     fn of(samples: &[Sample], last_s: f64) -> Self {
         let end = samples.last().map_or(0.0, |sample| sample.time_s);
         // A margin of half a tick is added, because the difference of two times in seconds is not exact.
@@ -181,7 +181,7 @@ pub(super) async fn values(
     from_log(&agent, &caller, last).await.map(Json)
 }
 
-/// Reads the log and converts it. Only operators may do this, one request at a time.
+/// Reads the log and converts it. Only operators may read the log, one request at a time.
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
@@ -194,7 +194,7 @@ async fn from_log<T: Send + 'static>(
         let next = "send the request again after some seconds";
         Problem::new("busy", "another client is reading the log of the flight recorder", next)
     })?;
-    // Uses a separate client, so that other questions do not wait for the log.
+    // Uses a separate client, so that other queries do not wait for the log.
     let name = format!("{}: log", caller.peer);
     let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
     let reader = HttpSession::new(&agent.line, introduction);

@@ -1,4 +1,4 @@
-//! Metrics of controller, arm, line and agent in the text format of Prometheus.
+//! Metrics of the controller, arm, serial line and agent, in the Prometheus text format.
 use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
@@ -10,10 +10,10 @@ use prometheus::{CounterVec, GaugeVec, Opts, Registry, TextEncoder};
 use super::Agent;
 use agent_kit::api::{Problem, Refusals};
 
-/// Content type of the Prometheus text format. Programs that prefer another format accept this one as well.
+/// Content type of the Prometheus text format. Programs that prefer another format also accept this type.
 const FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-/// Value with the values of its labels.
+/// Value of a metric, with the values of its labels.
 type Labelled = (Vec<String>, f64);
 
 /// Page of metrics.
@@ -60,7 +60,7 @@ impl Page {
         self.counters(name, help, &[], [("", value)])
     }
 
-    /// Adds a state: 1 for the current state, 0 for the others.
+    /// Adds a state: 1 for the current state, 0 for all other states.
     fn state(&self, name: &str, help: &str, all: &[&'static str], is: &str) -> prometheus::Result<()> {
         let unknown = (!all.contains(&is)).then_some(is);
         let states = all.iter().copied().chain(unknown);

@@ -1,4 +1,4 @@
-//! Arm model for display: frames, limits and masses. All readers share the answers of the controller.
+//! Arm model for display: frames, limits and masses. The agent uses one answer of the controller for all readers.
 use agent_kit::api::Refusals;
 use axum::Json;
 use axum::extract::State;

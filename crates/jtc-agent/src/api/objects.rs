@@ -150,17 +150,17 @@ impl From<Payload> for PayloadObject {
     }
 }
 
-/// Held stop and encoder state that the controller has reported.
+/// Held Stop and encoder state that the controller has reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
-    /// Cause and age in ms of the current held stop.
+    /// Cause and age (ms) of the current held Stop.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints with an encoder jump, one bit each.
+    /// Joints with an encoder jump, one bit per joint.
     pub jumped: u8,
 }
 
 impl Found {
-    /// Returns the next step.
+    /// Returns the next step for the user.
     fn next_step(&self, status: &Status) -> Next {
         if self.jumped != 0 && !status.is_held_stop() {
             return held_stop::after_encoder_jump();

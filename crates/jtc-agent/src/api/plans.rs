@@ -1,4 +1,4 @@
-//! Planning of trajectories through waypoints, as fast as the limits allow.
+//! Planning of the fastest trajectories through waypoints within the limits.
 use std::path::Path;
 use std::sync::Arc;
 
@@ -228,7 +228,7 @@ pub(super) async fn plan(
     caller.operator()?;
     let (request, file) = read(&agent, request, understood).await?;
     if let Some(KeepRequest { number, new: true, .. }) = request.keep {
-        // The number is checked before the plan is made, because planning takes time.
+        // The trajectory number is checked before planning, because planning takes time.
         agent.jobs.store.is_free(number).map_err(|e| Problem::of(&e))?;
     }
     let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
@@ -244,7 +244,7 @@ pub(super) async fn plan(
         Ok((arm, device))
     };
     let (arm, device) = agent.ask(asked).await?;
-    // This is dropped when the client that waits for the plan disconnects.
+    // This value is dropped when the client that waits for the plan disconnects.
     let waits = Arc::new(());
     let waited_for = Arc::downgrade(&waits);
     let plan = blocking(move || {
@@ -269,8 +269,8 @@ pub(super) async fn plan(
     Ok(Json(plan))
 }
 
-/// Returns the error for a plan whose client no longer waits. Meanwhile the client may have stored another trajectory
-/// under the number.
+/// Returns the error for a plan whose client no longer waits. In the meantime the client may have stored another
+/// trajectory under this number.
 fn abandoned() -> Problem {
     Problem::new(
         "abandoned",
@@ -279,7 +279,7 @@ fn abandoned() -> Problem {
     )
 }
 
-/// Returns the waypoints of a request if they can be planned.
+/// Returns the waypoints of a request if they are valid for planning.
 fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Problem> {
     let refused = |what: &str, message: String, value: f64, limit: f64| {
         let facts = Facts::beyond(value, limit);
@@ -365,7 +365,7 @@ fn planned(
     Ok(planned)
 }
 
-/// Returns the answer. If the client requested it, keeps the trajectory.
+/// Returns the answer. Stores the trajectory if the client requested this.
 fn kept(
     agent: &Agent,
     request: &PlanRequest,

@@ -58,7 +58,7 @@ impl Agent {
         poses
     }
 
-    /// Returns a pose for display, with its violations of the limits of the arm in use.
+    /// Returns a pose for display, with its violations of the limits of the arm that the controller uses.
     fn shown(&self, arm: &Arm, name: String, positions_rad: [f64; 6]) -> PoseObject {
         let from =
             if self.jobs.arm().poses.contains_key(&name) { PoseFrom::ArmFile } else { PoseFrom::Agent };

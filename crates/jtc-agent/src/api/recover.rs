@@ -1,4 +1,4 @@
-//! Recovery to position hold.
+//! Recovery of the arm to position hold.
 use std::sync::Arc;
 
 use agent_kit::api::{Problem, Refusals};
@@ -39,7 +39,7 @@ pub(super) struct RecoverRequest {
 }
 
 impl RecoverRequest {
-    /// Returns the source of the parameters for a controller that lacks some of them.
+    /// Returns the source of the parameters that the controller lacks.
     fn parameters(self) -> Result<RecoverParameters, Problem> {
         let Self { defaults, arm, accept_device_limits } = self;
         match arm {

@@ -1,4 +1,4 @@
-//! Reports of motions, as pages.
+//! Reports of motions as web pages.
 use agent_kit::api::{Number, Problem, Refusals};
 use axum::extract::State;
 use axum::http::{HeaderName, header};
@@ -9,7 +9,7 @@ use super::body::blocking;
 use super::runs::found;
 use crate::jobs::Stage;
 
-/// Content security policy of a report. The policy permits the report's own script and style, and no access to this
+/// Content security policy of a report. The policy permits the report's own script and style, but no access to this
 /// agent or any other server.
 const PAGE_POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; frame-ancestors 'self'";
 

@@ -1,4 +1,4 @@
-//! Runs and moves as jobs, and their results.
+//! Jobs that run trajectories or move to a target, and the results of these jobs.
 use std::sync::Arc;
 
 use agent_kit::api::{Body, Number, Problem, Refusals};
@@ -281,7 +281,7 @@ pub(super) async fn begin_move(
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {
-            // The permission is checked first, so that a client without it does not get another error.
+            // The permission is checked first, so that a client without permission does not receive another error.
             agent.http_session(&asker)?;
             let arm = Arm { poses: agent.poses(), ..(*agent.identity().await.arm).clone() };
             let to = arm.pose(&name).map_err(|error| pose_error(&error))?;
@@ -332,8 +332,8 @@ fn begin(
     let job = agent.jobs.begin(&http_session, turn, what.clone(), move |task, session| {
         let (done, error) = run(task, session, &order);
         task.line.with(|line, now| {
-            // If the result is uncertain and the motion may continue, the policy from the start of the motion stays in
-            // force.
+            // If the result is uncertain and the motion may continue, the policy from the start of the motion stays
+            // valid.
             if error.is_none() || !line.may_move(now) {
                 line.set_policy(client, own);
             }

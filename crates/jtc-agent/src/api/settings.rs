@@ -1,5 +1,5 @@
-//! Settings of the controller: reading them, and changing a list of them. Either all settings of a list are changed, or
-//! none.
+//! Reading of the controller's settings, and changing of a list of settings. Either all settings of a list are changed,
+//! or none of them.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
@@ -129,7 +129,7 @@ impl SettingsRequest {
         Ok(values)
     }
 
-    /// Returns the text for the log of commands.
+    /// Returns the text for the command log.
     fn words(&self) -> String {
         let all: Vec<String> =
             self.settings.iter().map(|change| format!("{} = {}", change.words(), change.value)).collect();
@@ -210,7 +210,7 @@ fn short(name: &str) -> String {
     agent_kit::gate::plain(name)
 }
 
-/// Returns the error for a refused change; no part of the change was applied.
+/// Returns the error for a refused change; no setting was changed.
 fn none(message: String, next: &'static str) -> Problem {
     Problem::new(CODE, message, next).kind(ErrorKind::Usage)
 }

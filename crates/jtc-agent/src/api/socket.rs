@@ -1,5 +1,5 @@
-//! Connection of a client to the line as a WebSocket: binary messages are bytes of the line, text messages are notices
-//! of the agent.
+//! Connection of a client to the line as a WebSocket: binary messages contain bytes of the line, text messages contain
+//! notices of the agent.
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -24,19 +24,19 @@ const MESSAGE_MAX: usize = 64 << 10;
 const SEND_TIME: Duration = Duration::from_secs(5);
 /// Interval of the pings that check whether a client is alive.
 const PING_TIME: Duration = Duration::from_secs(1);
-/// Number of unanswered pings in a row after which the client loses the lease.
+/// Number of consecutive unanswered pings after which the client loses the lease.
 const SILENT_MAX: u32 = 4;
-/// Close code of a client that the agent disconnected: it sent invalid bytes or too many frames, did not read, or was
-/// silent while it held the lease.
+/// Close code for a client that the agent disconnects. The client sent invalid bytes or too many frames, did not read,
+/// or was silent while it held the lease.
 pub const CLOSE_PUT_OUT: u16 = 4000;
 
-/// Introduction of a client, in the address of the socket.
+/// Data that a client sends about itself in the URL of the WebSocket.
 #[derive(Clone, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Joining {
-    /// Name of the client for people.
+    /// Name of the client that users see.
     name: Option<String>,
-    /// Policy for its motion when it disconnects.
+    /// Policy for the client's motion when the client disconnects.
     #[serde(default)]
     policy: Policy,
 }
@@ -46,7 +46,7 @@ pub(super) struct Joining {
 pub struct Hello {
     /// Name of the port.
     pub port: String,
-    /// Rate of the line, Bd, if it has one.
+    /// Bit rate of the serial line, Bd; `None` if the connection has no bit rate.
     pub baud: Option<u32>,
     /// `true` if the controller is simulated: no real arm moves.
     pub simulated: bool,
@@ -70,16 +70,16 @@ pub enum Notice {
         /// Reason.
         why: String,
     },
-    /// Stop or Pause of the arm. Earlier requests of this client no longer move the arm, until it sends a new request:
-    /// `{"asked_after": number}`.
+    /// Stop or Pause of the arm. Earlier requests of this client no longer move the arm, until the client sends a new
+    /// request: `{"asked_after": number}`.
     Halted {
         /// Number of this Stop or Pause.
         number: u64,
-        /// Name of the client that requested it.
+        /// Name of the client that requested this Stop or Pause.
         by: String,
         /// Command.
         command: String,
-        /// Stops and Pauses of other clients since this client connected.
+        /// Number of Stops and Pauses of other clients since this client connected.
         of_others: Halts,
     },
     /// Request of another client for the lease.
@@ -151,8 +151,8 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
     note("left", json!({ "client": client.0, "name": name }));
 }
 
-/// Passes messages in both directions until one end disconnects. The directions do not wait for each other, so a Stop
-/// is read even if the client does not read.
+/// Passes messages in both directions until one end disconnects. The directions do not wait for each other, so the
+/// agent receives a Stop even if the client does not read.
 async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
     let alive = AtomicBool::new(true);
     let (to, from) = socket.split();
@@ -179,11 +179,11 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
 async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);
-    // After a delay of this computer the missed pings are not made up for, so that the delay is not taken for silence
-    // of the client.
+    // After a delay of this computer, the agent does not send the missed pings later, so that it does not count the
+    // delay as silence of the client.
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut silent = 0;
-    // The client knows all Stops and Pauses from before it connected.
+    // A client counts as informed about all Stops and Pauses before it connected.
     let mut known = line.with(|line, _| line.asked_after(client)).unwrap_or_default();
     loop {
         let (deliveries, halt) = line.with(|line, _| {
@@ -258,7 +258,7 @@ fn wish(line: &Line, client: ClientId, text: &str) {
     line.wake();
 }
 
-/// Sends a message. Returns `false` if the client does not receive it.
+/// Sends a message. Sends a message; returns `false` if the client does not receive the message.
 async fn send(to: &mut SplitSink<WebSocket, Message>, message: Message) -> bool {
     matches!(tokio::time::timeout(SEND_TIME, to.send(message)).await, Ok(Ok(())))
 }

@@ -1,4 +1,4 @@
-//! Trajectories by number: keeping, checking and listing them.
+//! Storing, checking and listing of trajectories, which are identified by numbers.
 use std::sync::Arc;
 
 use agent_kit::api::{Asked, Number, Problem, Refusals};
@@ -243,7 +243,7 @@ pub(super) async fn put(
     Ok(Json(kept.await?))
 }
 
-/// Keeps the trajectory in `text` under a number. If `new` is `true`, only if the number is free.
+/// Stores the trajectory in `text` under a number. If `new` is `true`, stores it only if the number is free.
 pub(super) fn keep(
     agent: &Agent,
     (number, new): (u16, bool),
@@ -313,7 +313,7 @@ pub(super) async fn points(
     Ok(Json(PointsObject::new(&*kept(&agent, number)?, most)))
 }
 
-/// Returns the trajectory that is kept under a number.
+/// Returns the trajectory that is stored under a number.
 fn kept(agent: &Agent, number: u16) -> Result<Arc<Stored>, Problem> {
     agent.jobs.store.get(number).ok_or_else(|| Problem::nothing("trajectory", number, "/api/trajectories"))
 }

@@ -1,4 +1,4 @@
-//! Session of an HTTP client without a connection to the line: each request shows that the client is alive.
+//! Session of an HTTP client, which has no connection to the line. Each request is a sign of life of the client.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -26,15 +26,15 @@ type Work = Box<dyn FnOnce(&mut Session<ClientPort>) + Send>;
 pub struct HttpSession {
     /// Number of the client on the line.
     pub client: ClientId,
-    /// Name of the client for people.
+    /// Name of the client that users see.
     pub name: String,
     work: SyncSender<Work>,
-    /// Permits one function at a time.
+    /// Semaphore that permits one function at a time.
     free: Arc<Semaphore>,
     /// Current job, and the queue of requests while it runs.
     job: Mutex<Option<(u64, SyncSender<Wish>)>>,
     seen: Mutex<Instant>,
-    /// Policy of its lease.
+    /// Policy of the client's lease.
     pub policy: Policy,
     /// `true` while a motion runs, which accepts requests.
     moves: AtomicBool,
@@ -48,25 +48,25 @@ pub struct Wish {
     pub done: oneshot::Sender<Result<(), Problem>>,
 }
 
-/// Permit to use the session of a client. The turn ends on drop.
+/// Permit to use the session of a client. The permit is returned on drop.
 pub struct Turn(#[expect(dead_code, reason = "held until it is over")] OwnedSemaphorePermit);
 
 /// Reason why the session of a client cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unable {
-    /// The session is in use. Contains the number of the job that uses it, if there is one.
+    /// The session is busy. Contains the number of the job that uses the session, if any.
     Busy(Option<u64>),
     /// The line was lost, or the client was disconnected.
     Gone,
 }
 
 impl HttpSession {
-    /// Adds a client to this line.
+    /// Adds a client to the line in the argument.
     pub fn new(line: &Line, introduction: Introduction) -> Arc<Self> {
         let (name, policy) = (introduction.name.clone(), introduction.policy);
         let port = line.connect(introduction);
         let client = port.client();
-        // The channel has room for the next function while the thread receives the last one.
+        // The channel has space for the next function while the thread receives the previous function.
         let (work, incoming) = sync_channel(1);
         std::thread::spawn(move || serve(port, &incoming));
         let seen = Mutex::new(Instant::now());
@@ -74,7 +74,7 @@ impl HttpSession {
         Arc::new(Self { client, name, policy, work, free, job, seen, moves })
     }
 
-    /// Notes that the client has sent a request.
+    /// Records that the client has sent a request.
     pub fn see(&self) {
         *self.seen.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
     }
@@ -89,15 +89,15 @@ impl HttpSession {
         self.moves.store(true, Ordering::Release);
     }
 
-    /// Marks the end of a motion. Drops the requests that came too late, together with their result channels. So their
-    /// clients learn that the motion has ended.
+    /// Marks the end of a motion. Drops the requests that arrived too late, together with their result channels. The
+    /// closed channels tell the clients that the motion has ended.
     pub fn motion_ended(&self, wishes: &Receiver<Wish>) {
         let _job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
         self.moves.store(false, Ordering::Release);
         while wishes.try_recv().is_ok() {}
     }
 
-    /// Returns the time since the last request of the client; 0 while its session is in use.
+    /// Returns the time since the last request of the client; 0 while the session of the client is busy.
     pub fn idle(&self) -> Duration {
         if self.free.available_permits() == 0 {
             return Duration::ZERO;
@@ -110,7 +110,7 @@ impl HttpSession {
         self.job.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(|(job, _)| *job)
     }
 
-    /// Returns the turn if the session is free.
+    /// Returns a permit for the session if the session is free.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ impl HttpSession {
         self.free.clone().try_acquire_owned().map(Turn).map_err(|_| Unable::Busy(self.job()))
     }
 
-    /// Waits for the turn and runs a short function.
+    /// Waits for a permit and runs a short function on the session.
     ///
     /// # Errors
     ///
@@ -132,7 +132,7 @@ impl HttpSession {
         self.act(Turn(turn), act).await
     }
 
-    /// Runs a function in the given turn.
+    /// Runs a function on the session with this permit.
     ///
     /// # Errors
     ///
@@ -145,7 +145,8 @@ impl HttpSession {
         let (done, result) = oneshot::channel();
         let work: Work = Box::new(move |session| {
             let came = act(session);
-            // The session is free before the caller receives the result, so that it can send its next request at once.
+            // The session is free before the caller receives the result, so that the caller can send its next request
+            // at once.
             drop(turn);
             // The function has run even if its caller has disconnected.
             let _ = done.send(came);
@@ -154,7 +155,8 @@ impl HttpSession {
         result.await.map_err(|_| Unable::Gone)
     }
 
-    /// Runs a function in the given turn, without a waiting caller. Has no effect if the line was lost.
+    /// Runs a function on the session with this permit; the caller does not wait. The call has no effect if the line
+    /// was lost.
     pub fn tell(&self, turn: Turn, act: impl FnOnce(&mut Session<ClientPort>) + Send + 'static) {
         let work: Work = Box::new(move |session| {
             act(session);
@@ -163,8 +165,8 @@ impl HttpSession {
         drop(self.work.try_send(work));
     }
 
-    /// Begins a job, which receives the client's requests while it runs. After the job, when the session is free again,
-    /// `then` is called with the job's result.
+    /// Begins a job, which receives the client's requests while the job runs. After the job, when the session is free
+    /// again, `then` is called with the job's result.
     ///
     /// # Errors
     ///
@@ -194,7 +196,7 @@ impl HttpSession {
         })
     }
 
-    /// Sends a request to the running motion and waits for its result. `None`: no motion runs.
+    /// Sends a request to the running motion and waits for its result. Returns `None` if no motion runs.
     pub async fn wish(&self, flow: Flow) -> Option<Result<(), Problem>> {
         let done = self.wished(flow)?;
         Some(done.await.unwrap_or_else(|_| {
@@ -216,8 +218,8 @@ impl HttpSession {
     }
 }
 
-/// Runs the queued functions until no caller is left. Meanwhile it reads the deliveries, because the line disconnects a
-/// client that does not read.
+/// Runs the queued functions until no caller remains. Between the functions, it reads the deliveries, because the line
+/// disconnects a client that does not read.
 fn serve(port: ClientPort, work: &Receiver<Work>) {
     let mut session = Session::new(port);
     loop {

@@ -8,11 +8,12 @@ use jtc_host::arm::{Poses, is_pose_name};
 
 /// Largest number of poses.
 pub const POSES_MAX: usize = 200;
-/// Name of the file.
+/// Name of the pose file.
 const FILE: &str = "poses.json";
 /// Version of the file format.
 const FORMAT: u8 = 1;
-/// Positions are rounded to 1 µrad, as in arm files. At the end of an arm of one metre this is a micrometre.
+/// Positions are rounded to 1 µrad, as in arm files. At the end of an arm that is one metre long, 1 µrad corresponds to
+/// one micrometre.
 const DECIMALS: f64 = 1e6;
 
 /// Reason why a pose is not stored.
@@ -70,7 +71,7 @@ struct Kept {
 pub struct PoseStore {
     path: Option<PathBuf>,
     kept: Mutex<Poses>,
-    /// Lock of the file's writer, so that readers never wait for the disk.
+    /// Lock for writing the file; it is separate, so that readers never wait for the disk.
     writing: Mutex<()>,
 }
 
@@ -115,7 +116,7 @@ impl PoseStore {
     ///
     /// # Errors
     ///
-    /// The file cannot be written. In this case the pose is kept.
+    /// The file cannot be written. In this case the pose is not removed.
     pub fn delete(&self, name: &str) -> Result<bool, PoseStoreError> {
         self.change(|poses| Ok(poses.remove(name).is_some()))
     }

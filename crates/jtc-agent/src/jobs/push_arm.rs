@@ -1,4 +1,4 @@
-//! The job that sends a complete arm to the controller.
+//! Job that sends a complete arm to the controller.
 use agent_kit::api::Problem;
 use jtc_host::session::{ArmPart, PushReport};
 use jtc_host::{Arm, Error, LinkError, Session};
@@ -12,7 +12,7 @@ use crate::owner::ClientPort;
 pub struct Given {
     /// Number of settings that have changed.
     pub settings: usize,
-    /// `true` if the controller has the name of the arm.
+    /// `true` if the controller has stored the name of the arm.
     pub named: bool,
     /// Reports of the parameters (friction, gains, model) that the controller has confirmed.
     pub parts: Vec<PushReport>,
@@ -23,7 +23,7 @@ pub struct Given {
 }
 
 impl Given {
-    /// Returns, in words, which parts of an incompletely sent arm the controller already uses.
+    /// Returns a text that lists the parts of an incompletely sent arm that the controller already uses.
     fn in_use(&self) -> Option<String> {
         let mut parts = Vec::new();
         match self.settings {
@@ -39,8 +39,8 @@ impl Given {
     }
 }
 
-/// Sends the complete arm to the controller, reads it back and compares. If `store` is `true`, also stores it in
-/// non-volatile memory. Ends if a client stops or pauses the arm, because a controller with a complete arm applies
+/// Sends the complete arm to the controller, then reads it back and compares it. If `store` is `true`, also stores it
+/// in non-volatile memory. Ends if a client stops or pauses the arm, because a controller with a complete arm applies
 /// torque.
 pub fn give(
     task: &Task<'_>,

@@ -1,4 +1,4 @@
-//! The job that brings the controller back to position hold.
+//! Job that returns the controller to position hold.
 use agent_kit::api::Problem;
 use jtc_host::session::RecoverParameters;
 use jtc_host::{Error, Session};
@@ -6,7 +6,7 @@ use jtc_host::{Error, Session};
 use super::{Done, Task};
 use crate::owner::ClientPort;
 
-/// Brings the controller from any state back to position hold.
+/// Returns the controller from any state to position hold.
 pub fn recover(
     task: &Task<'_>,
     session: &mut Session<ClientPort>,

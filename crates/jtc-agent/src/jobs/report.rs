@@ -1,4 +1,4 @@
-//! Reports of the last motions: the agent keeps their data, and makes a page from it on request.
+//! Reports of the last motions. The agent stores the data of these motions, and generates a page on request.
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,9 +10,9 @@ use jtc_host::{Arm, Error};
 
 use super::{Job, Task};
 
-/// Largest number of jobs whose report is kept.
+/// Largest number of jobs whose report is stored.
 const KEPT: usize = 16;
-/// Largest size of all kept reports, bytes. The report of a motion of ten minutes or more takes some 20 MB.
+/// Largest total size of all stored reports, bytes. The report of a motion of ten minutes or more needs about 20 MB.
 const BYTES_MAX: usize = 64 << 20;
 
 /// Data of a report about a motion.
@@ -24,23 +24,23 @@ pub struct MotionReport {
     failure: Option<RunFailure>,
 }
 
-/// Facts about a motion in addition to its samples.
+/// Data about a motion in addition to its samples.
 pub(super) struct Made<'a> {
     /// `approach` or `motion`.
     pub phase: &'a str,
-    /// Number of finished motions of its job before it, without approaches.
+    /// Number of motions that the job has finished before this motion, without approaches.
     pub before: u32,
     /// Outcome of the motion.
     pub outcome: &'a Result<Outcome, Error>,
-    /// Upload of the motion.
+    /// Statistics of the upload of the motion.
     pub upload: &'a UploadReport,
-    /// Statistics of the link since the end of the previous motion, or since the start of the run.
+    /// Statistics of the connection since the end of the previous motion, or since the start of the run.
     pub link: LinkStatistics,
-    /// Start of the motion, since 1970.
+    /// Start time of the motion, since 1970.
     pub began: Duration,
     /// Name of the port.
     pub port: String,
-    /// Rate of the line, Bd.
+    /// Bit rate of the serial line, Bd.
     pub baud: Option<u32>,
 }
 
@@ -61,7 +61,7 @@ impl MotionReport {
             trajectory: task.what.to_owned(),
             start_unix_ns: made.began.as_nanos() as u64,
             ending: Ending { outcome: outcome.into(), reason, ..Ending::default() },
-            // No page shows the description.
+            // The description is dropped because the page does not show it.
             description: None,
             ..RecordingInfo::of(arm)
         };
@@ -84,19 +84,19 @@ impl MotionReport {
         Some(Self { info, digest, facts, failure })
     }
 
-    /// Returns the page, which needs no network.
+    /// Returns the page, which does not load data from a network.
     pub fn html(&self) -> String {
         let Self { info, digest, facts, failure } = self;
         html(&ReportInput { facts, failure: failure.as_ref(), ..ReportInput::new(info, digest) })
     }
 
-    /// Returns its approximate size in memory, bytes.
+    /// Returns the approximate size of the report in memory, bytes.
     fn bytes(&self) -> usize {
         self.digest.bytes()
     }
 }
 
-/// Drops the oldest reports until the others are within the limits.
+/// Drops the oldest reports until the remaining reports are within the limits.
 pub(super) fn make_room(jobs: &mut VecDeque<Job>) {
     let (mut reports, mut bytes) = (0, 0);
     for report in jobs.iter_mut().rev().map(|job| &mut job.done.report) {
@@ -132,7 +132,7 @@ mod tests {
         jobs.iter().filter(|job| job.done.report.is_some()).map(|job| job.number).collect()
     }
 
-    /// The last reports are kept within the limits, and each gives a page.
+    /// The last reports are stored within the limits, and a page can be generated from each of them.
     #[test]
     fn reports_of_the_last_jobs_are_kept_within_their_memory() {
         let mut jobs: VecDeque<Job> = (0..20).map(|n| job(n, usize::from(n % 10 != 9))).collect();

@@ -1,4 +1,4 @@
-//! The job that runs a motion. The job writes each step into the journal, and ends after a Stop of another client.
+//! Job that runs a motion. The job writes each step into the journal, and ends after a Stop of another client.
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -26,17 +26,17 @@ const MOVING: Duration = Duration::from_secs(1);
 /// Motion to run, and its options.
 #[derive(Clone, Debug)]
 pub struct Order {
-    /// Path of the motion.
+    /// Trajectory or target of the motion.
     pub course: Course,
-    /// `true`: if the arm is not at the first point, move it there first.
+    /// `true` if the arm must first move to the first point when it is not there.
     pub approach: bool,
-    /// Speed, % of the trajectory's own speed, or of the limits. `None`: the trajectory's own speed, and the default
-    /// speed of a move or an approach.
+    /// Speed in % of the trajectory's own speed or of the limits. With `None`, a trajectory runs at its own speed, and
+    /// a move or an approach at the default speed.
     pub speed_percent: Option<f64>,
     /// Number of runs.
     pub repeat: u32,
-    /// `true`: the user confirms that the limits of a controller without extensions are safe for the arm, although they
-    /// differ from the limits of the agent's arm.
+    /// `true` if the user accepts the limits of a controller without extensions, although they differ from the limits
+    /// of the agent's arm.
     pub accept_device_limits: bool,
 }
 
@@ -55,7 +55,7 @@ pub struct Done {
     pub given: Option<Given>,
 }
 
-/// Runs a motion. Returns its progress, and the problem that prevented or ended it.
+/// Runs a motion. Returns the progress of the run, and the problem that prevented or ended the run.
 pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<Problem>) {
     let mut done = Done::default();
     let error = go(task, session, order, &mut done).err();
@@ -113,7 +113,7 @@ fn go(
     }
 }
 
-/// Returns the arm of the controller if the controller can return it, else the agent's arm.
+/// Returns the arm of the controller if the controller can return it, otherwise the agent's arm.
 fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Result<Site, Error> {
     let device = session.device_config()?;
     let arm = if session.has_extensions() { session.device_arm()? } else { task.arm.clone() };
@@ -121,7 +121,7 @@ fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Re
     Ok(Site { arm, options: CheckOptions { accept_device_limits, device, ..CheckOptions::default() } })
 }
 
-/// Returns the trajectory of an order, and writes the notes of the planner into the journal.
+/// Returns the trajectory for an order, and writes the notes of the planner into the journal.
 fn trajectory(
     task: &Task<'_>,
     order: &Order,
@@ -146,11 +146,11 @@ struct RunJob<'a> {
     site: &'a Site,
     move_speed: MoveSpeed,
     done: &'a mut Done,
-    /// Statistics of the link at the end of the previous motion.
+    /// Statistics of the connection at the end of the previous motion.
     link: LinkStatistics,
-    /// Number of tenths of the upload that were reported.
+    /// Progress of the upload that was last reported, in tenths.
     upload_shown: usize,
-    /// Start of the motion, since 1970.
+    /// Start time of the motion, since 1970.
     began: Duration,
     digest: Rc<RefCell<Digest>>,
     reported: Instant,
@@ -169,7 +169,7 @@ impl Observer<ClientPort> for RunJob<'_> {
         before_motion(self.task, &error)
     }
 
-    /// A Stop before the motion begins also cancels the run, because the person wants the arm to stay at rest.
+    /// A Stop before the motion begins also cancels the run, because the user who stops wants the arm to stay at rest.
     fn is_cancelled(&mut self) -> bool {
         self.task.is_halted()
     }
@@ -194,7 +194,7 @@ impl Observer<ClientPort> for RunJob<'_> {
     fn uploading(&mut self, phase: Phase, progress: &Progress) {
         let Task { job, journal, .. } = *self.task;
         let (segments_done, segments) = (progress.segments_done, progress.segments);
-        // Reports the progress of the upload in steps of a tenth.
+        // Reports the progress of the upload in steps of 10 %.
         if segments_done * 10 >= (self.upload_shown + 1) * segments.max(1) {
             self.upload_shown = segments_done * 10 / segments.max(1);
             let phase = phase.name().to_owned();
@@ -245,7 +245,8 @@ impl Observer<ClientPort> for RunJob<'_> {
 
     fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), Problem> {
         let (task, done) = (self.task, &mut *self.done);
-        // A request that arrives with the last status has no effect. Its client is told that the motion has ended.
+        // A request that arrives with the last status has no effect. The client receives the answer that the motion has
+        // ended.
         self.wish = None;
         task.http_session.motion_ended(task.wishes);
         let digest = self.digest.take();

@@ -1,5 +1,5 @@
-//! Current held stop of the arm (J-69). The status does not contain the cause of the stop, so the agent asks the
-//! controller for it once, when the stop begins.
+//! Current held Stop of the arm (J-69). The status does not contain the cause of the stop, so the agent requests the
+//! cause from the controller once, when the Stop begins.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -8,30 +8,30 @@ use jtc_wire::{Reactions, Status, StopCause};
 
 use super::HttpSession;
 
-/// Time after which an unanswered question is repeated.
+/// Time after which an unanswered query is repeated.
 const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Default)]
 struct State {
-    /// Number of held stops that have ended. An answer about an ended stop is dropped.
+    /// Number of held Stops that have ended. An answer about a Stop that has ended is dropped.
     ended: u64,
     held: bool,
     asked: Option<Instant>,
-    /// Time of the controller's answer, and the answer. `None` in the pair: the controller does not report its
-    /// reactions.
+    /// Time of the controller's answer, with the answer itself. `None` in the pair means that the controller does not
+    /// report its reactions.
     told: Option<(Duration, Option<Reactions>)>,
-    /// Joints with an encoder jump, one bit each. Valid until the torque is off, because the drives are then configured
-    /// again.
+    /// Joints with an encoder jump, one bit per joint. The value is valid until the torque is off, because the drives
+    /// are then configured again.
     jumped: u8,
 }
 
-/// Known facts about the current held stop.
+/// Known data about the current held Stop.
 #[derive(Clone, Default)]
 pub struct Stops(Arc<Mutex<State>>);
 
 impl Stops {
-    /// Returns the cause of the current held stop, and its age in ms at the time `now` of the line. `None`: no held
-    /// stop is active, or its cause is not known.
+    /// Returns the cause of the current held Stop, and the age of this Stop in ms at the line's time `now`. Returns
+    /// `None` if no held Stop is active, or if its cause is not known.
     pub fn cause(&self, status: &Status, now: Duration) -> Option<(StopCause, u32)> {
         let state = self.lock();
         let (at, reactions) = state.told.as_ref().filter(|_| status.is_held_stop())?;
@@ -40,15 +40,15 @@ impl Stops {
         Some((cause, ago_ms.saturating_add(since)))
     }
 
-    /// Returns the joints with an encoder jump, one bit each.
+    /// Returns the joints with an encoder jump, one bit per joint.
     pub fn jumped(&self, status: &Status) -> u8 {
         if labels::has_torque(status) { self.lock().jumped } else { 0 }
     }
 
-    /// Takes a status. If it shows a new held stop, asks the controller for the cause.
+    /// Takes a status. If the status shows a new held Stop, requests the cause from the controller.
     pub(super) fn see(&self, status: &Status, asker: &HttpSession) {
         let Some(stop) = self.begins(status) else { return };
-        // Another question is in progress. The cause is requested at the next check.
+        // Another query is in progress. The cause is requested at the next check.
         let Ok(turn) = asker.turn() else { return };
         self.lock().asked = Some(Instant::now());
         let own = self.clone();
@@ -59,7 +59,7 @@ impl Stops {
         });
     }
 
-    /// Returns the number of the held stop whose cause must be requested. `None`: no request is needed.
+    /// Returns the number of the held Stop whose cause must be requested. Returns `None` if no request is needed.
     fn begins(&self, status: &Status) -> Option<u64> {
         let mut state = self.lock();
         if !labels::has_torque(status) {

@@ -24,9 +24,10 @@ pub struct Stored {
     pub name: String,
     /// Points and step of the trajectory.
     pub trajectory: Trajectory,
-    /// Notes about values that were derived or left out when it was read.
+    /// Notes about values that were derived or omitted when the trajectory was read.
     pub notes: Vec<String>,
-    /// Digest of points and step: it changes with every point and with the step, and does not depend on the name.
+    /// Digest of points and step: the digest changes with every point and with the step, but does not depend on the
+    /// name.
     pub digest: String,
 }
 
@@ -36,7 +37,7 @@ pub enum StoreError {
     /// The number is out of range.
     #[error("trajectory number {0} is out of range (1 to {NUMBER_MAX})")]
     Number(u16),
-    /// The number is in use, and the caller does not allow the trajectory to be replaced.
+    /// Another trajectory already has this number, and the caller does not allow the trajectory to be replaced.
     #[error("trajectory {number} already exists, {name}: nothing was replaced")]
     Taken {
         /// Number of the trajectory.
@@ -52,13 +53,13 @@ pub enum StoreError {
         /// Number of both files.
         number: u16,
     },
-    /// The trajectory has more points than a controller holds.
+    /// The trajectory has more points than a controller can store.
     #[error("too many points: {points}, a controller holds at most {POINTS_MAX}")]
     TooMany {
         /// Number of points.
         points: usize,
     },
-    /// The file is not a readable trajectory.
+    /// The file does not contain a readable trajectory.
     #[error(transparent)]
     File(#[from] FileError),
     /// The poses in the same directory cannot be used.
@@ -95,13 +96,13 @@ impl host_kit::Diagnose for StoreError {
     }
 }
 
-/// Trajectories by number. If the store has a directory, they survive a restart of the agent.
+/// Trajectories by number. If the store has a directory, the trajectories survive a restart of the agent.
 pub struct Store {
     directory: Option<PathBuf>,
     kept: Mutex<BTreeMap<u16, Arc<Stored>>>,
     /// Named poses.
     pub poses: PoseStore,
-    /// Lock of the directory's writer, so that readers never wait for the disk.
+    /// Lock for writing the directory; it is separate, so that readers never wait for the disk.
     writing: Mutex<()>,
 }
 
@@ -120,8 +121,8 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// The directory cannot be read or made, or one of its trajectories is invalid: it is safer not to start than to
-    /// run with other trajectories than the users expect.
+    /// The directory cannot be read or created, or one of its trajectories is invalid. Not starting is safer than
+    /// running with other trajectories than the users expect.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let io = |source| StoreError::Io { path: directory.to_owned(), source };
         fs::create_dir_all(directory).map_err(io)?;
@@ -144,7 +145,7 @@ impl Store {
         self.lock().get(&number).cloned()
     }
 
-    /// Returns all trajectories, by number.
+    /// Returns all trajectories in the order of their numbers.
     pub fn list(&self) -> Vec<Arc<Stored>> {
         self.lock().values().cloned().collect()
     }
@@ -220,7 +221,7 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// The file cannot be removed. In this case the trajectory is kept.
+    /// The file cannot be removed. In this case the trajectory stays in the store.
     pub fn delete(&self, number: u16) -> Result<bool, StoreError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(directory) = &self.directory {
@@ -249,7 +250,7 @@ fn digest(trajectory: &Trajectory) -> String {
     hash.update(trajectory.step_ms.to_le_bytes());
     for Point { position, velocity, acceleration } in &trajectory.points {
         for value in [position, velocity, acceleration].into_iter().flatten() {
-            // Positive and negative zero give the same digest.
+            // Positive and negative zero produce the same digest.
             hash.update((value + 0.0).to_le_bytes());
         }
     }
@@ -278,8 +279,8 @@ fn file_name(name: &str) -> String {
     if short.is_empty() { "trajectory".to_owned() } else { short }
 }
 
-/// Writes the file completely or not at all. The old file is removed before the new one gets its name. So a loss of
-/// power can leave no trajectory of this number, but never two.
+/// Writes the file completely or not at all. The old file is removed before the new file receives its name. After a
+/// loss of power, there may therefore be no trajectory of this number, but never two.
 fn write(directory: &Path, path: &Path, trajectory: &Trajectory, number: u16) -> io::Result<()> {
     let part = path.with_extension("part");
     let written = fs::write(&part, trajectory.to_exact_csv());
@@ -347,7 +348,7 @@ mod tests {
         // The name and the number format do not change the motion, and therefore not the digest.
         assert_eq!(digest("b", TEXT, true), first);
         assert_eq!(digest("b", &TEXT.replace("0,0\n", "0.0,-0\n"), false), first);
-        // Points, their order and their step change the motion.
+        // The points, their order and the step change the motion, and therefore the digest.
         for other in [
             TEXT.replace("1,0,", "1,0.000001,"),
             TEXT.replace("1,0,0", "1,0,0.000001"),

@@ -1,4 +1,4 @@
-//! State of a job in addition to its session.
+//! Data that a job uses in addition to its session.
 use std::sync::mpsc::Receiver;
 
 use agent_kit::api::Problem;
@@ -19,9 +19,9 @@ pub struct Task<'a> {
     pub what: &'a str,
     /// Requests while the job runs.
     pub wishes: &'a Receiver<Wish>,
-    /// Journal for each step.
+    /// Journal for the steps of the job.
     pub journal: &'a Journal,
-    /// Line, from which the job learns of a Stop of another client.
+    /// Serial line, which reports a Stop of another client to the job.
     pub line: &'a Line,
     /// Session of the job's client.
     pub http_session: &'a HttpSession,

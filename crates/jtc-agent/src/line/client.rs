@@ -1,4 +1,4 @@
-//! Client on the line: its received frames and its waiting deliveries.
+//! Client on the line, with its received frames and its waiting deliveries.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -10,14 +10,15 @@ use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 use super::Denied;
 use super::frame_class::HostFrame;
 
-/// Largest number of waiting bytes of a client's frames: the frames in flight of an upload, and some commands.
+/// Largest number of waiting bytes of a client's frames. This is enough for the frames in flight of an upload, and some
+/// commands.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
 /// Largest number of waiting frames of a client. Equals the number of frames that a client may send in one burst.
 const FRAMES_WAITING: usize = 500;
-/// Largest number of unread bytes of a client: two minutes of statuses.
+/// Largest number of unread bytes of a client, enough for two minutes of statuses.
 const UNREAD_MAX: usize = 1 << 20;
 
-/// Largest number of frames that a client may send: per second, and in one burst.
+/// Largest number of frames that a client may send, per second and in one burst.
 const FRAMES_PER_S: f64 = 250.0;
 const FRAMES_AT_ONCE: f64 = 500.0;
 /// Largest number of waiting records for refused frames; one is sent with each status.
@@ -52,7 +53,7 @@ impl Policy {
         }
     }
 
-    /// Returns a word for the policy.
+    /// Returns the name of the policy.
     pub fn name(self) -> &'static str {
         match self {
             Self::Continue => "continue",
@@ -62,24 +63,24 @@ impl Policy {
     }
 }
 
-/// Introduction of a client.
+/// Data that describes a client when it connects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Introduction {
-    /// Name of the client for people.
+    /// Name of the client that users see.
     pub name: String,
     /// Role of the client.
     pub role: Role,
-    /// Policy for its motion when it disconnects or its lease lapses.
+    /// Policy for the client's motion when the client disconnects or its lease lapses.
     pub policy: Policy,
 }
 
-/// Delivery to a client.
+/// Data that the line delivers to a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Delivery {
-    /// Bytes of the controller: statuses and answers to the client's own requests.
+    /// Bytes from the controller: statuses, and answers to the client's own requests.
     Bytes(Vec<u8>),
-    /// Reason why a frame of the client was not passed on. Its record, which only says "not allowed", follows in a
-    /// status.
+    /// Reason why a frame of the client was not passed on. The record of the frame follows in a status; it only
+    /// contains "not allowed".
     Denied(Denied),
     /// Reason why a request about the lease was refused.
     LeaseDenied(Denied),
@@ -102,13 +103,13 @@ pub enum PutOut {
     /// The client sent bytes that are not a host frame.
     #[error("the client sent bytes that are not a frame of this protocol")]
     NoFrame,
-    /// The client sent more than the line and the other clients can tolerate.
+    /// The client sent so many bytes or frames that the other clients would be disturbed.
     #[error(
         "the client sent more than {FRAMES_PER_S} frames per second, or has more than {FRAMES_WAITING} \
          frames or {WAITING_MAX} bytes in the queue"
     )]
     TooMuch,
-    /// The lease holder was silent for seconds.
+    /// The lease holder sent no data for several seconds.
     #[error("the client held the lease, and was silent for some seconds")]
     Silent,
     /// The client does not read.
@@ -133,15 +134,15 @@ pub(super) struct Client {
     /// End of the hold-off after a Stop or a Pause of another client. Before that time, no motion of this client
     /// begins.
     pub calm_until: Duration,
-    /// Number of the last Stop or Pause that the client knew when it made its present requests.
+    /// Number of the last Stop or Pause that the client knew when it sent its present requests.
     pub asked_after: u64,
     /// Stops and Pauses of other clients since this client connected.
     pub halts: Halts,
-    /// Last sign of life, and the duration of its lease.
+    /// Last sign of life of the client, and the duration of its lease.
     pub presence: Presence,
-    /// Arrival time of its last frame.
+    /// Arrival time of the client's last frame.
     pub heard_at: Duration,
-    /// `true` if its lease has lapsed and the client has not requested a new one since.
+    /// `true` if the lease of the client has lapsed and the client has not requested a new lease since then.
     pub lapsed: bool,
     /// Number of frames that the client may still send at once, and the time of this value.
     allowance: f64,
@@ -170,7 +171,7 @@ impl Client {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a frame is complete.
+    /// Removes bytes from the front of `bytes` until a frame is complete.
     pub(super) fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<HostFrame>, PutOut> {
         loop {
             let wanted = match self.partial.get(2..4) {
@@ -208,7 +209,7 @@ impl Client {
         if self.refusals.len() > REFUSALS_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
-    /// Takes the next queued record of a refused frame.
+    /// Removes and returns the next queued record of a refused frame.
     pub(super) fn take_refusal(&mut self) -> Option<Response> {
         self.refusals.pop_front()
     }
@@ -225,7 +226,7 @@ impl Client {
         }
     }
 
-    /// Takes the next queued frame.
+    /// Removes and returns the next queued frame.
     pub(super) fn take_waiting(&mut self) -> Option<HostFrame> {
         let frame = self.waiting.pop_front()?;
         self.waiting_bytes -= frame.bytes.len();
@@ -233,8 +234,8 @@ impl Client {
         Some(frame)
     }
 
-    /// Removes the queued frames that need the lease; the others keep their order. Returns at once if no such frame is
-    /// queued, because every Stop calls this for all clients.
+    /// Removes the queued frames that need the lease; the other frames keep their order. Returns at once if no such
+    /// frame is queued, because every Stop calls this function for all clients.
     pub(super) fn take_commands(&mut self) -> Vec<HostFrame> {
         if self.commands == 0 {
             return Vec::new();
@@ -252,7 +253,7 @@ impl Client {
         if self.unread > UNREAD_MAX { Err(PutOut::Unread) } else { Ok(()) }
     }
 
-    /// Takes the queued deliveries.
+    /// Removes and returns the queued deliveries.
     pub(super) fn take_deliveries(&mut self) -> Vec<Delivery> {
         self.unread = 0;
         self.deliveries.drain(..).collect()

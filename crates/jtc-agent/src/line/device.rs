@@ -1,4 +1,4 @@
-//! Controller's side of the line: selects the next bytes to write, and the clients that receive each record.
+//! Controller side of the line: selects the next bytes to write, and the clients that receive each record.
 use std::time::Duration;
 
 use jtc_wire::{DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
@@ -19,7 +19,7 @@ impl SharedLine {
             due => due,
         };
         let lease = self.lease.as_ref().and_then(|lease| lease.until);
-        // A command that waits for the line is due when the line is free.
+        // A command that waits for the line is due as soon as the line is free.
         let own = [self.halts.due(now), self.motion_tracker.due()].into_iter().flatten().min();
         let own = own.filter(|_| self.tx_queue.due(now).is_none());
         [line, lease, own].into_iter().flatten().min()
@@ -60,12 +60,12 @@ impl SharedLine {
         }
     }
 
-    /// Notes that the operating system has accepted the bytes at time `now`.
+    /// Records that the operating system has accepted the bytes at time `now`.
     pub fn handed_over(&mut self, now: Duration) {
         self.tx_queue.handed_over(now);
     }
 
-    /// Returns the next frame. The clients take turns.
+    /// Returns the next frame to write. Frames are taken from the clients in rotation.
     fn next_turn(&mut self, now: Duration) -> Option<Outgoing> {
         if let Some(frame) = self.motion_tracker.frame(now) {
             return Some(Outgoing { client: OWNER, frame });
@@ -87,8 +87,8 @@ impl SharedLine {
             }
             let Some(client) = self.clients.get_mut(&id) else { continue };
             let Some(frame) = client.waiting.front() else { continue };
-            // Frames that the controller returns have no number. So the next request for such a frame waits until the
-            // last one is answered (J-50).
+            // Frames that the controller returns have no number. The next request for such a frame therefore waits
+            // until the previous request is answered (J-50).
             let returns = frame.returns();
             if returns.is_some() && self.returns.is_some() {
                 continue;
@@ -145,7 +145,7 @@ impl SharedLine {
         self.sent.push_back(Sent { client, kind: frame_type as u8, abandoned, at });
     }
 
-    /// Takes bytes from the controller, in pieces of any length.
+    /// Processes bytes from the controller, in pieces of any length.
     pub fn from_device(&mut self, mut bytes: &[u8], now: Duration) {
         loop {
             match self.receiver.next_frame(&mut bytes) {
@@ -205,7 +205,7 @@ impl SharedLine {
     /// Returns the clients that receive a record. The record of a Stop goes to all clients that requested the Stop.
     fn whose(&mut self, response: Response, now: Duration) -> Vec<(ClientId, Response)> {
         let arrived = response.status == FrameStatus::NoError;
-        // Records come in the order of the frames. So the record of every earlier frame was lost or damaged.
+        // Records arrive in the order of the frames. The record of every earlier frame was therefore lost or damaged.
         let at = self.sent.iter().position(|sent| {
             if arrived { !sent.abandoned && sent.kind == response.frame_type } else { sent.abandoned }
         });
@@ -217,7 +217,7 @@ impl SharedLine {
         if let Some(returns) =
             self.returns.as_mut().filter(|r| r.client == sent.client && Some(r.kind) == returned)
         {
-            // The returned frame follows, unless the controller refused the request.
+            // The requested frame follows, unless the controller refused the request.
             returns.until = if response.accepted() { now + RETURN_TIME } else { now };
         }
         if sent.client == HALTS {

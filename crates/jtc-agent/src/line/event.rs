@@ -3,16 +3,16 @@ use jtc_wire::{FrameType, Response};
 
 use super::{ClientId, Denied, FrameClass, Lease, Policy, PutOut, Will};
 
-/// Numbers of events on a line since its owner was started.
+/// Numbers of events on a line since the thread that owns the line was started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Number of written frames that change a state.
     pub sent: u64,
-    /// Number of these frames that the controller accepted.
+    /// Number of state-changing frames that the controller accepted.
     pub accepted: u64,
-    /// Number of these frames that the controller refused.
+    /// Number of state-changing frames that the controller refused.
     pub refused: u64,
-    /// Number of frames that were not passed on.
+    /// Number of client frames that were not sent to the controller.
     pub denied: u64,
     /// Number of clients that were disconnected.
     pub put_out: u64,
@@ -50,14 +50,14 @@ pub enum LineEvent {
         /// Complete frame.
         bytes: Vec<u8>,
     },
-    /// Answer of the controller to such a frame.
+    /// Answer of the controller to a frame that changes a state.
     Answered {
         /// Client that sent the frame.
         client: ClientId,
         /// Answer of the controller.
         response: Response,
     },
-    /// Frame that was not passed on.
+    /// Client frame that was not sent to the controller.
     Denied {
         /// Client that sent the frame.
         client: ClientId,
@@ -77,7 +77,8 @@ pub enum LineEvent {
     },
     /// Stop or Pause that was sent many times without a confirmation of the controller.
     NotTaken,
-    /// Change of the motion, or of the client whose policy applies to the motion. `None`: the motion has ended.
+    /// Change of the motion, or of the client whose policy applies to the motion. `None` means that the motion has
+    /// ended.
     Will(Option<Will>),
     /// Disconnection of a client by the agent.
     PutOut {

@@ -1,4 +1,4 @@
-//! Classes of host frames: what a frame may do, and which client may send it.
+//! Classes of host frames: the effect that a frame may have, and the clients that may send it.
 use jtc_wire::{Command, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLOCK, Response};
 
 /// Effect of a host frame.
@@ -8,9 +8,9 @@ pub enum FrameClass {
     Ask,
     /// Stop or Pause. Every client may send the frame, which overtakes all other frames.
     Halt(ExecCommand),
-    /// May begin a motion. Refused if the client requested the motion before a Stop.
+    /// The frame may begin a motion. The frame is refused if the client requested the motion before a Stop.
     Motion,
-    /// Changes something else. Only the holder of the lease may send it.
+    /// Changes something else. Only the holder of the lease may send the frame.
     Command,
 }
 
@@ -46,15 +46,15 @@ pub(super) struct HostFrame {
 }
 
 impl HostFrame {
-    /// Returns `None` if the bytes are not a valid frame of a host.
+    /// Parses the bytes; returns `None` if they are not a valid host frame.
     pub(super) fn parse(bytes: Vec<u8>) -> Option<Self> {
         let frame = FrameRef::new_checked(&bytes).filter(|frame| frame.frame_type.from_host())?;
         let (frame_type, class) = (frame.frame_type, FrameClass::of(frame));
         Some(Self { bytes, frame_type, class })
     }
 
-    /// Returns true if the frame reads the log of the flight recorder. Viewers may not send it, because the recorder
-    /// pauses meanwhile (J-56).
+    /// Returns true if the frame reads the log of the flight recorder. Viewers may not send this frame, because the
+    /// recorder pauses while its log is read (J-56).
     pub(super) fn reads_log(&self) -> bool {
         let command = FrameRef::new_checked(&self.bytes).map(Command::parse);
         matches!(command, Some(Ok(Command::GetLog { block, .. })) if block != LOG_NO_BLOCK)
@@ -71,7 +71,7 @@ impl HostFrame {
     }
 }
 
-/// Returns true if the frame may change which arm the controller has (J-51 to J-55).
+/// Returns true if the frame may change the arm of the controller (J-51 to J-55).
 pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
     use FrameType::*;
     matches!(

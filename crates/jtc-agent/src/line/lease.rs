@@ -1,4 +1,4 @@
-//! The lease: at most one client at a time may send commands. All clients can see the holder's name.
+//! Lease of the line: only the client that holds it may send commands. All clients can see the holder's name.
 use std::time::Duration;
 
 use agent_kit::lease::Presence;
@@ -47,14 +47,14 @@ pub enum Denied {
     /// The client was disconnected.
     #[error("this client has lost its connection: the agent or the client ended it")]
     Gone,
-    /// The controller supervises its host, and the lease holder is silent. Questions of other clients would hide the
+    /// The controller supervises its host, and the lease holder is silent. Queries of other clients would hide the
     /// silence from the controller (J-59).
     #[error(
         "{who} is silent: the agent sends no queries of other clients until the arm is at rest, so that the \
          controller can pause the motion"
     )]
     Unattended {
-        /// Name of the present or last lease holder.
+        /// Name of the present or the previous lease holder.
         who: String,
     },
     /// The client does not hold the lease.
@@ -69,13 +69,13 @@ impl SharedLine {
     }
 
     /// Takes or renews the lease. `lasts` is the time without renewal after which the lease lapses. A lease that the
-    /// client gets later, by a command or from another client, also lasts for this time. `None`: the lease lasts while
-    /// the client is connected.
+    /// client receives later, by a command or from another client, has the same duration. With `None`, the lease lasts
+    /// while the client is connected.
     ///
     /// # Errors
     ///
-    /// [`Denied`] if another client holds the lease, or if this client may not hold it. In the first case the holder is
-    /// asked to release the lease.
+    /// [`Denied`] if another client holds the lease, or if this client may not hold it. If another client holds the
+    /// lease, the holder receives a request to release it.
     pub fn take_lease(
         &mut self,
         client: ClientId,
@@ -92,7 +92,7 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Releases the lease. The client that has requested it, if any, gets it.
+    /// Releases the lease. Releases the lease, which passes to the client that has requested it, if any.
     ///
     /// # Errors
     ///
@@ -105,12 +105,13 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Requests the lease from its holder. The first client that requests it keeps its place until it gets the lease,
+    /// Requests the lease from its holder. The first client that requests it stays first until it receives the lease,
     /// disconnects, or is silent for the duration of its own lease.
     ///
     /// # Errors
     ///
-    /// [`Denied::Viewer`]; [`Denied::Awaited`]; [`Denied::NotHolder`] if no client holds the lease: it can be taken.
+    /// [`Denied::Viewer`]; [`Denied::Awaited`]; [`Denied::NotHolder`] if no client holds the lease, so that it can be
+    /// taken.
     pub fn want_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(Introduction { name, role: Role::Operator, .. }) = self.introduction(client).cloned() else {
             return Err(Denied::Viewer);
@@ -126,27 +127,28 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Returns the duration of a client's lease. The outer `None`: the client has gone.
+    /// Returns the duration of a client's lease. The outer `None` means that the client has disconnected.
     fn lasts(&self, id: ClientId) -> Option<Option<Duration>> {
         self.clients.get(&id).map(|client| client.presence.lasts)
     }
 
-    /// Notes that the client is present.
+    /// Records a sign of life of the client.
     fn show(&mut self, id: ClientId, now: Duration) {
         if let Some(client) = self.clients.get_mut(&id) {
             client.presence.seen = now;
         }
     }
 
-    /// Disconnects a holder of the lease that has fallen silent, and applies its policy to its motion. A client that
-    /// wakes up later must connect again, so it sees the changes that other clients made meanwhile.
+    /// Disconnects a holder of the lease that no longer sends data, and applies the holder's policy to its motion. A
+    /// client that sends data again later must first reconnect, so that it receives the changes that other clients made
+    /// in the meantime.
     pub fn lapse(&mut self, client: ClientId, now: Duration) {
         if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
             self.put_out(client, PutOut::Silent, now);
         }
     }
 
-    /// Checks that the client holds the lease. Gives it the lease if no client holds it.
+    /// Checks that the client holds the lease. If no client holds the lease, the client takes it.
     pub(super) fn may_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         if self.lease.is_none() {
@@ -167,13 +169,13 @@ impl SharedLine {
                 let age_ms = now.saturating_sub(lease.since).as_millis() as u64;
                 Err(Denied::Held { holder: self.name(lease.holder), age_ms })
             }
-            // Only the client's policy decides about the motion that the client began.
+            // Only the client's own policy applies to the motion that the client began.
             None if self.is_over(id) => Err(Denied::NotHolder),
             None => Ok(()),
         }
     }
 
-    /// Notes that the client is present, and renews its lease if it holds it.
+    /// Records a sign of life of the client, and renews the lease if the client holds it.
     pub fn renew(&mut self, id: ClientId, now: Duration) {
         self.end_lapsed(now);
         self.show(id, now);
@@ -183,7 +185,7 @@ impl SharedLine {
         }
     }
 
-    /// Returns true if the lease of this client has lapsed, and its policy has ended its motion.
+    /// Returns true if the lease of this client has lapsed, and the client's policy has ended its motion.
     fn is_over(&self, id: ClientId) -> bool {
         let client = self.clients.get(&id);
         client.is_some_and(|client| client.lapsed && client.introduction.policy != Policy::Continue)
@@ -199,7 +201,7 @@ impl SharedLine {
         }
     }
 
-    /// Ends the lease of `holder`, and applies its policy.
+    /// Ends the lease of `holder`, and applies the policy of this client.
     pub(super) fn end_lease(&mut self, holder: ClientId, policy: Policy, now: Duration) {
         let next = self.lease.as_ref().and_then(|lease| lease.next(|next| self.lasts(*next), now));
         self.set_lease(next);
@@ -208,7 +210,7 @@ impl SharedLine {
         if self.hold(POLICY, command, now) {
             self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
         } else if let Some(client) = self.clients.get_mut(&holder) {
-            // Prevents the motion that this client was about to begin. Other clients are not affected.
+            // Prevents a motion that this client was about to begin. Other clients are not affected.
             client.asked_after = NOT_ASKED;
         }
     }

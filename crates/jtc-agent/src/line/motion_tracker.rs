@@ -1,5 +1,5 @@
-//! Motion tracker: tells from frames and statuses whether the arm may move. Also repeats the frame that ends Teaching
-//! until the controller confirms it.
+//! Motion tracker, which determines from frames and statuses if the arm may move. The tracker also repeats the frame
+//! that ends Teaching until the controller confirms it.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
@@ -9,7 +9,7 @@ use super::frame_class::HostFrame;
 
 /// Time within which the statuses show the motion that a frame begins. A status older than this is not used.
 const SHOWS: Duration = Duration::from_secs(1);
-/// Time after an upload within which its motion is expected.
+/// Time after an upload within which the uploaded motion is expected.
 const FOLLOWS: Duration = Duration::from_secs(5);
 /// Interval at which the frame that ends Teaching is repeated until the controller confirms it.
 const AGAIN: Duration = Duration::from_millis(250);
@@ -20,26 +20,26 @@ pub(super) struct MotionTracker {
     begun_at: Option<Duration>,
     /// Time of the last part of a trajectory.
     uploaded_at: Option<Duration>,
-    /// Set after Teaching was requested. Teaching can start seconds later, when position hold begins, and no status
-    /// shows the request.
+    /// `true` after Teaching was requested. Teaching can start seconds later, when position hold begins; until then no
+    /// status shows the request.
     teaches: bool,
-    /// Time at which the frame that ends Teaching is sent next.
+    /// Time at which the frame that ends Teaching is due to be sent.
     end_at: Option<Duration>,
 }
 
 impl MotionTracker {
-    /// Notes that a frame that may begin a motion was sent at `at`.
+    /// Records that a frame that may begin a motion was sent at `at`.
     pub(super) fn begun(&mut self, frame_type: FrameType, at: Duration) {
         self.begun_at = Some(at);
         self.teaches |= frame_type == FrameType::TeachingModeEnable;
     }
 
-    /// Notes that a part of a trajectory was sent at `at`.
+    /// Records that a part of a trajectory was sent at `at`.
     pub(super) fn uploaded(&mut self, at: Duration) {
         self.uploaded_at = Some(at);
     }
 
-    /// Notes that the frame that ends Teaching was sent.
+    /// Records that the frame that ends Teaching was sent.
     pub(super) fn taught(&mut self) {
         self.teaches = false;
     }
@@ -51,7 +51,7 @@ impl MotionTracker {
         self.teaches || self.begun_at.is_some_and(shown) || !rests
     }
 
-    /// Returns the cause of the present or next motion. If no recent status shows it, returns `before`.
+    /// Returns the cause of the present or next motion. If no recent status shows the cause, returns `before`.
     pub(super) fn what(
         &self,
         status: Option<&(Duration, Status)>,
@@ -79,7 +79,7 @@ impl MotionTracker {
             || status.is_some_and(|(_, status)| status.state.is_in(&moves))
     }
 
-    /// Returns true if Teaching may be on, or may begin.
+    /// Returns true if Teaching may be active, or may begin.
     pub(super) fn may_teach(&self, status: Option<&(Duration, Status)>) -> bool {
         self.teaches || status.is_some_and(|(_, status)| status.state == ControllerState::Teaching)
     }
@@ -96,7 +96,7 @@ impl MotionTracker {
         HostFrame::parse(fixed::empty(FrameType::TeachingModeDisable).to_vec())
     }
 
-    /// Notes that the controller confirmed the end of Teaching, or refused the frame because Teaching was off.
+    /// Records that the controller confirmed the end of Teaching, or refused the frame because Teaching was not active.
     pub(super) fn answered(&mut self) {
         self.end_at = None;
     }
@@ -107,7 +107,7 @@ impl MotionTracker {
     }
 }
 
-/// Returns true if the status shows a motion, or one that is paused and may resume.
+/// Returns true if the status shows a motion, or a paused motion that may resume.
 fn shows_motion(status: &Status) -> bool {
     status.state.is_in(&[ControllerState::Operate, ControllerState::Teaching])
         || status.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause])

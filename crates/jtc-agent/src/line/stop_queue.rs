@@ -1,4 +1,4 @@
-//! Queue of Stops and Pauses: sent before all other frames, and repeated until the controller has confirmed them.
+//! Queue of Stops and Pauses, which are sent before all other frames and repeated until the controller confirms them.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -8,14 +8,14 @@ use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
 use super::ClientId;
 use super::frame_class::HostFrame;
 
-/// Time after which a frame without a record is sent again. The time of three statuses on the line is added.
+/// Time after which a frame without a record is sent again. The time that three statuses need on the line is added.
 const AWAITED: Duration = Duration::from_millis(150);
-/// Number of times that a frame is sent at the interval of [`AWAITED`].
+/// Number of times that a frame is sent with the interval [`AWAITED`].
 const TRIES: u32 = 20;
-/// Interval of the later repetitions, until the controller answers.
+/// Interval of the later repetitions, which end when the controller answers.
 const LATER: Duration = Duration::from_secs(1);
 
-/// A Stop or a Pause, and the clients that have requested it.
+/// Stop or Pause, with the clients that have requested it.
 #[derive(Debug)]
 struct Halt {
     command: ExecCommand,
@@ -33,14 +33,14 @@ impl Halt {
     }
 }
 
-/// Stops and Pauses without a record. The requests of several clients share one frame, and each of the clients receives
-/// its record.
+/// Stops and Pauses without a record. The requests of several clients share one frame, and each of these clients
+/// receives the record of the frame.
 #[derive(Debug, Default)]
 pub(super) struct StopQueue {
     waiting: Option<Halt>,
     /// Written frames, oldest first.
     written: VecDeque<Halt>,
-    /// Set if a frame that may begin a motion was written after the last Stop or Pause.
+    /// `true` if a frame that may begin a motion was written after the last Stop or Pause.
     motion_since: bool,
 }
 
@@ -69,7 +69,7 @@ impl StopQueue {
         self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
     }
 
-    /// Notes that the frame was written. The line finishes its last byte at `at`.
+    /// Records that the frame was written. The line finishes the last byte of the frame at `at`.
     pub(super) fn written(&mut self, at: Duration, baud: Option<u32>) {
         if let Some(mut halt) = self.waiting.take() {
             halt.tries += 1;
@@ -80,13 +80,13 @@ impl StopQueue {
         }
     }
 
-    /// Notes that a frame that may begin a motion was written.
+    /// Records that a frame that may begin a motion was written.
     pub(super) fn motion_written(&mut self) {
         self.motion_since = true;
     }
 
-    /// Takes the record of the oldest written frame. Returns the clients that receive the record. If the controller
-    /// received the frame damaged, it is sent again.
+    /// Processes the record of the oldest written frame. Returns the clients that receive the record. If the frame
+    /// arrived damaged at the controller, it is sent again.
     pub(super) fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
         let Some(halt) = self.written.pop_front() else { return Vec::new() };
         if !arrived {
@@ -128,13 +128,13 @@ impl StopQueue {
     }
 
     /// Returns the command that was sent more than once because the controller does not confirm it. If both a Stop and
-    /// a Pause were, returns the Stop.
+    /// a Pause were sent more than once, returns the Stop.
     pub(super) fn untaken(&self) -> Option<ExecCommand> {
         let again = self.waiting.iter().chain(&self.written).filter(|halt| halt.tries > 1);
         again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)
     }
 
-    /// Returns true if every request has its record.
+    /// Returns true if every request has received its record.
     pub(super) fn are_done(&self) -> bool {
         self.waiting.is_none() && self.written.is_empty()
     }

@@ -1,5 +1,5 @@
-//! Host supervision (J-59) on a shared line: the controller sees all clients as one host. So questions of other clients
-//! must not hide that the lease holder is silent.
+//! Host supervision (J-59) on a shared line: the controller sees all clients as one host. Queries of other clients must
+//! therefore not hide that the lease holder is silent.
 use std::time::Duration;
 
 use jtc_host::session::host_timeout_ms;
@@ -10,7 +10,7 @@ use super::{ClientId, Denied, SharedLine};
 /// Known state of the controller's host supervision.
 #[derive(Debug, Default)]
 pub(super) struct Supervision {
-    /// Value of `host_timeout_ms` that was last read or set on this line. `None`: supervision is off, or the value is
+    /// Value of `host_timeout_ms` that was last read or set on this line. `None` if supervision is off or the value is
     /// not known.
     timeout: Option<Duration>,
     /// Timeout in a SetSettings whose record has not arrived, ms.
@@ -24,21 +24,21 @@ impl Supervision {
         }
     }
 
-    /// Takes the timeout from settings that the device returns.
+    /// Stores the timeout from settings that the controller returns.
     pub(super) fn take_answer(&mut self, answer: &Answer<'_>) {
         if let Answer::Settings { values, .. } = answer {
             self.set(host_timeout_ms(values.iter()));
         }
     }
 
-    /// Notes the timeout in a SetSettings that was written.
+    /// Stores the timeout in a SetSettings that was written.
     pub(super) fn note_written(&mut self, frame: &[u8]) {
         if let Some(Ok(Command::SetSettings(values))) = FrameRef::new_checked(frame).map(Command::parse) {
             self.written_ms = host_timeout_ms(values.iter());
         }
     }
 
-    /// Takes the record of a SetSettings.
+    /// Processes the record of a SetSettings.
     pub(super) fn take_record(&mut self, response: &Response) {
         let written = self.written_ms.take();
         if response.accepted() {
@@ -46,8 +46,8 @@ impl Supervision {
         }
     }
 
-    /// Takes a status. In Start and Init, the controller may have restarted with other settings, so the timeout is
-    /// forgotten.
+    /// Takes a status. In Start and Init, the controller may have restarted with other settings, so the stored timeout
+    /// is no longer valid.
     pub(super) fn take_status(&mut self, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.timeout = None;
@@ -56,9 +56,9 @@ impl Supervision {
 }
 
 impl SharedLine {
-    /// Checks that this client may ask the controller. While the arm moves under host supervision, other clients may
-    /// ask only if a frame of the lease holder arrived within half of the timeout. The project's own clients send a
-    /// frame in each third of the timeout.
+    /// Checks that this client may send a query to the controller. While the arm moves under host supervision, other
+    /// clients may send queries only if a frame of the lease holder arrived within half of the timeout. The project's
+    /// own clients send a frame in each third of the timeout.
     pub(super) fn may_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(timeout) = self.supervision.timeout else { return Ok(()) };
         self.end_lapsed(now);

@@ -1,9 +1,9 @@
-//! Transmit queue of the line. The queue sends whole frames, one after the other, and hands their bytes to the
+//! Transmit queue of the line. The queue sends whole frames, one after the other, and passes their bytes to the
 //! operating system shortly before the line can send them.
 //!
-//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] bytes are queued there. A
-//! Stop does not wait for the remainder of a long frame. The frame is abandoned, and the controller detects this by the
-//! gap after it (J-05).
+//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] bytes are queued in the
+//! operating system. A Stop does not wait for the remainder of a long frame. The queue aborts this frame, and the
+//! controller detects this by the gap after it (J-05).
 use std::time::Duration;
 
 use jtc_host::port::line_time;
@@ -11,55 +11,57 @@ use jtc_host::port::line_time;
 use super::ClientId;
 use super::frame_class::HostFrame;
 
-/// Largest number of bytes queued in the operating system: 256 (J-05), less a margin. Each delay of the system can make
-/// the line up to a byte later than the estimate.
+/// Largest number of bytes that are queued in the operating system: 256 (J-05) minus a margin. Each delay of the system
+/// can delay the line by up to one byte more than estimated.
 const AHEAD: usize = 250;
-/// Silence after an abandoned frame: 5 ms (J-03), plus a margin because USB adapters may shorten the gap.
+/// Silence after an aborted frame: 5 ms (J-03), plus a margin because USB adapters may shorten the gap.
 const GAP: Duration = Duration::from_millis(8);
-/// Remainders of frames up to this length, in bytes, are sent before a Stop: sending them takes no longer than the gap.
+/// Remainders of frames up to this length, in bytes, are still sent before a Stop, because sending them takes at most
+/// as long as the gap.
 const SHORT: usize = 64;
-/// Smallest number of bytes of a longer frame that are written at once.
+/// Smallest number of bytes of a longer frame that are written in one step.
 const PIECE: usize = 64;
 
-/// A frame for the controller.
+/// Frame for the controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Outgoing {
-    /// Client that sent it.
+    /// Client that sent the frame.
     pub client: ClientId,
     /// Whole frame.
     pub frame: HostFrame,
 }
 
-/// End of a frame.
+/// Result of the transmission of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Passed {
-    /// Its last byte was written.
+    /// The last byte of the frame was written.
     Written(Outgoing),
-    /// The frame was abandoned halfway.
+    /// The frame was aborted before its end.
     Abandoned(Outgoing),
 }
 
-/// A frame that is being written.
+/// Frame whose bytes are currently written.
 struct Writing {
     outgoing: Outgoing,
     at: usize,
 }
 
-/// Paces the bytes of a line. An urgent frame can overtake a frame that is being written.
+/// Transmit queue, which adapts the bytes that it writes to the rate of the line. An urgent frame can overtake the
+/// current frame.
 pub(super) struct TxQueue {
     baud: Option<u32>,
     urgent: Option<Outgoing>,
     writing: Option<Writing>,
-    /// When the line will have carried everything that was written.
+    /// Time at which the line will have sent all written bytes.
     free_at: Duration,
-    /// Time at which the line begins to carry the bytes that are being handed over.
+    /// Time at which the line begins to send the bytes that are currently passed to the operating system.
     begins_at: Option<Duration>,
-    /// End of the silence after an abandoned frame.
+    /// End of the silence after an aborted frame.
     silent_until: Duration,
 }
 
 impl TxQueue {
-    /// Creates the queue of a line with this rate in Bd; `None` for a line without a rate.
+    /// Creates the queue of a line with this bit rate in Bd; `None` means that the line has no bit rate.
     pub(super) fn new(baud: Option<u32>) -> Self {
         Self {
             baud,
@@ -71,22 +73,22 @@ impl TxQueue {
         }
     }
 
-    /// When the line will have carried everything that was written.
+    /// Returns the time at which the line will have sent all written bytes.
     pub(super) fn free_at(&self) -> Duration {
         self.free_at
     }
 
-    /// Sets the frame that overtakes all others.
+    /// Sets the frame that overtakes all other frames.
     pub(super) fn set_urgent(&mut self, urgent: Option<Outgoing>) {
         self.urgent = urgent;
     }
 
-    /// Rate of the line, Bd, if it has one.
+    /// Returns the bit rate of the line in Bd, or `None` if it has no bit rate.
     pub(super) fn baud(&self) -> Option<u32> {
         self.baud
     }
 
-    /// Returns true if a new frame can be begun.
+    /// Returns true if a new frame can begin.
     pub(super) fn is_free(&self) -> bool {
         self.writing.is_none() && self.urgent.is_none()
     }
@@ -96,14 +98,14 @@ impl TxQueue {
         self.writing = Some(Writing { outgoing, at: 0 });
     }
 
-    /// Returns the time at which [`next`](Self::next) may have more to write. `None`: no bytes wait.
+    /// Returns the time at which [`next`](Self::next) may return more bytes. Returns `None` if no bytes wait.
     pub(super) fn due(&self, now: Duration) -> Option<Duration> {
         if now < self.silent_until {
             return Some(self.silent_until);
         }
         if let Some(urgent) = &self.urgent {
-            // If the urgent frame replaces the current one, the current frame is abandoned when its next piece could be
-            // written.
+            // If the urgent frame replaces the current one, the current frame is aborted at the time at which its next
+            // piece could be written.
             let needed =
                 urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
             let ahead = AHEAD.saturating_sub(needed);
@@ -120,8 +122,8 @@ impl TxQueue {
         if now < self.silent_until {
             return (bytes, passed);
         }
-        // On a line without a rate, no bytes are assumed to be queued. Its frames are still written in pieces, so that a Stop
-        // can overtake them.
+        // On a line without a rate, no bytes are assumed to be queued. The frames are still written in pieces, so that
+        // a Stop can overtake them.
         let queued = bytes_in(self.free_at.saturating_sub(now), self.baud);
         let room = AHEAD.saturating_sub(queued);
         if self.urgent.is_some() {
@@ -166,15 +168,15 @@ impl TxQueue {
         (bytes, passed)
     }
 
-    /// Notes that the operating system accepted the bytes only now. If the line was idle, it began later than
-    /// estimated, so it is free later.
+    /// Records that the operating system accepted the bytes only now. If the line was idle, it began to send later than
+    /// estimated, so it is also free later.
     pub(super) fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);
         }
     }
 
-    /// Abandons the frame that has begun. Returns it, and true if the controller has received a part of it.
+    /// Aborts the current frame. Returns the frame, and true if the controller has received a part of it.
     pub(super) fn give_up(&mut self, now: Duration) -> Option<(Outgoing, bool)> {
         let writing = self.writing.take()?;
         if writing.at > 0 {
@@ -195,7 +197,7 @@ impl TxQueue {
     }
 }
 
-/// Returns the number of 8N1 bytes that the line sends in this time, rounded up.
+/// Returns the number of 8N1 bytes that the line sends in a time, rounded up.
 fn bytes_in(time: Duration, baud: Option<u32>) -> usize {
     baud.map_or(0, |baud| (time.as_secs_f64() * f64::from(baud) / 10.0).ceil() as usize)
 }

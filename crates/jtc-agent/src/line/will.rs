@@ -1,5 +1,5 @@
-//! Last will of a client, as in MQTT: its policy for the current motion. If this agent is killed, another agent applies
-//! the policy.
+//! Last will of a client, as in MQTT: the client's policy for the current motion. If this agent is killed, the next
+//! agent applies the policy.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, ExecCommand, TrajectoryState};
@@ -14,12 +14,12 @@ pub enum Moves {
     Upload,
     /// Motion, including a paused motion.
     Motion,
-    /// Teaching. The arm is led by hand, or may be led by hand soon.
+    /// Teaching. The arm is moved by hand (Teaching), or may soon be moved by hand.
     Teaching,
 }
 
 impl Moves {
-    /// Returns the cause in words.
+    /// Returns a text for the cause.
     pub fn text(self) -> &'static str {
         match self {
             Self::Upload => "an upload",
@@ -32,22 +32,22 @@ impl Moves {
 /// Client whose policy applies to the motion if the agent is killed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Will {
-    /// Name of the client for people.
+    /// Name of the client that users see.
     pub client: String,
-    /// Its policy.
+    /// Policy of this client.
     pub policy: Policy,
     /// Cause of the motion.
     pub what: Moves,
 }
 
-/// Result of applying a last will.
+/// Result of the application of a last will.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
     /// The arm is at rest.
     Rests,
     /// The motion continues.
     GoesOn,
-    /// The motion was paused before, and stays paused.
+    /// The motion was paused before, and the will leaves it paused.
     Paused,
     /// This command was sent.
     Sent(ExecCommand),
@@ -73,7 +73,7 @@ impl SharedLine {
             status.trajectory == TrajectoryState::Pause && status.state == ControllerState::HoldPos
         });
         match policy.command() {
-            // The motion is already paused; another Pause would only delay new clients.
+            // The motion is already paused; a second Pause would only delay new clients.
             Some(ExecCommand::Pause) if stands => Applied::Paused,
             Some(command) if self.hold(POLICY, command, now) => Applied::Sent(command),
             None if moves => Applied::GoesOn,
@@ -86,7 +86,7 @@ impl SharedLine {
         self.will.as_ref()
     }
 
-    /// Reports the will when it has changed.
+    /// Reports the last will if it has changed.
     pub(super) fn look_what_moves(&mut self, now: Duration) {
         let before = self.will.as_ref().map(|will| will.what);
         let will = self.motion_tracker.what(self.status.as_ref(), now, before).map(|what| self.will_of(what));
@@ -97,7 +97,7 @@ impl SharedLine {
     }
 
     /// Returns the will with the policy of the present or last lease holder. A stronger command that the controller has
-    /// not confirmed yet takes precedence.
+    /// not confirmed yet has priority.
     fn will_of(&self, what: Moves) -> Will {
         let holder = self.lease.as_ref().and_then(|lease| self.introduction(lease.holder));
         let (client, policy) =

@@ -19,7 +19,7 @@ use crate::owner::ClientPort;
 /// Reason why a command was not executed.
 pub(super) struct Refusal {
     pub outcome: Outcome,
-    /// Number of the error. 0: no error.
+    /// Number of the error; 0 if there was no error.
     pub error: u16,
     /// Reason in words.
     pub why: String,
@@ -98,17 +98,17 @@ impl Plc {
             Command::GripperOn => self.call(&http_session, |session| session.gripper(true)).await,
             Command::GripperOff => self.call(&http_session, |session| session.gripper(false)).await,
             Command::Clear => self.call(&http_session, Session::clear_all).await,
-            // These commands were already executed when they arrived.
+            // Pause, Stop and Release were already executed when they arrived.
             Command::None | Command::Pause | Command::Stop | Command::Release => Ok(()),
         }
     }
 
-    /// Returns an error if a coil of a connection holds the arm.
+    /// Returns an error if a coil of any connection holds the arm at rest.
     fn free_to_move(&self) -> Result<(), Refusal> {
         if self.is_held_by_a_coil() { Err(Refusal::new(Outcome::Coil)) } else { Ok(()) }
     }
 
-    /// Takes or renews the lease, which lasts for the time of the watchdog.
+    /// Takes or renews the lease, which lasts for the watchdog time of the PLC.
     fn take_lease(&self, http_session: &HttpSession) -> Result<(), Refusal> {
         let (policy, lasts) = self.watchdog();
         let taken = self.line.with(|line, now| {
@@ -139,7 +139,8 @@ impl Plc {
         let number = order.trajectory;
         let stored = self.jobs.store.get(number).ok_or_else(|| Refusal::new(Outcome::NoTrajectory))?;
         self.free_to_move()?;
-        // The turn is requested first. So while a job runs, the answer is "busy" and not a consequence of that job.
+        // The session is reserved first. While a job runs, the answer is therefore "busy", and not an error that this
+        // job causes.
         let turn = http_session.turn()?;
         self.take_lease(http_session)?;
         let reported = self.reported();
@@ -153,7 +154,7 @@ impl Plc {
         let order = RunOrder {
             course: Course::Along(Arc::new(stored.trajectory.clone())),
             approach: order.approach,
-            // The register always has a value. Its default of 100 means that the PLC has not chosen a speed.
+            // The register always has a value. The default value 100 means that the PLC has not chosen a speed.
             speed_percent: Some(order.speed).filter(|speed| *speed != 100).map(f64::from),
             repeat: order.repeat.into(),
             accept_device_limits: false,
@@ -232,14 +233,14 @@ impl Plc {
         if let Some(job) = http_session.job() {
             return Err(Unable::Busy(Some(job)).into());
         }
-        // If the client does not hold the lease, this has no effect.
+        // If the client does not hold the lease, this call has no effect.
         let _ = self.line.with(|line, now| line.release_lease(http_session.client, now));
         self.line.wake();
         self.resign();
         Ok(())
     }
 
-    /// Runs a short function with the lease.
+    /// Takes the lease and runs a short function.
     async fn call<E: Into<Error> + Send + 'static>(
         &self,
         http_session: &HttpSession,

@@ -1,9 +1,9 @@
-//! Allowed clients: addresses and networks.
+//! Addresses and networks of the clients that may connect.
 use std::fmt;
 use std::net::IpAddr;
 use std::str::FromStr;
 
-/// Address, or network of all addresses that begin with the same bits.
+/// Single address, or network of all addresses that begin with the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Network {
     address: IpAddr,
@@ -20,7 +20,7 @@ impl Network {
     pub fn contains(&self, address: IpAddr) -> bool {
         let (own, other) = (number(self.address), number(address.to_canonical()));
         let left = own.1 - u32::from(self.bits);
-        // `left` may be the full width. `checked_shr` then returns `None`.
+        // `left` may be the full number of address bits. `checked_shr` then returns `None`.
         own.1 == other.1 && own.0.checked_shr(left).unwrap_or(0) == other.0.checked_shr(left).unwrap_or(0)
     }
 }
@@ -65,7 +65,7 @@ impl fmt::Display for Network {
 pub struct Allowed(Vec<Network>);
 
 impl Allowed {
-    /// Allows these networks; an empty list allows only this computer.
+    /// Creates the list of allowed networks; an empty list allows only this computer.
     pub fn new(networks: Vec<Network>) -> Self {
         Self(networks)
     }

@@ -1,4 +1,4 @@
-//! Numbers of a PLC's commands, their outcomes and errors.
+//! Numbers of the commands of a PLC, and numbers of their outcomes and errors.
 
 macro_rules! numbered {
     ($(#[$doc:meta])* $name:ident { $($(#[$meaning:meta])* $variant:ident = $code:literal, $text:literal;)+ }) => {
@@ -54,7 +54,7 @@ numbered! {
         Clear = 9, "clear the errors of the controller and of all drives";
         /// Recover.
         Recover = 10, "recover: start a job that brings the controller back to a held arm";
-        /// Recover, with the controller's defaults.
+        /// Recovery with the controller's default parameters.
         RecoverWithDefaults = 11, "recover a controller that has not received its arm: it uses the stored arm, or its defaults if it has none";
         /// Speed.
         SetSpeed = 12, "set speed: run the present motion and later ones at `speed` % of their own speed";
@@ -86,11 +86,11 @@ numbered! {
         Held = 6, "another client holds the lease: nothing was done";
         /// Another client stopped or paused the arm.
         Stopped = 7, "another client stopped or paused the arm less than three seconds ago: nothing was done";
-        /// A coil of a connection is 1.
+        /// The Stop or Pause coil of a connection is 1.
         Coil = 8, "the coil `stop` or `pause` of a connection is 1: nothing was done";
-        /// Wrong state of the arm.
+        /// The arm is in a state that does not permit the command.
         NotReady = 9, "the state of the arm does not permit this command (see `state`, `errors`, `ready`, `paused`): nothing was done";
-        /// No answer of the controller.
+        /// The controller did not answer.
         NoController = 10, "the controller is silent or did not answer the command: the arm may be moving";
         /// Refused or failed.
         Failed = 11, "the command was refused or failed: `command_error` has the reason";
@@ -100,7 +100,7 @@ numbered! {
 /// Number for an error code that is not in [`ERRORS`].
 pub const OTHER_ERROR: u16 = 255;
 
-/// Errors by number: their codes in the API, and descriptions. Numbers are never reused.
+/// Error numbers, with their codes in the API and descriptions. Numbers are never reused.
 #[rustfmt::skip]
 pub const ERRORS: &[(u16, &str, &str)] = &[
     (1, "stopped", "a client stopped or paused the arm before this command moved it"),

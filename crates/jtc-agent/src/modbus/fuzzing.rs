@@ -1,7 +1,7 @@
 //! Body of the fuzz target `modbus_stream`, which uses only this file and `pdu` of this crate.
 use super::pdu::{Device, Exception, HEADER_LEN, Header, Table, answer};
 
-/// Longest response with its header, bytes, by the standard.
+/// Longest response with its header that the standard permits, bytes.
 const RESPONSE_MAX: usize = 260;
 
 /// Device with sixteen entries in each table; higher addresses do not exist.
@@ -42,9 +42,9 @@ impl Device for Sixteen {
     }
 }
 
-/// Simulates a connection that sends these bytes. Checks that each request gets one response with its transaction
-/// number, no longer than the standard allows, and that the response tells if the request was executed. Also checks
-/// that a refused request writes nothing, and that written values can be read back.
+/// Simulates a connection that sends these bytes. Checks that each request gets one response with the same transaction
+/// number and a permitted length. Checks that the response shows if the request was executed. Also checks that a
+/// refused request does not write, and that written values can be read back.
 ///
 /// # Panics
 ///

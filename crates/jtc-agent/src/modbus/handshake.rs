@@ -4,7 +4,7 @@ use super::codes::{Command, Outcome};
 use super::map::{HOLDINGS, WATCHDOG_MIN, holding};
 use super::pdu::Exception;
 
-/// Command with the values that its parameters had when the sequence number was written.
+/// Command with the parameter values at the time when the sequence number was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Order {
     /// Sequence number.
@@ -17,7 +17,7 @@ pub struct Order {
     pub speed: u16,
     /// Number of runs.
     pub repeat: u16,
-    /// `true`: if the arm is not at the first point, move it there first.
+    /// `true` if the arm must first move to the first point when it is not there.
     pub approach: bool,
     /// Watchdog, ms.
     pub watchdog_ms: u16,
@@ -25,9 +25,10 @@ pub struct Order {
 
 /// Holding registers of the commanding PLC, and its last command.
 ///
-/// A command must have the sequence number after that of the last command. With any other number, no command is executed.
-/// So a write that is repeated after a lost answer has no effect. A PLC may repeat values that it has written before
-/// the agent was started. These values have no effect either, because each agent starts with a different number.
+/// The sequence number of a command must follow the sequence number of the last command. A command with any other
+/// number is not executed. A write that is repeated after a lost answer therefore has no effect. A PLC may repeat
+/// values that it wrote before the agent was started. These values have no effect either, because each agent starts
+/// with a different number.
 #[derive(Clone, Debug)]
 pub struct Handshake {
     values: [u16; holding::COUNT],
@@ -52,7 +53,7 @@ impl Handshake {
         new
     }
 
-    /// Resets the registers, because another PLC has written them. The sequence number continues.
+    /// Resets the registers, because they contain values of another PLC. The sequence number is not reset.
     pub fn forget(&mut self) {
         self.values = HOLDINGS.map(|row| row.default);
         self.values[holding::SEQUENCE] = self.taken;
@@ -63,7 +64,7 @@ impl Handshake {
         &self.values
     }
 
-    /// Returns the time without a request after which the policy applies, ms; 0: off.
+    /// Returns the time without a request after which the policy applies, ms; 0 if the watchdog is off.
     pub fn watchdog_ms(&self) -> u16 {
         self.values[holding::WATCHDOG]
     }
@@ -78,8 +79,8 @@ impl Handshake {
         self.taken != self.acknowledged
     }
 
-    /// Checks that these values may be written. `commands`: this PLC holds the lease, so it cannot switch its watchdog
-    /// off.
+    /// Checks that these values may be written. If `commands` is `true`, this PLC holds the lease and cannot switch its
+    /// watchdog off.
     ///
     /// # Errors
     ///
@@ -100,7 +101,8 @@ impl Handshake {
         Ok(())
     }
 
-    /// Writes values that passed [`check`](Self::check), all at once. Returns the command that they complete, if any.
+    /// Writes values that [`check`](Self::check) has accepted, in one step. Returns the command that the values
+    /// complete, if any.
     pub fn write(&mut self, at: u16, values: &[u16]) -> Option<Order> {
         let at = usize::from(at);
         for (register, value) in self.values.iter_mut().skip(at).zip(values) {
@@ -164,7 +166,7 @@ mod tests {
         assert_eq!(write(&mut handshake, holding::TRAJECTORY, &[4]), Ok(None));
         handshake.acknowledge(42, Outcome::Done, 0);
         assert_eq!((handshake.last(), handshake.is_pending()), ((42, Outcome::Done, 0), false));
-        // All registers in one write.
+        // One write sets all registers.
         let all = [500, 2, 5, 20, 7, 1, START, 43];
         let order = write(&mut handshake, 0, &all).expect("it may be").expect("a command");
         let whole = Order {
@@ -221,7 +223,7 @@ mod tests {
             assert_eq!(write(&mut handshake, at, values), Err(exception), "{at} {values:?}");
         }
         assert_eq!((*handshake.values(), handshake.is_pending()), (before, false));
-        // A commanding PLC needs a watchdog.
+        // A PLC that sends commands needs a watchdog.
         assert_eq!(handshake.check(holding::WATCHDOG as u16, &[0], true), Err(Exception::Value));
         assert_eq!(handshake.check(holding::WATCHDOG as u16, &[0], false), Ok(()));
     }
@@ -237,8 +239,8 @@ mod tests {
     }
 
     proptest! {
-        /// For any writes in any order, a command results only from the next sequence number, with the values of the
-        /// registers at that moment.
+        /// For any writes in any order, only the next sequence number starts a command. The command uses the register
+        /// values at that time.
         #[test]
         fn nothing_is_done_without_a_new_number(
             first in any::<u16>(),
@@ -247,7 +249,8 @@ mod tests {
             let mut handshake = Handshake::new(first);
             let mut last = first;
             for (at, mut values, near) in writes {
-                // Sequence numbers near the last one are included. Otherwise the next number would hardly ever occur.
+                // Sequence numbers near the last one are included. Otherwise the test would almost never use the next
+                // number.
                 let place = holding::SEQUENCE.checked_sub(usize::from(at)).filter(|place| *place < values.len());
                 if let Some(place) = place.filter(|_| near) {
                     values[place] = last.wrapping_add(values[place] % 3);

@@ -18,17 +18,17 @@ pub const UNKNOWN: u16 = u16::MAX;
 const UNKNOWN_LONG: u32 = u32::MAX;
 /// Age of the last status after which the controller is reported as disconnected.
 pub const FRESH: Duration = Duration::from_secs(1);
-/// Period of the heartbeat counter.
+/// Interval at which the heartbeat counter increases.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 
-/// Lease holder from the point of view of a connection.
+/// Lease holder as seen from one connection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Holder {
     /// No client.
     #[default]
     Nobody = 0,
-    /// PLC of this connection.
+    /// The PLC of this connection holds the lease.
     Own = 1,
     /// Another client.
     Other = 2,
@@ -37,17 +37,17 @@ pub enum Holder {
 /// Values that a connection can read.
 #[derive(Clone, Debug, Default)]
 pub struct View {
-    /// Time of the agent.
+    /// Present time by the agent's clock.
     pub now: Duration,
     /// `true` if the controller is simulated: no real arm moves.
     pub simulated: bool,
     /// `true` if the port was lost.
     pub lost: bool,
-    /// Age and content of the last status.
+    /// Age and contents of the last status.
     pub status: Option<(Duration, Status)>,
-    /// Cause and age in ms of the current held stop.
+    /// Cause and age (ms) of the current held Stop.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints with an encoder jump, one bit each.
+    /// Joints with an encoder jump, one bit per joint.
     pub jumped: u8,
     /// Speed override, %.
     pub speed: Option<u16>,
@@ -59,9 +59,9 @@ pub struct View {
     pub job: Option<Job>,
     /// Sequence number of the last acknowledged command.
     pub acknowledged: u16,
-    /// Outcome of that command.
+    /// Outcome of the last acknowledged command.
     pub outcome: Outcome,
-    /// Number of the error of that command.
+    /// Error number of the last acknowledged command.
     pub error: u16,
 }
 
@@ -83,12 +83,13 @@ impl View {
         self.status(f32::NAN, known).to_bits()
     }
 
-    /// Returns a value of the cause of the current held stop. 0: no held stop is active, or its cause is not known.
+    /// Returns a value of the cause of the current held Stop; 0 if no held Stop is active, or if its cause is not
+    /// known.
     fn stop(&self, read: impl FnOnce(&StopCause) -> u32) -> u32 {
         self.stop.as_ref().map_or(0, |(cause, _)| read(cause))
     }
 
-    /// Returns the bits of a value or limit of the cause. NaN: the cause does not have one.
+    /// Returns the bits of a value or limit of the cause. Returns NaN if the cause has no such value.
     fn figure(&self, read: impl FnOnce((Option<f32>, Option<f32>)) -> Option<f32>) -> u32 {
         let known = self.stop.as_ref().and_then(|(cause, _)| read(held_stop::figures(cause)));
         known.unwrap_or(f32::NAN).to_bits()
@@ -125,11 +126,11 @@ impl View {
 /// Format of a value in registers. The first of two registers has the upper 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// A single register, unsigned.
+    /// Single unsigned register.
     U16,
     /// Two registers, unsigned.
     U32,
-    /// Two registers, IEEE 754.
+    /// Two registers with a 32-bit number (IEEE 754).
     F32,
 }
 
@@ -139,7 +140,7 @@ impl Form {
         if self == Self::U16 { 1 } else { 2 }
     }
 
-    /// Returns the name for people.
+    /// Returns the name of the format for the documentation.
     pub fn name(self) -> &'static str {
         match self {
             Self::U16 => "u16",
@@ -153,7 +154,7 @@ impl Form {
 pub struct Input {
     /// Address of the first register, from 0.
     pub at: u16,
-    /// Number of values: one, or one per joint.
+    /// Number of values, which is one or one per joint.
     pub count: u16,
     /// Format of each value.
     pub form: Form,
@@ -161,7 +162,7 @@ pub struct Input {
     pub name: &'static str,
     /// Meaning of the value.
     pub meaning: &'static str,
-    /// Function for its n-th value.
+    /// Function that returns the n-th value.
     pub value: fn(&View, usize) -> u32,
 }
 
@@ -171,7 +172,7 @@ pub struct DiscreteInput {
     pub name: &'static str,
     /// Meaning of the bit.
     pub meaning: &'static str,
-    /// Function for its value.
+    /// Function that returns the value of the bit.
     pub value: fn(&View) -> bool,
 }
 
@@ -207,7 +208,7 @@ const fn joints(
     Input { at, count: JOINTS as u16, form, name, meaning, value }
 }
 
-/// Input registers, by address.
+/// Input registers, in the order of their addresses.
 #[rustfmt::skip]
 pub const INPUTS: &[Input] = &[
     one(0, Form::U16, "map_version", "version of this map", |_, _| VERSION.into()),
@@ -285,7 +286,7 @@ pub const DISCRETE_INPUTS: &[DiscreteInput] = &[
 pub mod holding {
     /// Time without a request after which the policy applies, ms.
     pub const WATCHDOG: usize = 0;
-    /// Policy for a motion after that time.
+    /// Policy that applies to a motion after this time.
     pub const POLICY: usize = 1;
     /// Number of the trajectory.
     pub const TRAJECTORY: usize = 2;
@@ -293,7 +294,7 @@ pub mod holding {
     pub const SPEED: usize = 3;
     /// Number of runs.
     pub const REPEAT: usize = 4;
-    /// Motion to the first point before the run.
+    /// Selection of a motion to the first point before the trajectory.
     pub const APPROACH: usize = 5;
     /// Command.
     pub const COMMAND: usize = 6;
@@ -321,11 +322,11 @@ pub const HOLDINGS: [Holding; holding::COUNT] = [
     Holding { name: "sequence", range: (0, u16::MAX), default: 0, meaning: "sequence number. Write `acknowledged` plus one to execute the command" },
 ];
 
-/// Address of the coil that stops.
+/// Address of the coil that stops the arm.
 pub const STOP: usize = 0;
-/// Address of the coil that pauses.
+/// Address of the coil that pauses the arm.
 pub const PAUSE: usize = 1;
-/// Coils, from address 0: name and meaning.
+/// Coils from address 0, with name and meaning.
 pub const COILS: [(&str, &str); 2] = [
     ("stop", "a change from 0 to 1 stops the motion on its path, at once"),
     ("pause", "a change from 0 to 1 pauses the motion on its path, at once"),
@@ -379,8 +380,8 @@ mod tests {
         }
     }
 
-    /// The registers have the word order that the page documents. The expected words were computed by hand: 1.5 is
-    /// 3FC00000, 70000 is 00011170.
+    /// The registers have the word order that the documentation page describes. The expected words were computed by
+    /// hand: 1.5 is 3FC00000, 70000 is 00011170.
     #[test]
     fn two_registers_have_the_upper_half_first() {
         let mut status = Status { point: 70_000, ..Status::default() };

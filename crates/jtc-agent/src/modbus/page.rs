@@ -1,4 +1,4 @@
-//! Tables of docs/modbus.md, made from the tables of the code.
+//! Tables of docs/modbus.md, generated from the tables in the code.
 use std::fmt::Write as _;
 
 use jtc_host::held_stop;

@@ -1,15 +1,16 @@
-//! Requests and responses of Modbus TCP. The module does no I/O: it takes the bytes of a request and returns the bytes
-//! of the response.
+//! Requests and responses of Modbus TCP. The module does not do I/O: it takes the bytes of a request and returns the
+//! bytes of the response.
 //!
 //! The standard is the *Modbus Application Protocol* V1.1b3 with the *Messaging on TCP/IP Implementation Guide* V1.0b.
 //! A request is checked in the order of the standard's state diagrams (function, quantity, address) and then executed.
-//! Any received bytes lead to a response or to the end of the connection. A write is executed completely or not at all.
+//! For any received bytes, the server sends a response or closes the connection. A write is executed completely or not
+//! at all.
 
-/// Length of the header before a request, bytes: transaction, protocol, length, unit.
+/// Length of the header before a request, bytes. The header contains transaction, protocol, length and unit.
 pub const HEADER_LEN: usize = 7;
 /// Longest request or response after the header, bytes.
 const PDU_MAX: usize = 253;
-/// Largest quantities of one request, by the standard.
+/// Largest quantities in one request that the standard permits.
 const READ_BITS_MAX: u16 = 2000;
 const READ_REGISTERS_MAX: u16 = 125;
 const WRITE_BITS_MAX: u16 = 1968;
@@ -38,9 +39,9 @@ pub enum Exception {
     Address = 2,
     /// A quantity, a length or a value is invalid.
     Value = 3,
-    /// The device failed. Here: the controller cannot be reached.
+    /// The device failed. In this server: the controller cannot be reached.
     Failure = 4,
-    /// The device is busy. Here: another connection commands.
+    /// The device is busy. In this server: another connection sends the commands.
     Busy = 6,
 }
 
@@ -60,14 +61,14 @@ pub trait Device {
     /// [`Exception`].
     fn registers(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<u16>, Exception>;
 
-    /// Writes coils from address `at` on: all of them, or none.
+    /// Writes all coils from address `at` on, or none of them.
     ///
     /// # Errors
     ///
     /// [`Exception`]: nothing was written.
     fn write_coils(&mut self, at: u16, values: &[bool]) -> Result<(), Exception>;
 
-    /// Writes holding registers from address `at` on: all of them, or none.
+    /// Writes all holding registers from address `at` on, or none of them.
     ///
     /// # Errors
     ///
@@ -78,7 +79,7 @@ pub trait Device {
 /// Header of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Request number of the client. The response repeats it unchanged, like the unit.
+    /// Request number of the client. The response contains the same number and the same unit.
     transaction: [u8; 2],
     unit: u8,
     /// Length of the request after the header, bytes.
@@ -86,8 +87,8 @@ pub struct Header {
 }
 
 impl Header {
-    /// Returns `None` if the header is not Modbus or has an invalid length. In this case the start of the next request
-    /// is not known.
+    /// Parses a header; returns `None` if it is not a Modbus header or has an invalid length. In this case the server
+    /// cannot find the start of the next request.
     pub fn parse(bytes: [u8; HEADER_LEN]) -> Option<Self> {
         let [t0, t1, p0, p1, l0, l1, unit] = bytes;
         let len = usize::from(u16::from_be_bytes([l0, l1])).checked_sub(1)?;
@@ -177,7 +178,7 @@ fn read_registers(
     Ok([function, (2 * values.len()) as u8].into_iter().chain(bytes).collect())
 }
 
-/// Returns exactly two words.
+/// Returns the data if it is exactly two words.
 fn two(rest: &[u8]) -> Result<(u16, u16), Exception> {
     let [a, b, c, d] = rest.try_into().map_err(|_| Exception::Value)?;
     Ok((u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])))
@@ -263,8 +264,8 @@ mod tests {
     }
 
     proptest! {
-        /// Any request gets a response with its function code that is not too long. No request writes more entries than
-        /// exist.
+        /// For any request, the response has the same function code and is not too long. No request writes more entries
+        /// than exist.
         #[test]
         fn any_bytes_are_answered(function in 0..24_u8, rest in prop::collection::vec(any::<u8>(), 0..PDU_MAX)) {
             let pdu: Vec<u8> = [function].into_iter().chain(rest).collect();

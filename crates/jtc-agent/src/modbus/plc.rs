@@ -1,4 +1,4 @@
-//! Requests of PLCs: the values that they read, which connection may command, and the outcome of commands.
+//! Requests of PLCs: the values that PLCs read, the connection that may send commands, and the outcome of commands.
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,8 +18,8 @@ use crate::owner::Line;
 
 /// Name of the PLC client on the line.
 const NAME: &str = "the PLC (Modbus)";
-/// Silence after which a commanding connection is considered lost. The limit is `GONE`, or longer with a longer
-/// watchdog. Without a watchdog it is `GONE_UNWATCHED`.
+/// Duration of silence after which a connection that sends commands counts as lost. The limit is `GONE`, or more if the
+/// watchdog time is longer. Without a watchdog it is `GONE_UNWATCHED`.
 const GONE: Duration = Duration::from_secs(1);
 const GONE_UNWATCHED: Duration = Duration::from_secs(60);
 
@@ -32,10 +32,10 @@ pub struct Connection {
     pub peer: SocketAddr,
 }
 
-/// PLC that writes the holding registers.
+/// State of the PLC that writes the holding registers.
 struct Operator {
     address: IpAddr,
-    /// Number of its connection. `None`: the PLC has disconnected or released the lease.
+    /// Number of the PLC's connection. `None` if the PLC has disconnected or released the lease.
     connection: Option<u64>,
     seen: Instant,
 }
@@ -43,10 +43,11 @@ struct Operator {
 struct State {
     handshake: Handshake,
     operator: Option<Operator>,
-    /// Coils of each connection that has written a coil.
+    /// Coil values of each connection that has written a coil.
     coils: BTreeMap<u64, [bool; COILS.len()]>,
     http_session: Arc<HttpSession>,
-    /// Last job. The next two fields are the number of the last event that was read, and the number of runs.
+    /// Last job. The next two fields contain the number of the last event that was read, and the number of finished
+    /// runs.
     job: Option<u64>,
     looked: u64,
     runs: u32,
@@ -64,7 +65,8 @@ pub struct Plc {
 }
 
 impl Plc {
-    /// Returns the device of a line. The first command must have the sequence number after `sequence`.
+    /// Creates the Modbus device of a serial line. The first command must have the sequence number that follows
+    /// `sequence`.
     pub fn new(
         line: Line,
         jobs: Arc<Jobs>,
@@ -76,7 +78,8 @@ impl Plc {
             handshake: Handshake::new(sequence),
             operator: None,
             coils: BTreeMap::new(),
-            // The client joins now, so that Stops of other clients apply to it even before its first request.
+            // The client is added to the line now, so that Stops of other clients apply to it even before its first
+            // request.
             http_session: http_session(&line),
             job: None,
             looked: 0,
@@ -97,7 +100,7 @@ impl Plc {
         response
     }
 
-    /// Removes a connection. The lease lasts until the watchdog ends it, so that the PLC can connect again.
+    /// Removes a connection. The lease lasts until the watchdog ends it, so that the PLC can reconnect.
     pub fn left(&self, connection: &Connection) {
         let mut state = self.lock();
         state.coils.remove(&connection.number);
@@ -106,7 +109,8 @@ impl Plc {
         }
     }
 
-    /// Returns `true` if this connection must not be closed: it commands, or one of its coils holds the arm.
+    /// Returns `true` if this connection must not be closed: the connection sends commands, or one of its coils holds
+    /// the arm at rest.
     pub fn needs_its_place(&self, connection: u64) -> bool {
         let state = self.lock();
         let holds = state.coils.get(&connection).is_some_and(|coils| coils.contains(&true));
@@ -116,7 +120,7 @@ impl Plc {
             })
     }
 
-    /// Returns `true` if a request was received within this time.
+    /// Returns `true` if a request was received within the time `within`.
     pub fn is_asked(&self, within: Duration) -> bool {
         self.lock().asked.is_some_and(|asked| asked.elapsed() < within)
     }
@@ -141,17 +145,17 @@ impl Plc {
         state.http_session.clone()
     }
 
-    /// Returns `true` if a coil of any connection is 1, which holds the arm.
+    /// Returns `true` if a coil of any connection is 1, which holds the arm at rest.
     pub(super) fn is_held_by_a_coil(&self) -> bool {
         self.lock().coils.values().any(|coils| coils.contains(&true))
     }
 
-    /// Returns the policy for a motion without the PLC, and the time after which it applies.
+    /// Returns the policy for a motion when the PLC is silent, and the time after which this policy applies.
     pub(super) fn watchdog(&self) -> (Policy, Duration) {
         watchdog(&self.lock().handshake)
     }
 
-    /// Releases the lease of the PLC.
+    /// Releases the lease that the PLC holds.
     pub(super) fn resign(&self) {
         if let Some(operator) = &mut self.lock().operator {
             operator.connection = None;
@@ -177,7 +181,7 @@ impl Plc {
         self.line.with(|line, _| line.lease().is_some_and(|lease| lease.holder == state.http_session.client))
     }
 
-    /// Renews the lease after a request of the connection that commands.
+    /// Renews the lease after a request of the connection that sends commands.
     fn renew(&self, connection: &Connection) {
         let mut state = self.lock();
         let Some(operator) =
@@ -266,7 +270,7 @@ impl Plc {
         if lost.is_some() {
             return Err(Exception::Failure);
         }
-        // A connection may command again at once after its own Stop or Pause.
+        // A connection may send commands again immediately after its own Stop or Pause.
         let state = self.lock();
         let is_own = |operator: &Operator| operator.connection == Some(connection.number);
         let own = state.operator.as_ref().is_some_and(is_own).then_some(state.http_session.client);
@@ -309,7 +313,7 @@ impl Plc {
 }
 
 impl Operator {
-    /// Returns `true` if the commanding connection is closed, or has been silent for too long.
+    /// Returns `true` if the connection that sends commands is closed, or has been silent for too long.
     fn is_gone(&self, handshake: &Handshake) -> bool {
         let after = match handshake.watchdog_ms() {
             0 => GONE_UNWATCHED,
@@ -320,7 +324,8 @@ impl Operator {
 }
 
 impl State {
-    /// Gives this connection the holding registers if no other connection has them. `leased`: a PLC holds the lease.
+    /// Assigns the holding registers to this connection, unless another connection uses them. `leased` is `true` if a
+    /// PLC holds the lease.
     fn operate(&mut self, connection: &Connection, leased: bool) -> Result<(), Exception> {
         let address = connection.peer.ip();
         let same = self.operator.as_ref().is_some_and(|operator| operator.address == address);
@@ -385,7 +390,7 @@ impl Device for Asking<'_> {
         let before = coils;
         coils[usize::from(at)..][..values.len()].copy_from_slice(values);
         let rises = |coil: usize| coils[coil] && !before[coil];
-        // A Stop takes precedence over a Pause.
+        // A Stop has priority over a Pause.
         if rises(map::STOP) {
             self.plc.halt(self.connection, ExecCommand::Stop)?;
         } else if rises(map::PAUSE) {

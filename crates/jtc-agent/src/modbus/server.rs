@@ -19,19 +19,19 @@ use super::plc::{Connection, Plc};
 
 /// Largest number of connections.
 pub const CONNECTIONS_MAX: usize = 8;
-/// Silence after which a connection may be closed to make room for a new one, unless it commands or holds the arm by a
-/// coil.
+/// Duration of silence after which a connection may be closed for a new connection. Connections that send commands or
+/// hold the arm by a coil are excepted.
 const GIVES_WAY: Duration = Duration::from_secs(2);
-/// Silence after which a connection is closed; longer than the longest watchdog.
+/// Duration of silence after which a connection is closed, which is longer than the longest watchdog time.
 const IDLE: Duration = Duration::from_secs(90);
 /// Longest time in which a response may stay unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
-/// Largest number of requests of a connection: per second, and in one burst.
+/// Largest number of requests of a connection, per second and in one burst.
 const REQUESTS_PER_S: f64 = 250.0;
 const REQUESTS_AT_ONCE: f64 = 50.0;
 /// Interval at which the end condition is checked.
 const LOOK: Duration = Duration::from_millis(50);
-/// Interval at which the controller is asked for its speed override, while a PLC sends requests.
+/// Interval at which the agent reads the speed override from the controller while a PLC sends requests.
 const SPEED: Duration = Duration::from_secs(2);
 
 /// Modbus server on a separate thread. The server ends on drop.
@@ -73,7 +73,7 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of that thread has been printed.
+            // A panic of the server thread was already printed.
             drop(thread.join());
         }
     }
@@ -106,16 +106,16 @@ struct Open {
 
 type Connections = Arc<Mutex<BTreeMap<u64, Open>>>;
 
-/// Accepts connections without end.
+/// Accepts connections in an endless loop.
 async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc<Plc>) {
     let (connections, start, mut last) = (Connections::default(), Instant::now(), 0);
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
-            // The limit of open files is reached for now.
+            // The program has reached its limit of open files for the moment.
             tokio::time::sleep(LOOK).await;
             continue;
         };
-        // The drop of the stream closes the connection at once.
+        // Dropping the stream closes the connection immediately.
         if !allowed.contains(peer.ip()) {
             plc.refused(peer, "this address is not allowed: --modbus-allow lists the allowed addresses");
             continue;
@@ -130,14 +130,15 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
         let gone = Gone { connection, plc: plc.clone(), connections: connections.clone() };
         let mut open = lock(&connections);
         let conversing = converse(stream, gone, seen.clone(), start);
-        // The connection cannot end before it is in the list: the lock is held, and the connection runs on this thread.
+        // The connection cannot end before it is in the list, because the lock is held and the connection runs on this
+        // thread.
         open.insert(last, Open { seen, abort: tokio::spawn(conversing).abort_handle() });
     }
 }
 
-/// Makes room for another connection, if necessary by closing an idle one. Returns `false` if no connection can be
-/// closed, because each of them commands, holds the arm by a coil, or was not idle long enough. If all of them hold the
-/// arm, it is at rest, and no motion can begin.
+/// Ensures that another connection is possible, if necessary by closing an idle connection. Returns `false` if no
+/// connection can be closed, because each of them sends commands, holds the arm by a coil, or was not idle long enough.
+/// If all connections hold the arm, the arm is at rest and no motion can begin.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {
@@ -163,7 +164,7 @@ fn millis(since: Instant) -> u64 {
     u64::try_from(since.elapsed().as_millis()).unwrap_or(u64::MAX)
 }
 
-/// Removes its connection on drop.
+/// Guard that removes its connection from the list on drop.
 struct Gone {
     connection: Connection,
     plc: Arc<Plc>,
@@ -195,7 +196,7 @@ async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start
     }
 }
 
-/// Reads a request; `None`: the connection has ended.
+/// Reads a request; returns `None` if the connection has ended.
 async fn read(stream: &mut TcpStream, request: &mut Vec<u8>) -> Option<Header> {
     let mut head = [0; HEADER_LEN];
     stream.read_exact(&mut head).await.ok()?;
@@ -216,7 +217,7 @@ impl Pace {
         Self { allowance: REQUESTS_AT_ONCE, at: Instant::now() }
     }
 
-    /// Returns the time that the next request must wait.
+    /// Returns the time for which the next request must wait.
     fn wait(&mut self, now: Instant) -> Duration {
         let passed = now.saturating_duration_since(self.at).as_secs_f64();
         self.allowance = (self.allowance + passed * REQUESTS_PER_S).min(REQUESTS_AT_ONCE) - 1.0;
@@ -234,7 +235,7 @@ mod tests {
         let (mut pace, begin) = (Pace::new(), Instant::now());
         pace.at = begin;
         // The client sends each request after the answer to the previous one. The first requests form a burst, and the
-        // others are sent at the limited rate.
+        // later requests are sent at the limited rate.
         let mut now = begin;
         for _ in 0..1000 {
             now += pace.wait(now);

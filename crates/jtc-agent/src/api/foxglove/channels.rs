@@ -5,7 +5,7 @@ use jtc_host::recording::Topic;
 
 use super::protocol::{Channel, Service, Shape, Subscription};
 
-/// Number of the channel that carries the status as text. The other channels carry numbers.
+/// Number of the channel that carries the status as text. All other channels carry numeric values.
 pub(super) const STATUS: u32 = Topic::ALL.len() as u32 + 1;
 const STATUS_SCHEMA: &str = r#"{
   "type": "object",
@@ -66,7 +66,7 @@ pub(super) fn services() -> Vec<Service<'static>> {
     vec![service(STOP, "stop"), service(PAUSE, "pause")]
 }
 
-/// Subscription: its channel, and `true` if constant data must still be sent.
+/// Subscription, with its channel and `true` if constant data must still be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Subscribed {
     channel: u32,
@@ -104,7 +104,7 @@ impl Subscriptions {
         self.0.remove(&id);
     }
 
-    /// Returns the subscriptions of constant data that have not received it yet.
+    /// Returns the subscriptions of constant data for which the data was not sent yet.
     pub(super) fn take_latched(&mut self) -> Vec<u32> {
         let due = |(id, subscribed): (&u32, &mut Subscribed)| {
             std::mem::take(&mut subscribed.latched).then_some(*id)

@@ -2,7 +2,7 @@
 //! with a byte for their type. Numbers are little-endian.
 use std::collections::BTreeMap;
 
-/// The two names of the protocol in the handshake.
+/// Names of the protocol in the handshake; both are accepted.
 pub(super) const NAMES: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 
 /// Text messages to a client.
@@ -17,7 +17,7 @@ pub(super) enum ToClient<'a> {
         metadata: BTreeMap<&'a str, String>,
         session_id: &'a str,
     },
-    /// Message for people; level 0: information, 1: warning, 2: error.
+    /// Message for the user; level 0: information, 1: warning, 2: error.
     Status { level: u8, message: String },
     /// Channels that a client can subscribe to.
     Advertise { channels: Vec<Channel<'a>> },
@@ -87,7 +87,7 @@ pub(super) struct Subscription {
     pub channel_id: u32,
 }
 
-/// Returns a message on a channel, for one subscription.
+/// Returns the message with the data of a channel for one subscription.
 pub(super) fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(13 + payload.len());
     bytes.push(1);
@@ -106,7 +106,7 @@ pub(super) struct Call<'a> {
 }
 
 impl<'a> Call<'a> {
-    /// Returns `None` if a binary message is not a valid call.
+    /// Parses a binary message; returns `None` if it is not a valid call.
     pub(super) fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (2, rest) = bytes.split_first()? else { return None };
         let (service, rest) = number(rest)?;
@@ -149,7 +149,7 @@ mod tests {
         assert_eq!(call, Call { service: 7, call: 265, encoding: b"json" });
         let answer = [3, 7, 0, 0, 0, 9, 1, 0, 0, 4, 0, 0, 0, b'j', b's', b'o', b'n', b'{', b'}'];
         assert_eq!(call.answer(b"{}"), answer);
-        // A message that is cut off, of another type, or too long is not a valid call.
+        // A message is not a valid call if it is incomplete, too long, or of another type.
         for n in 0..17 {
             assert_eq!(Call::parse(&bytes[..n]), None, "{n}");
         }

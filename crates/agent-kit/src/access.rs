@@ -1,8 +1,9 @@
 //! Access control: tokens, and checks of the origin of a request.
 //!
-//! A page of another site that is open in a browser can send requests to the address of this computer. Such a request
-//! is recognised by its `Origin` header. A page can also point its own host name to this computer (DNS rebinding); its
-//! request is recognised by its `Host` header. The agent refuses both kinds of request, even with a valid token.
+//! A page of another site that is open in a browser can send requests to the address of this computer. The agent
+//! recognises such a request by the `Origin` header. A page can also point its own host name to this computer (DNS
+//! rebinding). The agent recognises a request of such a page by the `Host` header. The agent refuses both kinds of
+//! request, even with a valid token.
 mod paths;
 mod tokens;
 
@@ -27,7 +28,7 @@ pub enum Role {
     Operator,
 }
 
-/// Number of wrong tokens per minute that are reported as wrong: per address, and from all addresses together. Further
+/// Number of wrong tokens per minute that are reported as wrong, per address and from all addresses together. Further
 /// wrong tokens are refused with "too many".
 const WRONG_MAX: usize = 20;
 const ALL_WRONG_MAX: usize = 2000;
@@ -115,7 +116,8 @@ pub struct Access {
 }
 
 impl Access {
-    /// Returns the rules of an agent that listens at `listen` and has these names in addition to its address.
+    /// Returns the rules of an agent that listens at `listen` and has the names in the argument in addition to its
+    /// address.
     pub fn new(tokens: Tokens, listen: SocketAddr, names: &[String]) -> Self {
         let port = listen.port();
         let mut hosts: Vec<String> = names
@@ -403,7 +405,7 @@ mod tests {
                 assert!(text.len() < 320 && text.contains(&evil[..length.min(200)]), "{text}");
             }
         }
-        // The complete text of an origin is compared with an allowed one, not only its beginning.
+        // The complete text of an origin is compared with each allowed origin, not only the beginning of the text.
         let long = format!("https://{}.example", "a".repeat(300));
         let access = access.allowing(std::slice::from_ref(&long));
         let peer = "127.0.0.1".parse().expect("an address");

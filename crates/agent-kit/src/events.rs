@@ -17,7 +17,7 @@ use crate::socket::{ended, pass};
 const WAIT_MAX_S: f64 = 8.0;
 /// Largest number of events in one answer.
 const EVENTS_MAX: usize = 500;
-/// Number of requests that can wait for an event at the same time. Further requests wait only [`NO_PLACE_S`], so that
+/// Number of requests that can wait for an event at the same time. More requests wait only [`NO_PLACE_S`], so that
 /// connections remain free for other clients.
 const WAITING_MAX: usize = 64;
 /// Longest wait of a request when the maximum number of requests already waits, in seconds. This wait limits the load

@@ -114,7 +114,7 @@ pub fn plain(name: &str) -> String {
 }
 
 impl Caller {
-    /// Checks that the client may command when it holds the lease.
+    /// Checks that the client may send commands when it holds the lease.
     ///
     /// # Errors
     ///
@@ -218,7 +218,7 @@ fn bearer_token(value: &str) -> &str {
     }
 }
 
-/// Lets a page of this origin read the response.
+/// Adds the headers that permit a page of this origin to read the response.
 fn may_read(mut response: Response, origin: Option<HeaderValue>) -> Response {
     let headers = response.headers_mut();
     if let Some(origin) = origin {
@@ -244,8 +244,8 @@ fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     asked.and_then(|Query(asked)| asked.token)
 }
 
-/// Returns the token in the protocol list of a page's WebSocket. This list is the only header of a WebSocket that a
-/// browser allows a page to set; browsers do not store it in a history.
+/// Returns the token in the protocol list of a page's WebSocket. A page of a browser can set no other header of a
+/// WebSocket than this list, and browsers do not store the list in a history.
 fn protocol_token(headers: &HeaderMap) -> Option<&str> {
     let protocols = text_of(headers, header::SEC_WEBSOCKET_PROTOCOL)?;
     protocols.split(',').find_map(|name| name.trim().strip_prefix(BEARER))

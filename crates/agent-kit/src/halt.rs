@@ -25,9 +25,8 @@ pub struct KnownHalt {
     pub asked_after: Option<u64>,
 }
 
-/// Number of the last Stop or Pause before a request: the number that the client sends, or otherwise the number of the
-/// last Stop or Pause when the head of the request arrived. The number is read before the body, which may arrive
-/// slowly.
+/// Number of the last Stop or Pause before a request. If the client sends no number, the last Stop or Pause before the
+/// head of the request arrived applies. The number is read before the body, which may arrive slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 

@@ -6,8 +6,8 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-/// Number of events that are stored. This is enough for some hours of work, or for the last minutes of a device that
-/// reports often.
+/// Number of events that are stored. This number is enough for some hours of work, or for the last minutes of a device
+/// that reports often.
 const KEPT: usize = 4096;
 
 /// Event of a journal.
@@ -62,8 +62,8 @@ impl<E> Default for Journal<E> {
 }
 
 impl<E: JournalEvent> Journal<E> {
-    /// Sets the callback for each further event; it runs in the thread that writes the event. Only the first call has
-    /// an effect.
+    /// Sets the callback for each further event; the callback runs in the thread that writes the event. Only the first
+    /// call has an effect.
     pub fn follow(&self, follower: impl Fn(&E) + Send + Sync + 'static) {
         let _ = self.follower.set(Box::new(follower));
     }

@@ -20,7 +20,7 @@ const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
 const LASTS_DEFAULT_S: f64 = 10.0;
 /// Largest number of clients that are registered at the same time.
 const CLIENTS_MAX: usize = 32;
-/// Time from the end of its lease until a silent client is removed.
+/// Time from the end of the lease of a silent client until the client is removed.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
 /// Returns the default time until a lease without a request ends, in seconds.
@@ -145,7 +145,7 @@ impl From<Denied> for Problem {
     }
 }
 
-/// Clients of an agent. At most one of them holds the lease. All times are measured by the agent's clock.
+/// Clients of an agent. At most one client holds the lease. All times are measured by the agent's clock.
 pub struct Leases<P> {
     clients: BTreeMap<String, Client<P>>,
     /// Lease, in which clients are identified by their keys.
@@ -190,8 +190,8 @@ impl<P: Clone> Leases<P> {
             other => other.is_none(),
         };
         if self.clients.len() >= CLIENTS_MAX {
-            // The client that has been silent longest is removed, so that a program that restarts again and again does
-            // not block other clients.
+            // The client that has been silent longest is removed, so that a program that restarts repeatedly does not
+            // block other clients.
             let holder = self.held.as_ref().map(|held| held.holder.clone());
             let others = self.clients.iter().filter(|(key, _)| Some(*key) != holder.as_ref());
             let oldest = others.min_by_key(|(_, client)| client.seen).map(|(key, _)| key.clone());
@@ -247,7 +247,7 @@ impl<P: Clone> Leases<P> {
     /// Ends a lease that has lapsed and returns its former holder. The lease passes to the waiting client if there is
     /// one. Also removes clients that no longer send requests.
     pub fn lapse(&mut self, now: Duration) -> Option<Client<P>> {
-        // The holder is never removed before its lease has lapsed, because its policy must be applied.
+        // The holder is never removed before its lease has lapsed, because the policy of the holder must be applied.
         let holder = self.held.as_ref().map(|held| held.holder.clone());
         self.clients.retain(|key, client| {
             Some(key) == holder.as_ref() || now.saturating_sub(client.seen) < client.lasts + FORGOTTEN
@@ -272,7 +272,7 @@ impl<P: Clone> Leases<P> {
 
     fn pass_on(&mut self, held: &Lease<String>, now: Duration) {
         self.held = held.next(|next| self.clients.get(next).map(|client| client.presence().lasts), now);
-        // The new holder is treated as if it had just sent a request, so that it is not removed too early.
+        // The new holder is treated as if it had just sent a request, so that the holder is not removed too early.
         let next = self.held.as_ref().and_then(|held| self.clients.get_mut(&held.holder));
         next.into_iter().for_each(|client| client.seen = now);
     }

@@ -15,7 +15,7 @@ use crate::cut::cut_texts;
 use repeats::Repeats;
 use rotate::{Rotated, Target};
 
-/// Default limit of the log, bytes: the current file and the previous one together.
+/// Default limit of the total size of the current and the previous log file, bytes.
 pub const LIMIT: u64 = 100_000_000;
 
 /// Largest number of lines that wait for a slow disk.
@@ -142,7 +142,7 @@ impl Drop for CommandLog {
             self.line(what, facts);
         }
         self.lines = None;
-        // The channel carries no message; it closes when the writer's thread ends, even after a panic. The wait is
+        // The channel transmits no message; it closes when the writer's thread ends, even after a panic. The wait is
         // limited.
         let _ = self.written.recv_timeout(LAST_LINES);
     }
@@ -164,7 +164,7 @@ fn write(
             let before = line.get("lines_lost_before").and_then(Value::as_u64).unwrap_or(0);
             line.insert("lines_lost_before".into(), (before + lost).into());
         }
-        // An incomplete line is ended first, so that only this line is lost.
+        // An incomplete line is first completed with a line end, so that only this line is lost.
         let mut text = format!("{}{line}\n", if cut { "\n" } else { "" });
         let room = file.make_room(text.len());
         if cut && matches!(room, Ok(true)) {
@@ -280,8 +280,8 @@ mod tests {
             };
             (0..5).for_each(|n| log.write("sent", json!({ "n": n })));
             done(&log);
-            // The disk may still process the last line, so three more lines follow. Each of them is either refused or
-            // written after it.
+            // The disk may still process the last line, so three more lines follow. Each of these lines is either
+            // refused or written after the last line.
             disk.with(|(left, _)| *left = usize::MAX);
             (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
             log.lines = None;
@@ -289,7 +289,7 @@ mod tests {
             let text = disk.with(|(_, taken)| String::from_utf8(taken.clone()).expect("text"));
             let whole: Vec<Value> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
             let lost = log.lost_in_all();
-            // A line that lacks only its line end is counted as lost although its text is there.
+            // A line without its line end is counted as lost, although its text is in the file.
             assert!((8..=9).contains(&(whole.len() as u64 + lost)), "{room}: {text}");
             assert!(text.lines().count() <= whole.len() + 1, "{room}: one line breaks off: {text}");
             assert_eq!(whole.last().map(|line| line["n"].clone()), Some(7.into()));
@@ -362,8 +362,8 @@ mod tests {
         assert!(!Path::new("/dev/null.1").exists());
     }
 
-    /// The first refused requests each cause a line of limited length; later ones cause no line. Each request is
-    /// counted.
+    /// The first refused requests each cause a line of limited length. Later requests do not cause a line. Each request
+    /// is counted.
     #[test]
     fn lines_of_those_who_are_not_let_in_are_short_and_few() {
         let dir = tempfile::tempdir().expect("a directory");

@@ -104,8 +104,8 @@ enum Denials {
     Lost(Problem),
 }
 
-/// Returns the refusals that a command can receive in addition to those of every request. `denied` and `lost` are the
-/// agent's descriptions of these two cases.
+/// Returns the refusals that a command can receive in addition to the refusals that every request can receive. `denied`
+/// and `lost` are the agent's descriptions of these two cases.
 pub fn denials(denied: &str, lost: &str) -> BTreeMap<String, RefOr<Response>> {
     let mut responses = Denials::responses();
     for (status, words) in [("409", denied), ("503", lost)] {

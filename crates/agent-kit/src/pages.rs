@@ -1,8 +1,8 @@
-//! Pages of the dashboard, which are part of the program: a browser needs no other files.
+//! Pages of the dashboard, which are part of the program, so that a browser does not need other files.
 //!
 //! A page contains no secrets. The agent serves a page to every browser that requests it by one of the agent's names,
-//! but never to pages of other sites. The page itself requests a token from the user if one is needed. Its later
-//! requests pass the access gate like all other requests.
+//! but never to pages of other sites. The page itself requests a token from the user if one is needed. Later requests
+//! of the page pass the access gate like all other requests.
 use std::io::Write as _;
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::gate::Gate;
 struct Built;
 
 /// Permissions of a page: it may use its own scripts and files, and send requests to this agent. No page of another
-/// site may show it in a frame.
+/// site may show the page in a frame.
 const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; \
                       connect-src 'self' ws: wss:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 /// Directory of files whose names contain a hash of their contents.
@@ -114,7 +114,7 @@ impl File {
     }
 }
 
-/// Middleware in front of the gate: serves the pages and passes on all other requests.
+/// Middleware in front of the gate: serves the pages and passes all other requests to the gate.
 pub async fn show(State(pages): State<Pages>, request: Request, next: Next) -> Response {
     let looks = [Method::GET, Method::HEAD].contains(request.method());
     // A WebSocket request at `/` does not request the page.

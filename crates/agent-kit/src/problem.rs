@@ -13,7 +13,7 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::cut::cut_middle;
 
-/// Error as an agent answers it.
+/// Error in the form in which an agent returns it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     failure: Failure,

@@ -66,7 +66,7 @@ pub fn serve(
             () = end => Ok(()),
         }
     });
-    // This also closes sockets that are still open.
+    // Ending the runtime also closes WebSockets that are still open.
     runtime.shutdown_timeout(Duration::from_millis(200));
     served
 }

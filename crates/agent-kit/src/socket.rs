@@ -18,7 +18,7 @@ const OPERATORS_MAX: usize = 32;
 pub const PROTOCOL: &str = "openjtc";
 /// Longest message of a client with read-only access, in bytes.
 pub const MESSAGE_MAX: usize = 1024;
-/// Largest number of pings of a client between two messages to it.
+/// Largest number of pings of a client between two messages to the client.
 const NOISE_MAX: u32 = 100;
 /// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
@@ -70,7 +70,7 @@ pub(crate) async fn ended(socket: &mut WebSocket) {
     }
 }
 
-/// Sends a message as JSON. Returns `false` if the client does not accept it in time.
+/// Sends a message as JSON. Returns `false` if the client does not accept the message in time.
 pub(crate) async fn pass(socket: &mut WebSocket, message: &impl Serialize) -> bool {
     // The message contains only strings and numbers, so this cannot fail.
     let text = serde_json::to_string(message).unwrap_or_default();

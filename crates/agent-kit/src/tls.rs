@@ -44,7 +44,7 @@ impl host_kit::Diagnose for TlsError {
 }
 
 /// Returns a configuration for TLS 1.2 and 1.3 with this certificate chain and its private key, both PEM files. The
-/// agent's own certificate is the first one in the chain.
+/// agent's own certificate is the first certificate in the chain.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Classes of requests. They depend only on the method and the path, so the agent knows the class before it reads the
+//! Classes of requests. The class depends only on the method and the path, so the agent knows it before it reads the
 //! other parts.
 
 /// Paths that pages of allowed origins may request. A request to these paths with the method GET changes nothing.

@@ -1,4 +1,4 @@
-//! The tokens of an agent, and the token file that only its owner can read.
+//! Tokens of an agent, and the token file, which only the owner of the file can read.
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -68,7 +68,7 @@ impl host_kit::Diagnose for TokenError {
 ///
 /// # Errors
 ///
-/// The system has no random numbers.
+/// The operating system does not provide random numbers.
 pub fn random() -> Result<String, TokenError> {
     let mut bytes = [0; 32];
     getrandom::fill(&mut bytes).map_err(TokenError::Random)?;

@@ -48,17 +48,17 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         self.until.is_some_and(|until| now >= until)
     }
 
-    /// Returns the client that waits for the lease, if it is still present.
+    /// Returns the client that waits for the lease, if this client still sends signs of life.
     pub fn first(&self, is_present: impl Fn(&Id) -> bool) -> Option<&Id> {
         self.wanted_by.as_ref().filter(|first| is_present(first))
     }
 
-    /// Registers a client that waits for the lease. A single client waits at a time: the first waiting client stays
+    /// Registers a client that waits for the lease. Only one client can wait at a time. The first waiting client stays
     /// first while it sends signs of life.
     ///
     /// # Errors
     ///
-    /// The client that waits already.
+    /// The client that already waits.
     pub fn want(&mut self, client: Id, is_present: impl Fn(&Id) -> bool) -> Result<(), Id> {
         match self.first(is_present).filter(|first| **first != client) {
             Some(first) => Err(first.clone()),

@@ -61,10 +61,10 @@ impl Body for InTime {
     }
 }
 
-/// Connection that is closed if the other end does not read.
+/// Connection that is closed if the client does not read.
 pub(super) struct Taken<S> {
     stream: S,
-    /// `true` after the connection has become a socket, which has its own time limits.
+    /// `true` after the connection has become a WebSocket, which has its own time limits.
     released: Arc<AtomicBool>,
     since: Option<Instant>,
     waited: Duration,
@@ -83,7 +83,7 @@ impl<S> Taken<S> {
         TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S)
     }
 
-    /// Handles the result of a write: either bytes were written, or the write waits until the other end reads.
+    /// Handles the result of a write: either bytes were written, or the write waits until the client reads.
     fn see<T>(
         &mut self,
         context: &mut Context<'_>,

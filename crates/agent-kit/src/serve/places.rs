@@ -1,4 +1,4 @@
-//! Limits of the number of connections: some for all requests, and further connections that are reserved for Stop and
+//! Limits of the number of connections for all requests, and of further connections that are reserved for Stop and
 //! Pause.
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,7 +23,7 @@ const KEPT_ELSEWHERE: usize = 64;
 /// waits for this time.
 const ASKS_WITHIN: Duration = Duration::from_millis(20);
 
-/// Connections from this computer, or from other computers.
+/// Limits and state of the connections from this computer, or from other computers.
 pub(super) struct Places {
     common: Arc<Semaphore>,
     kept: Mutex<Kept>,
@@ -75,8 +75,8 @@ impl Places {
         Arc::new(Self { common, kept: Mutex::default(), kept_max, asks_within })
     }
 
-    /// Runs a connection if one is free or can be freed. If all reserved connections serve a Stop, the new connection
-    /// is dropped, which closes it.
+    /// Runs a connection if the limits permit it, or if an older connection can be closed. If all reserved connections
+    /// serve a Stop, the new connection is dropped, which closes it.
     pub(super) async fn run<F: Future<Output = ()> + Send + 'static>(
         self: &Arc<Self>,
         connection: impl FnOnce(Place) -> F,
@@ -87,7 +87,7 @@ impl Places {
             tokio::spawn(connection(place));
             return;
         }
-        // This gives the serving threads time to read earlier requests.
+        // The wait gives the serving threads time to read earlier requests.
         let oldest = self.oldest().map(|open| open + self.asks_within);
         if let Some(due) = oldest.filter(|due| *due > Instant::now()) {
             tokio::time::sleep_until(due).await;

@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
     });
-    // `line` is kept open so that the terminal continues to exist after a host disconnects.
+    // `line` stays open so that the terminal continues to exist after a host disconnects.
     println!("ready: {}", line.name().unwrap_or_default());
     let mut adapter = SlcanAdapter::new();
     loop {

@@ -13,11 +13,11 @@ pub trait CanBus {
     /// seconds, for example because no other member acknowledges.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
 
-    /// Returns the next frame of another member, or `None` if none arrived within `timeout`. With a timeout of zero it
-    /// does not wait.
+    /// Returns the next frame of another member, or `None` if none arrived within `timeout`. With a timeout of zero,
+    /// the call does not wait.
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
 
-    /// Returns the state of this member's CAN controller, as far as the frames received so far show it.
+    /// Returns the state of this member's CAN controller, as far as the frames received so far show this state.
     fn state(&mut self) -> ControllerState {
         ControllerState::default()
     }

@@ -1,4 +1,4 @@
-//! Errors of a bus: while it is opened, and while it is used.
+//! Errors that occur while a bus is opened or used.
 
 use std::io;
 use std::net::IpAddr;
@@ -146,7 +146,7 @@ pub enum AnswerError {
         /// Answer.
         answer: String,
     },
-    /// The other side uses another protocol, or does not answer.
+    /// The server or adapter uses another protocol, or does not answer.
     #[error("{url}: no answer to {step} within {seconds} s; {hint}")]
     NoAnswer {
         /// The bus.

@@ -57,7 +57,8 @@ pub struct FaultStats {
 pub(crate) struct Line {
     faults: FaultConfig,
     random: fastrand::Rng,
-    /// Sorted by the time at which they are due. Frames with equal times are in the order of their arrival.
+    /// Queue of frames, sorted by the time at which each frame is due. Frames with equal times are in the order of
+    /// their arrival.
     under_way: Vec<(Duration, CanFrame)>,
     /// Time at which the last frame is due. Frames that are not reordered do not overtake each other.
     last_due: Duration,

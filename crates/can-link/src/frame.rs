@@ -50,7 +50,7 @@ enum Kind {
     Fd { brs: bool },
 }
 
-/// A classic, remote or CAN FD frame. Its length is always valid for its kind, so every frame can be sent.
+/// A classic, remote or CAN FD frame. The length of a frame is always valid for its kind, so every frame can be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     id: Id,
@@ -145,7 +145,7 @@ impl CanFrame {
         matches!(self.kind, Kind::Remote)
     }
 
-    /// Returns the number of payload bytes; for a remote frame, the number of bytes it requests.
+    /// Returns the number of payload bytes; for a remote frame, the number of bytes that the frame requests.
     pub const fn len(&self) -> usize {
         self.len as usize
     }

@@ -17,7 +17,7 @@ const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A member of a multicast group.
 ///
-/// UDP loses frames if a member is too slow. Suitable for simulators and tools on one computer.
+/// UDP loses frames if a member is too slow. This transport is suitable for simulators and tools on one computer.
 pub struct MulticastBus {
     url: String,
     /// Socket that listens at the group's port, which all members share.
@@ -25,7 +25,7 @@ pub struct MulticastBus {
     /// Socket that sends from its own port, so that the datagrams of this member can be distinguished from others.
     sender: UdpSocket,
     own: SocketAddr,
-    /// Timeout of the listener; with `None` it does not wait.
+    /// Timeout of the listener; with `None`, the listener does not wait.
     timeout: Option<Duration>,
     ignored: u64,
 }
@@ -100,8 +100,8 @@ fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<
     step("sharing the port", share_port(&listener))?;
     // A larger buffer is useful but not required.
     let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
-    // If bound to the group, the listener receives no datagrams of other groups. Windows can only bind to its own
-    // addresses.
+    // If bound to the group, the listener receives no datagrams of other groups. On Windows, a socket can only be bound
+    // to the computer's own addresses.
     let address = if cfg!(windows) { unspecified(group) } else { group };
     step("binding the port", listener.bind(&SocketAddr::new(address, port).into()))?;
 
@@ -197,7 +197,8 @@ impl CanBus for MulticastBus {
 
 /// Returns `true` if the queue of the interface or of the socket is full, which is temporary.
 fn is_queue_full(error: &io::Error) -> bool {
-    // Rust has no error kind for ENOBUFS. Its number is 105 on Linux, 55 on the BSDs and macOS, 10055 on Windows.
+    // The Rust library has no error kind for ENOBUFS. The number of ENOBUFS is 105 on Linux, 55 on the BSDs and macOS,
+    // 10055 on Windows.
     let code = if cfg!(windows) {
         10055
     } else if cfg!(target_os = "linux") {

@@ -39,7 +39,7 @@ impl SocketCanBus {
             hint: hint(&source, interface),
             source,
         };
-        // First opens any interface, because a kernel without CAN gives another error than a wrong name.
+        // First opens any interface, because the error of a kernel without CAN differs from the error for a wrong name.
         drop(CanFdSocket::open_iface(0).map_err(failed)?);
         let socket = CanFdSocket::open(interface).map_err(failed)?;
         // The kernel reports a disabled interface (down) here.

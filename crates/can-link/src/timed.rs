@@ -25,7 +25,7 @@ const QUEUE: usize = 65_536;
 /// Frames take as long as on a real bus with this bit rate; stuff bits are counted exactly. The first frames of all
 /// queues take part in arbitration as on a real bus. Members acknowledge frames, count errors, become error passive and
 /// go bus-off according to ISO 11898-1. Two members that send the same identifier with different data at the same time
-/// collide. Equal calls with equal seeds give equal events.
+/// collide. Equal calls with equal seeds produce equal events.
 ///
 /// ```
 /// use can_link::{CanFrame, BusEvent, Id, TimedBus};
@@ -273,9 +273,9 @@ impl TimedBus {
         due.chain(recoveries).chain(wire).min().map(|at| at.max(self.now))
     }
 
-    /// Advances to the next event, or to `at_ns` if no event comes before. Must be called until it returns `None`.
-    /// After the call returns an event, the current time is the time of this event. Frames that are queued at that
-    /// point take part in arbitration from this time on.
+    /// Advances to the next event, or to `at_ns` if no event comes before. The caller must repeat the call until it
+    /// returns `None`. After the call returns an event, the current time is the time of this event. Frames that are
+    /// queued at that point take part in arbitration from this time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {
@@ -334,7 +334,8 @@ impl TimedBus {
                 self.events.push_back(BusEvent::Received { member: MemberId(number), frame });
             }
         }
-        // Events of this time are returned first, so that members that react to them take part in the next arbitration.
+        // Events of this time are returned first, so that members that react to these events take part in the next
+        // arbitration.
         if self.events.is_empty() && self.transfer.is_none() {
             self.start();
         }
@@ -349,7 +350,8 @@ impl TimedBus {
         }
     }
 
-    /// Updates the recovery when a frame begins. A sequence of fewer than 11 recessive bits before it is not counted.
+    /// Updates the recovery when a frame begins. A sequence of fewer than 11 recessive bits before the frame is not
+    /// counted.
     fn wire_is_taken(&mut self) {
         let (now, sequence) = (self.now, self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -367,8 +369,8 @@ impl TimedBus {
         };
         let starters: Vec<_> = self.members.iter().enumerate().filter_map(ready).collect();
         let Some(arbitration) = Arbitration::of(&starters) else { return };
-        // A random number is drawn for every frame, so that the fault of one frame does not change the faults of
-        // others.
+        // A random number is drawn for every frame, so that the fault of one frame does not change the faults of other
+        // frames.
         let (luck, place) = (self.random.f64(), self.random.f64());
         let (bits, error) = if arbitration.senders.is_empty() {
             (arbitration.bits + ERROR_FRAME, None)

@@ -74,7 +74,7 @@ impl CanUrl {
 /// Reasons why a text is not a valid CAN URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UrlError {
-    /// The text has no scheme, or an unknown one.
+    /// The text has no scheme, or an unknown scheme.
     #[error(
         "`{url}` is not a valid CAN URL, expected socketcan:can0, slcan:/dev/ttyACM0@1000000, \
          socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME"

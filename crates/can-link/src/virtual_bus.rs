@@ -116,8 +116,8 @@ impl VirtualHub {
     }
 
     /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames
-    /// is full. A member that takes no frame for that time misses frames until it takes one. A slow member therefore
-    /// does not stop the bus for the other members.
+    /// is full. A member that takes no frame for that time misses frames until it takes a frame again. A slow member
+    /// therefore does not stop the bus for the other members.
     pub fn with_timeout(timeout: Duration) -> Self {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
@@ -214,7 +214,7 @@ impl VirtualBus {
         Self { membership: Arc::clone(&self.membership) }
     }
 
-    /// Stops or starts receiving. When it stops, waiting frames are dropped.
+    /// Stops or starts receiving. When the member stops receiving, waiting frames are dropped.
     pub(crate) fn set_deaf(&self, deaf: bool) {
         if let Some(member) = self.shared().state().members.get_mut(&self.number()) {
             member.deaf = deaf;

@@ -1,4 +1,4 @@
-//! Runs the fuzz targets' functions with the stored inputs, and with some random ones.
+//! Runs the functions of the fuzz targets with the stored inputs, and with some random inputs.
 
 use can_link::fuzzing::{slcan_stream, socketcand_stream};
 use proptest::prelude::*;

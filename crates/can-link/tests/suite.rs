@@ -1,3 +1,4 @@
-//! The tests of the crate in one program, so that only one program is linked. Each file here is a module of it.
+//! The tests of the crate in one program, so that only one program is linked. Each file in this directory is a module
+//! of the program.
 mod buses;
 mod fuzz_regressions;

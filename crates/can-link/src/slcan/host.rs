@@ -46,7 +46,7 @@ struct Outstanding {
 
 /// Bus of an SLCAN adapter.
 ///
-/// If the adapter confirms frames, each frame is sent after the confirmation of the previous one. A refused frame is
+/// If the adapter confirms frames, each frame is sent after the confirmation of the previous frame. A refused frame is
 /// sent again, because the adapter's queue was full. If the adapter never answers, frames are written as fast as the
 /// line accepts them.
 pub struct SlcanBus {
@@ -127,7 +127,7 @@ impl SlcanBus {
         Ok(bus)
     }
 
-    /// Closes a channel that an earlier user left open, and checks that an adapter answers.
+    /// Closes a channel that an earlier user has not closed, and checks that an adapter answers.
     fn check_presence(&mut self) -> Result<(), CanError> {
         // The first carriage return ends any earlier input.
         self.write(b"\rC\r")?;

@@ -58,7 +58,7 @@ impl Lines {
                     self.complete = true;
                     return str::from_utf8(&self.line).ok().map(Piece::Line);
                 }
-                // Some adapters end lines with CR LF.
+                // Some adapters send CR LF at the end of a line.
                 b'\n' => {}
                 _ if self.line.len() == LONGEST => self.too_long = true,
                 _ => self.line.push(byte),
@@ -68,7 +68,7 @@ impl Lines {
     }
 }
 
-/// CAN FD lengths by their codes.
+/// CAN FD lengths, in the order of their codes.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
 /// Returns the frame in a line (without line end); `None` if the line is not a frame.
@@ -108,7 +108,7 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
         (_, true, true) => 'b',
     };
     let kind = if frame.is_extended() { kind.to_ascii_uppercase() } else { kind };
-    // Every frame has one of these lengths.
+    // The length of every frame is in this list.
     let code = LENGTHS.iter().position(|len| *len == frame.len()).unwrap_or(0);
     let written = write!(text, "{kind}{}{code:X}", frame.id())
         .and_then(|()| frame.data().iter().try_for_each(|byte| write!(text, "{byte:02X}")))

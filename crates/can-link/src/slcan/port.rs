@@ -1,4 +1,4 @@
-//! Transport of the lines: a serial port or a TCP connection.
+//! Transport for the lines of the protocol: a serial port or a TCP connection.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -34,7 +34,8 @@ impl Port {
         Err(last)
     }
 
-    /// Reads bytes that arrive within `timeout`; returns `None` if no byte arrived. The end of the stream is an error.
+    /// Reads bytes that arrive within `timeout`; returns `None` if no byte arrived. The end of the stream is returned
+    /// as an error.
     pub(super) fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
         let timeout = timeout.max(SHORTEST);
         let read = match self {

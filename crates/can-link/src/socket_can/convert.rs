@@ -55,8 +55,8 @@ fn id(raw: &impl EmbeddedFrame) -> Option<Id> {
     }
 }
 
-/// Returns the state after an error frame. The frame may contain a new state, new counters, both of them or none of
-/// them.
+/// Returns the state after an error frame. The frame may contain a new state and new counters; each of these can be
+/// missing.
 fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
     const WARNING: ControllerProblems = ControllerProblems::RX_WARNING.union(ControllerProblems::TX_WARNING);
@@ -132,7 +132,7 @@ mod tests {
         }
         let passive = after(unknown, CONTROLLER | COUNTERS, 0x20, 136, 7);
         assert_eq!(passive, ControllerState::of_counters(136, 7));
-        // Counters alone also determine the state. Frames without state and counters change nothing.
+        // Counters alone also determine the state. Frames without state and counters do not change the state.
         assert_eq!(after(passive, COUNTERS, 0, 100, 0), ControllerState::of_counters(100, 0));
         assert_eq!(after(passive, BUS_ERROR, 0, 0, 0), passive);
         let off = after(passive, BUS_OFF | COUNTERS, 0, 248, 0);

@@ -18,7 +18,7 @@ const SEND_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time that a send waits for space before it reads received bytes, because the server may wait until this client
 /// reads.
 const SEND_SLICE: Duration = Duration::from_millis(20);
-/// Longest time that the server has to accept the last frames when the bus is closed.
+/// Longest wait when the bus is closed until the server accepts the last frames.
 const END_TIMEOUT: Duration = Duration::from_millis(250);
 /// Largest number of bytes per read.
 const READ: usize = 16 * 1024;
@@ -35,7 +35,7 @@ pub struct SocketcandBus {
     /// Bytes that arrived together with an answer while the bus was opened.
     glued: Vec<u8>,
     receive_queue: VecDeque<CanFrame>,
-    /// Timeout of the socket; with `None` it does not wait.
+    /// Timeout of the socket; with `None`, the socket does not wait.
     timeout: Option<Duration>,
     closed: bool,
     errors: ErrorState,
@@ -125,7 +125,7 @@ impl SocketcandBus {
     }
 
     /// Waits up to `wait` (`None`: does not wait) for bytes; returns `None` if no byte arrived. The end of the stream
-    /// is an error.
+    /// is returned as an error.
     fn read(&mut self, buffer: &mut [u8; READ], wait: Option<Duration>) -> Result<Option<usize>, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
@@ -193,7 +193,7 @@ impl SocketcandBus {
         Ok(true)
     }
 
-    /// Writes all bytes. While the server accepts no data, reads the bytes that it has sent.
+    /// Writes all bytes. While the server accepts no data, reads the bytes that the server has sent.
     fn write(&mut self, mut bytes: &[u8]) -> Result<(), CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });

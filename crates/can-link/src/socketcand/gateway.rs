@@ -25,7 +25,7 @@ pub enum ClientEvent {
 /// Event of a client at a [`SocketcandGateway`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FromClient {
-    /// Index of the channel in the list of names given to `bind`.
+    /// Index of the channel in the list of names that was passed to `bind`.
     pub channel: usize,
     /// Client.
     pub client: ClientId,
@@ -64,7 +64,8 @@ impl SocketcandGateway {
 
     /// Returns the next event of the clients, in their order, or `None` if no event occurred within `timeout`.
     pub fn next(&mut self, timeout: Duration) -> Option<FromClient> {
-        // The server holds the other end and lives as long as this gateway, so the only possible error is a timeout.
+        // The server owns the other end of the channel and exists as long as this gateway, so the only possible error
+        // is a timeout.
         self.events.recv_timeout(timeout).ok()
     }
 
@@ -73,8 +74,8 @@ impl SocketcandGateway {
         self.server.deliver(channel, frame, except);
     }
 
-    /// Delivers a frame to one client only, for host programs in which each client is a separate member, for example of
-    /// a [`TimedBus`](crate::TimedBus). Never waits.
+    /// Delivers a frame to one client only. This function is for host programs in which each client is a separate
+    /// member, for example of a [`TimedBus`](crate::TimedBus). Never waits.
     pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
         self.server.deliver_to(client, frame);
     }

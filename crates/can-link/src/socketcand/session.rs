@@ -13,7 +13,7 @@ use crate::virtual_bus::Received;
 use crate::{CanBus, VirtualBus};
 
 /// Time after the answer to `rawmode` in which no frame is sent, because python-can compares all bytes of one read with
-/// that answer.
+/// the answer.
 const HELD_BACK: Duration = Duration::from_millis(20);
 /// Largest number of frames that wait for a client: some seconds of a fully loaded bus.
 const WAITING: usize = 65_536;
@@ -26,7 +26,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time after which a client without requests and without an open bus is disconnected.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// The socket, to which both threads write.
+/// Socket to which both threads write.
 struct Out {
     stream: Mutex<Output>,
 }

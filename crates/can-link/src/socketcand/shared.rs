@@ -29,7 +29,7 @@ pub(super) enum ClientAction {
 pub(super) enum Route {
     /// Hub: frames go directly to its other members.
     Hub,
-    /// Host program: it puts the frames on its bus and delivers them.
+    /// Host program, which puts the frames on its bus and delivers them.
     Host(Box<dyn Fn(ClientId, ClientAction) -> bool + Send + Sync>),
 }
 

@@ -150,8 +150,8 @@ pub(crate) fn has_form(frame: &CanFrame) -> bool {
 
 /// Appends `< frame … >` with the time since 1970.
 ///
-/// The bytes have no blanks between them, because python-can reads only the first word. Without bytes, two blanks
-/// follow each other, because python-can would not find the empty word otherwise.
+/// The bytes have no blanks between them, because python-can reads only the first word. A frame without bytes has two
+/// blanks in sequence, because python-can would otherwise not find the empty word.
 pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     let (s, us) = (time.as_secs(), time.subsec_micros());
     let written = write!(text, "< frame {} {s}.{us:06} ", frame.id()).and_then(|()| {
@@ -272,8 +272,8 @@ mod tests {
         assert_eq!(Reply::parse(&text.replace(" 01 ", " 00 ")), Reply::Frame(fd.with_brs(false)));
     }
 
-    /// python-can 4.6.1 needs exactly these forms. With a single blank it raises an IndexError, and with blanks between
-    /// the bytes it reads only one byte.
+    /// python-can 4.6.1 needs exactly these forms. With a single blank, python-can raises an IndexError. With blanks
+    /// between the bytes, python-can reads only one byte.
     #[test]
     fn frames_are_written_as_python_can_reads_them() {
         for (frame, line, send) in [
@@ -294,8 +294,8 @@ mod tests {
         }
     }
 
-    /// Error frames as socketcand writes them and python-can 4.6.1 reads them: three digits for the class, then the
-    /// time.
+    /// Error frames as socketcand writes them and python-can 4.6.1 reads them: three digits for the class, followed by
+    /// the time.
     #[test]
     fn bus_off_and_the_way_back_are_error_frames() {
         let time = Duration::from_micros(12_000_345);

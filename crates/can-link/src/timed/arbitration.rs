@@ -1,4 +1,4 @@
-//! Arbitration: if several members start at once, selects those that continue to send (ISO 11898-1).
+//! Arbitration: if several members start at once, selects the members that continue to send (ISO 11898-1).
 
 use super::confinement::Counters;
 use super::event::MemberId;
@@ -15,7 +15,7 @@ pub(super) struct Starter {
 
 /// Result of the arbitration at the start of a frame.
 pub(super) struct Arbitration {
-    /// Members that send the same bits to the end; empty if the frame is destroyed.
+    /// Members that send the same bits until the end of the frame; empty if the frame is destroyed.
     pub(super) senders: Vec<MemberId>,
     /// Frame on the bus.
     pub(super) frame: CanFrame,
@@ -46,7 +46,7 @@ impl Arbitration {
         let all = members(&sending);
         let mut failed = Vec::new();
         while let Some(at) = first_difference(&sending) {
-            // A member that sends a recessive bit and reads a dominant one has a bit error.
+            // A member that sends a recessive bit and reads a dominant bit has a bit error.
             let (lost, on): (Vec<_>, Vec<_>) =
                 sending.iter().partition(|(_, wire)| wire.bits().get(at) != Some(&DOMINANT));
             if lost.iter().any(|(starter, _)| !starter.counters.passive()) {

@@ -40,7 +40,7 @@ pub enum BusEvent {
         /// The dropped frame.
         frame: CanFrame,
     },
-    /// Transmitting a frame has failed. Its senders try again, unless they send each frame only once.
+    /// Transmitting a frame has failed. The senders of the frame try again, unless they send each frame only once.
     Error {
         /// The error.
         error: BusError,
@@ -95,8 +95,8 @@ pub struct BusStats {
     pub busy_ns: u64,
     /// Number of acknowledged frames.
     pub frames: u64,
-    /// Number of identical frames that several members sent at the same time. Such a group is counted in `frames` as
-    /// one frame.
+    /// Number of identical frames that several members sent at the same time. A group of such frames is counted in
+    /// `frames` as one frame.
     pub shared: u64,
     /// Number of collisions.
     pub collisions: u64,

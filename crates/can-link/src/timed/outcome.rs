@@ -96,7 +96,7 @@ impl TimedBus {
         }
     }
 
-    /// Changes a member's counters. If its error state changes, adds an event.
+    /// Changes a member's counters. If the error state of the member changes, adds an event.
     fn count(&mut self, number: MemberId, how: fn(&mut Counters)) {
         let member = &mut self.members[number.0];
         if !member.on_bus() {

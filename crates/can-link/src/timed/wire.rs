@@ -2,7 +2,7 @@
 
 use crate::CanFrame;
 
-/// A dominant bit wins against a recessive one.
+/// A dominant bit wins against a recessive bit.
 pub(crate) const DOMINANT: bool = false;
 const RECESSIVE: bool = true;
 

@@ -35,8 +35,8 @@ fn take(bus: &mut impl CanBus) -> CanFrame {
     }
 }
 
-/// Waits until other threads have finished something. Its pauses are shorter than those of `patience::until`, because
-/// some tests wait thousands of times.
+/// Waits until other threads have finished something. The pauses of this function are shorter than the pauses of
+/// `patience::until`, because some tests wait thousands of times.
 #[track_caller]
 fn until(mut done: impl FnMut() -> bool) {
     let mut patience = Patience::begin();

@@ -1,5 +1,5 @@
-//! Tests of the host's side of SLCAN with adapters: our own on a pseudo-terminal and over TCP, and simulated ones of
-//! other manufacturers.
+//! Tests of the host's side of SLCAN with adapters: our own adapter on a pseudo-terminal and over TCP, and simulated
+//! adapters of other manufacturers.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -70,7 +70,8 @@ fn check(url: &str, adapter: Running, mut node: VirtualBus) -> SlcanAdapter {
         node.send(frame).unwrap();
         assert_eq!(take(&mut bus), *frame);
     }
-    // Bursts in both directions at once: no side waits forever for the other, and no frame is lost or out of order.
+    // Bursts in both directions at the same time. The two sides do not block each other, and no frame is lost or out of
+    // order.
     let count = 3000;
     std::thread::scope(|scope| {
         let node = &mut node;
@@ -102,7 +103,7 @@ fn all_frames_go_both_ways_over_a_pseudo_terminal() {
     use serialport::{SerialPort, TTYPort};
     let (mut port, line) = TTYPort::pair().unwrap();
     port.set_timeout(Duration::from_millis(1)).unwrap();
-    // `line` is kept open so that the terminal continues to exist.
+    // `line` stays open so that the terminal continues to exist.
     let hub = VirtualHub::new();
     let adapter = Running::start(port, hub.join());
     let device = line.name().unwrap();

@@ -10,7 +10,7 @@ use test_kit::patience::LONGEST;
 
 use super::{frame, numbered, socketcand_bench, take, until};
 
-/// A client as simple as the one in python-can.
+/// Simple client that works like the client in python-can.
 struct Raw(TcpStream);
 
 impl Raw {
@@ -89,12 +89,12 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
             assert_eq!(client.ask("< open can0 >"), "< ok >");
             client.write("< rawmode >");
             client.0.peek(&mut [0]).unwrap();
-            // Long enough for frames that are not held back to arrive. On a busy computer it is sometimes also long
-            // enough for frames that are held back.
+            // Wait that is long enough for frames that the server does not delay. On a busy computer, delayed frames
+            // sometimes also arrive in this time.
             std::thread::sleep(Duration::from_millis(3));
             let first = client.read();
             assert!(first.starts_with("< ok >"), "{first}");
-            // The frames that were held back arrive without a gap in their numbers.
+            // The delayed frames arrive without a gap in their numbers.
             let text = client.read_until(" >< frame 100 ");
             let text = text + &client.read_until(" >< frame 100 ");
             let numbers: Vec<_> = text.split(" >").filter_map(|line| line.get(line.len() - 8..)).collect();
@@ -187,13 +187,13 @@ fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
 
 #[test]
 fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
-    // If a sender waited for this member, it would wait forever.
+    // A sender that waited for this member would wait forever.
     let hub = VirtualHub::with_timeout(Duration::MAX);
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     let mut node = hub.join();
     let mut sleeper = Raw::raw_mode(&server);
     let mut listener = open(&server.url("can0")).unwrap();
-    // More frames than its queue and the buffers of any system can hold.
+    // Number of frames that exceeds the client's queue and the buffers of any system.
     let count = 100_000;
     let (done, waited) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
@@ -212,8 +212,8 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     });
     let mut node = waited.recv_timeout(LONGEST).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
-    // The client that slept is still connected, and reads the oldest waiting frames. When its queue has space again, it
-    // receives new frames.
+    // The client that slept is still connected, and reads the oldest waiting frames. When the queue of the client has
+    // space again, the client receives new frames.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
     until(|| {
         sleeper.read();
@@ -268,7 +268,8 @@ fn an_unknown_bus_is_refused_with_what_there_is() {
     assert!(error.contains("opening the bus") && error.contains("there is can0"), "{error}");
 }
 
-/// Frames that a client sent before it disconnected are delivered, even if it did not read its own received frames.
+/// Frames that a client sent before it disconnected are delivered, even if the client did not read the frames that it
+/// received.
 #[test]
 fn the_last_frames_of_a_client_are_delivered() {
     let (server, hub) = socketcand_bench();

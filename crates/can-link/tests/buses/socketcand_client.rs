@@ -1,4 +1,5 @@
-//! The socketcand client: frames it refuses, and its errors if a server disconnects or does not use the protocol.
+//! Tests of the socketcand client: frames that it refuses, and errors if a server disconnects or does not use the
+//! protocol.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener};
@@ -39,7 +40,7 @@ fn the_client_refuses_what_the_protocol_cannot_carry() {
     }
 }
 
-/// Invalid servers: each must lead to an error, not to a panic or a hang.
+/// Invalid servers: the client must return an error for each server, without a panic or an endless wait.
 #[test]
 fn servers_that_are_none_end_in_words() {
     let end_with = |texts: &'static [&'static str]| {
@@ -78,8 +79,8 @@ fn servers_that_are_none_end_in_words() {
     assert!(
         matches!(&refused, Err(OpenError::SetUp(CanError::Answer(AnswerError::Refused { answer, .. }))) if answer == "could not open bus")
     );
-    // All messages arrive in one piece: with and without blanks between bytes, in the old and the new format, and with
-    // an incomplete message at the end.
+    // All messages arrive in one piece. The messages have the old and the new format, with and without blanks between
+    // bytes; the last one is incomplete.
     let (frames, ignored, errors) = end_with(&[
         "< hi >< ok >< ok >< frame 123 1.0 11 22 >< frame 123 1.0 1122 >\n< frame 00000001 2.5  >",
         "< error 040 1.0 >< rtr 123 1.0 >< frame 5 zz 11 >< frame 12",

@@ -27,7 +27,7 @@ fn a_host_can_run_the_bus_itself() {
     a.send(&numbered(1)).unwrap();
     let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.channel, event.client, event.event), (0, id_a, ClientEvent::Frame(numbered(1))));
-    // No client has received the frame yet, because the host program decides when it is on the bus.
+    // No client has received the frame yet, because the host program decides when the frame is on the bus.
     gateway.deliver(0, &numbered(2), None);
     gateway.deliver(0, &numbered(1), Some(id_a));
     gateway.deliver(0, &numbered(3), None);
@@ -101,8 +101,8 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
     assert_eq!(stats.frames, u64::from(2 * count));
 }
 
-/// A client is informed, in order with its frames, that its own controller is bus-off and that it is back. Other
-/// clients are not informed.
+/// A client receives reports about bus-off and recovery of its own controller, in order with its frames. Other clients
+/// are not informed.
 #[test]
 fn a_client_receives_its_own_bus_off() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();

@@ -104,7 +104,7 @@ proptest! {
         prop_assert!(errors(&events).is_empty());
     }
 
-    /// For any sequence of calls, each call ends, and equal calls give equal events.
+    /// For any sequence of calls, each call ends, and equal calls produce equal events.
     #[test]
     fn any_calls_are_repeatable_and_end(calls in prop::collection::vec((0..9_u8, 0..5_usize, 0..40_u32, any::<u64>()), 1..120), seed in any::<u64>()) {
         let all = || {
@@ -135,8 +135,8 @@ proptest! {
     }
 }
 
-/// D-05: if two nodes send the same identifier with different data at once, a collision is reported. Both repeat their
-/// frames, as controllers do, until one is error passive and no longer destroys the other's frame.
+/// D-05: if two nodes send the same identifier with different data at once, a collision is reported. Both nodes repeat
+/// their frames, as controllers do, until one node is error passive and no longer destroys the frame of the other node.
 #[test]
 fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -165,7 +165,7 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     assert_eq!(states, [ErrorState::Warning, ErrorState::Passive, ErrorState::Warning]);
 }
 
-/// D-05: a node that drops its frame instead of repeating it leaves the bus to the other.
+/// D-05: a node that drops its frame instead of repeating it leaves the bus to the other node.
 #[test]
 fn d_05_who_sends_once_only_gives_up_after_a_collision() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -181,7 +181,7 @@ fn d_05_who_sends_once_only_gives_up_after_a_collision() {
     assert_eq!(bus.pending(b), 0);
 }
 
-/// D-05: a node that collides again and again finally goes bus-off.
+/// D-05: a node that collides repeatedly finally goes bus-off.
 #[test]
 fn d_05_endless_collisions_end_in_bus_off() {
     let mut bus = TimedBus::new(1_000_000, 0);

@@ -12,7 +12,7 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
     let events = run(&mut bus, 100 * MS);
     assert!(errors(&events).len() > 500 && errors(&events).iter().all(|e| *e == BusError::NotAcknowledged));
     assert_eq!((bus.state(alone).errors, bus.state(alone).tec), (ErrorState::Passive, Some(128)));
-    // Once it is passive, it waits for eight more bits before each attempt.
+    // When the node is error passive, it waits for eight more bits before each attempt.
     let times: Vec<_> = events
         .iter()
         .filter(|event| matches!(event.what, BusEvent::Error { .. }))
@@ -55,7 +55,7 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     let events = run(&mut bus, 100 * MS);
     let is_back = |event: &TimedEvent| matches!(event.what, BusEvent::State { member, .. } if member == a);
     let back = events.iter().position(is_back).unwrap();
-    // No member acknowledges the other frame, and each attempt ends with 11 recessive bits.
+    // No member acknowledges the other frame, and each attempt to send this frame ends with 11 recessive bits.
     assert_eq!(errors(&events[..back]), [BusError::NotAcknowledged; 128]);
     assert_eq!(received(&events, a), [frame(0x200, &[])]);
     bus.queue(a, frame(0x100, &[1])).unwrap();
@@ -75,8 +75,8 @@ fn recovery_on_an_idle_bus_takes_1408_bit_times() {
     assert_eq!((back.at_ns, bus.state(a).errors), (100 * MS + 1408 * 2000, ErrorState::Active));
 }
 
-/// ISO 11898-1: on a busy bus there are 11 consecutive recessive bits once per frame, so a controller is back after 128
-/// frames.
+/// ISO 11898-1: on a busy bus there are 11 consecutive recessive bits once per frame, so a controller recovers after
+/// 128 frames.
 #[test]
 fn recovery_on_a_busy_bus_takes_128_frames() {
     let mut bus = TimedBus::new(1_000_000, 7);
@@ -88,7 +88,7 @@ fn recovery_on_a_busy_bus_takes_128_frames() {
         bus.advance_to(50 * MS);
     }
     bus.set_disturbance(0.0);
-    // The frame waits for the recovery, and no other frame waits meanwhile.
+    // The frame waits for the recovery, and no other frame waits during this time.
     bus.queue(a, frame(0x001, &[])).unwrap();
     for _ in 0..200 {
         bus.queue(b, frame(0x200, &[0x55; 8])).unwrap();

@@ -71,7 +71,7 @@ pub(crate) fn of_steps(total: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// Creates a bar that shows a number of bytes. The text of its owner is below it, so that the bar fits on narrow
+/// Creates a bar that shows a number of bytes. The text of its owner is below the bar, so that the bar fits on narrow
 /// terminals.
 pub(crate) fn of_bytes(total: u64, what: &str) -> ProgressBar {
     let bar = made(total, "{prefix:9} {wide_bar:.cyan/dim} {bytes:>9} of {total_bytes}\n  {msg}");

@@ -1,7 +1,7 @@
 //! Input of single keys from the terminal. The terminal is restored when the command ends for any reason.
 //!
 //! Ctrl-C still sends a signal. Ctrl-Z is disabled while keys are read, because a suspended command would leave a
-//! machine running without supervision. Ctrl-S is disabled because it would block the command at its next output, and
+//! moving machine without supervision. Ctrl-S is disabled because it would block the command at its next output, and
 //! the command could not read the stop key.
 
 /// A key.
@@ -178,7 +178,7 @@ mod console {
 
     use super::Key;
 
-    /// Does nothing, because a console needs no other mode for single keys.
+    /// Does not do anything, because a console does not need another mode for single keys.
     pub fn restore() {}
 
     /// Key input from the console.

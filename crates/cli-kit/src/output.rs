@@ -71,7 +71,7 @@ impl Output {
         stream.lock().unwrap_or_else(PoisonError::into_inner).lines.finish();
     }
 
-    /// Formats a result: `value` as one line of JSON, or the text.
+    /// Formats a result, which is `value` as one line of JSON, or the text.
     pub fn words(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> String {
         if self.json {
             serde_json::to_string(value)
@@ -109,8 +109,8 @@ impl Output {
         stdout::is_gone()
     }
 
-    /// Returns the reason why a result could not be printed, or `None` if it was printed. In the first case the command
-    /// was successful, but the user cannot read the result.
+    /// Returns the reason why a result could not be printed, or `None` if the result was printed. In the first case the
+    /// command was successful, but the user cannot read the result.
     pub fn lost() -> Option<&'static str> {
         stdout::lost()
     }
@@ -126,7 +126,7 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
 
-    /// Prints one line of a log before the command begins: a note, or with JSON an event `note`, because the command
+    /// Prints one line of a log before the command begins. With JSON, the line is an event `note`, because the command
     /// may stream events.
     pub(crate) fn log(&self, text: &str) {
         if !self.json {

@@ -23,7 +23,7 @@ pub enum OutputError {
         /// Its other name.
         other: PathBuf,
     },
-    /// The system cannot open or write it.
+    /// The system cannot open or write the file.
     Io {
         /// The file.
         path: PathBuf,
@@ -110,7 +110,7 @@ impl OutputFile {
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
             Err(e) => return Err(io(e)),
         }
-        // A pipe or a device holds no data that could be lost.
+        // A pipe or a device contains no data that could be lost.
         if !overwrite && path.is_file() {
             return Err(OutputError::Exists { path: path.to_owned() });
         }
@@ -135,7 +135,8 @@ impl OutputFile {
         done.map_err(|e| self.failure(e))
     }
 
-    /// Returns a handle for writing, and discards the old content. Call [`settle`] at the end.
+    /// Returns a handle for writing, and discards the old content. The caller must call [`settle`] after the last
+    /// write.
     pub fn begin(&mut self) -> Result<File, OutputError> {
         self.written = true;
         settled(&self.path);
@@ -151,7 +152,8 @@ impl OutputFile {
         Ok(file)
     }
 
-    /// Marks the output as written: other code created the file at its path, for example by renaming a complete file.
+    /// Marks the output as written, because other code created the file at its path, for example by renaming a complete
+    /// file.
     pub fn is_written(mut self) {
         self.written = true;
         settled(&self.path);

@@ -65,7 +65,7 @@ impl Screen {
         self.gone |= self.terminal.draw(picture).is_err();
     }
 
-    /// Returns `true` if the view has lost its terminal.
+    /// Returns `true` if the terminal of the view was closed.
     pub fn gone(&self) -> bool {
         self.gone || self.keys.gone()
     }

@@ -76,7 +76,7 @@ pub fn program(path: &str, prefix: &str) -> Command {
 pub fn run(mut command: Command, words: &[&str], stdin: &str) -> CommandOutput {
     let pipes = command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = pipes.spawn().expect("it starts");
-    // A command that ends without reading its stdin closes it.
+    // The write fails if the command ends without reading its stdin; this is not an error.
     child.stdin.take().expect("stdin").write_all(stdin.as_bytes()).ok();
     ended(child)
 }

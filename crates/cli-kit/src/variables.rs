@@ -2,7 +2,7 @@
 //! notes about retired variables.
 //!
 //! Variables exist only for options that name a port, address, folder, file or format, and for a few options with
-//! harmless numbers. Options that move, reset, number, program, enable outputs, set bits, confirm a question or
+//! harmless numbers. Options that move, reset, number, program, enable outputs, set bits, answer a confirmation or
 //! override a check have no variable, because a variable stays set for later commands in the shell. `audit` checks this
 //! for all options of a command line.
 
@@ -152,7 +152,7 @@ impl Variables {
     }
 
     /// Returns the notes about variables if the command line could not be parsed: the variables that set an option in
-    /// the error, and the retired ones.
+    /// the error, and the retired variables.
     pub(crate) fn report_error(
         &self,
         program: &'static str,

@@ -69,9 +69,9 @@ pub struct Trouble {
 }
 
 impl Trouble {
-    /// Returns the lines for the head of a view, at most about `most`: as many complete causes as fit, the next
-    /// command, and the result of the last key press. The causes that do not fit are returned as the first rows of the
-    /// scrolled part.
+    /// Returns the lines for the head of a view, at most about `most`. The lines contain as many complete causes as
+    /// fit, the next command, and the result of the last key press. The causes that do not fit are returned as the
+    /// first rows of the scrolled part.
     pub fn lines(&self, width: u16, most: usize) -> (Vec<Line<'static>>, Vec<Line<'static>>) {
         let red = |text: String| Line::from(text).style(Style::new().fg(Color::Red).bold());
         let yellow = |text: String| Line::from(text).style(Style::new().fg(Color::Yellow));

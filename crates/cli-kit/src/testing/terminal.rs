@@ -36,7 +36,7 @@ fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
 
 /// A pseudo-terminal.
 pub struct Terminal {
-    /// Input that the user types; when it is closed, the terminal hangs up.
+    /// Input that the user types; when this input is closed, the terminal hangs up.
     person: Option<File>,
     slave: Option<OwnedFd>,
     closed: Arc<AtomicBool>,

@@ -3,8 +3,8 @@ use std::fs::{File, OpenOptions, metadata, read_link};
 use std::io::{Result, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a file completely, or leaves the old file unchanged. If the path is a link, its target is written. An
-/// existing file keeps its mode. Pipes and terminals are written to, not replaced.
+/// Writes a file completely, or leaves the old file unchanged. If the path is a link, the target of the link is
+/// written. The mode of an existing file is not changed. Pipes and terminals are written to, not replaced.
 ///
 /// # Errors
 ///

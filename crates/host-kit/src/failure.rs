@@ -5,8 +5,8 @@ use crate::{Diagnose, Diagnosis, ErrorKind, Facts, Next};
 /// Reason why a request was not carried out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
-    /// Kind of the failure. It determines the exit code of a command, the HTTP status of an agent and the exception in
-    /// Python.
+    /// Kind of the failure. The kind determines the exit code of a command, the HTTP status of an agent and the
+    /// exception in Python.
     pub kind: ErrorKind,
     /// Short name for programs.
     pub code: &'static str,

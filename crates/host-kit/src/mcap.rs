@@ -9,20 +9,20 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 /// missing bytes are detected.
 const MAX_RECORD: usize = 1 << 26;
 
-/// Passes the channels, messages and metadata of a file to `see`, including those in chunks. Returns `true` if the file
-/// was completed. Reads the file from beginning to end in small pieces, so that memory contains at most one record.
-/// Attachments and indices are skipped without reading them, because the library panics if they are damaged. Errors
-/// after the data are ignored, because only the index follows.
+/// Passes the channels, messages and metadata of a file to `see`, including the messages in chunks. Returns `true` if
+/// the file was completed. Reads the file from beginning to end in small pieces, so that memory contains at most one
+/// record. Attachments and indices are skipped without reading them, because the library panics if they are damaged.
+/// Errors after the data are ignored, because only the index follows.
 ///
 /// # Errors
 ///
-/// The first record that cannot be read, or that `see` refuses. `see` has already received the records before it. Also
-/// an error of `file` itself.
+/// The first record that cannot be read, or that `see` refuses. The records before this record were already passed to
+/// `see`. Also an error of `file` itself.
 pub fn each_record<E: From<McapError>>(
     mut file: impl Read,
     mut see: impl FnMut(Record<'_>) -> Result<(), E>,
 ) -> Result<bool, E> {
-    // A file that was cut off has no end record.
+    // An incomplete file has no end record.
     let options =
         LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);

@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 pub enum FrontEnd {
     /// Command-line tool.
     Command,
-    /// Agent: its HTTP API and its dashboard.
+    /// Agent, with its HTTP API and its dashboard.
     Agent,
     /// Python package.
     Python,

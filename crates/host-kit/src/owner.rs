@@ -35,10 +35,12 @@ pub enum Refused {
     Closed,
 }
 
-/// Function of a request: it is called once, with the device `D` or with the reason why the request is not carried out.
+/// Function of a request, which is called once, with the device `D` or with the reason why the request is not carried
+/// out.
 ///
-/// A refusal calls the function in the thread that refuses: the owner's thread, or a thread that cancels a request,
-/// requests a Stop or adds a request. During the call, no thread may hold a lock that the function needs.
+/// A refusal calls the function in the thread that refuses the request. This is the owner's thread, or a thread that
+/// cancels a request, requests a Stop or adds a request. During the call, no thread may hold a lock that the function
+/// needs.
 pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 
 /// Value of [`Request::after`] for a request that no Stop refuses.
@@ -96,7 +98,7 @@ impl<D, T: Clone> Queue<D, T> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the number of Stops so far, which is the number of the last one.
+    /// Returns the number of Stops so far, which is also the number of the last Stop.
     pub fn stops(&self) -> u64 {
         self.lock().stops
     }
@@ -151,7 +153,7 @@ impl<D, T: Clone> Queue<D, T> {
 
     /// Returns the permission to add one request. Returns `None` if the queue is closed.
     ///
-    /// The permission holds the lock of the queue, so its owner must not call other functions of the queue.
+    /// A thread with this permission holds the lock of the queue, so it must not call other functions of the queue.
     pub fn place(&self) -> Option<Place<'_, D, T>> {
         Some(Place(self.lock())).filter(|place| !place.0.closed)
     }
@@ -164,8 +166,8 @@ impl<D, T: Clone> Queue<D, T> {
         }
     }
 
-    /// Takes the next request, which is the current one until [`Queue::done`]: Stops first, then commands and updates,
-    /// then queries.
+    /// Takes the next request, which is the current request until [`Queue::done`]. Stops are taken first, then commands
+    /// and updates, then queries.
     pub fn take(&self) -> Option<Turn<D, T>> {
         let mut state = self.lock();
         let (tag, act, refused, is_cancelled_by_stop) = match state.stopping.pop_front() {
@@ -205,7 +207,7 @@ impl<D, T: Clone> Queue<D, T> {
     }
 
     /// Cancels the request with a matching tag: a current request must end, a waiting request is refused. Returns
-    /// `false` if no such request exists.
+    /// `false` if no matching request exists.
     pub fn cancel(&self, is_it: impl Fn(&T) -> bool) -> bool {
         let request = {
             let mut state = self.lock();

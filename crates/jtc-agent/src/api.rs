@@ -67,10 +67,10 @@ use objects::Found;
 
 /// Longest request body, bytes.
 const BODY_MAX: usize = 64 << 10;
-/// Longest body with a trajectory, bytes: 12,000 points as text, with a margin. The number of such bodies read at the
-/// same time is limited.
+/// Longest body with a trajectory, bytes. This is enough for 12,000 points as text, with a margin. Only a limited
+/// number of such bodies is read at the same time.
 const TRAJECTORY_MAX: usize = 16 << 20;
-/// Longest body with an arm, bytes: a robot description, with a margin.
+/// Longest body with an arm, bytes. This is enough for a robot description, with a margin.
 const ARM_MAX: usize = 1 << 20;
 /// Longest body with waypoints, bytes.
 const PLAN_MAX: usize = 1 << 18;
@@ -111,7 +111,7 @@ impl Agent {
     ///
     /// # Errors
     ///
-    /// The system has no random numbers.
+    /// The operating system does not provide random numbers.
     pub fn new(
         line: Line,
         jobs: Arc<Jobs>,
@@ -170,7 +170,7 @@ impl Agent {
         self.gate.lost_lines()
     }
 
-    /// Sends a Stop or a Pause of an HTTP client. The line never treats the sender as the lease holder, because the
+    /// Sends a Stop or a Pause of an HTTP client. The agent never treats the sender as the lease holder, because the
     /// holder may have sent requests before the Stop.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;

@@ -1,5 +1,5 @@
-//! Work of an agent for clients without a connection to the line: maintains connections for these clients, runs their
-//! jobs, and writes a journal that a client can read when it reconnects.
+//! Work of an agent for clients without a connection to the serial line. The agent maintains connections for these
+//! clients, runs their jobs, and writes a journal that a client can read when it reconnects.
 mod event;
 mod http_session;
 mod poses;
@@ -35,14 +35,14 @@ pub use task::{STOPPED, Task, stopped};
 
 /// Number of jobs that are stored.
 const KEPT: usize = 256;
-/// Largest number of clients without a connection to the line.
+/// Largest number of clients without a connection to the serial line.
 const COMMANDERS_MAX: usize = 32;
 /// Time from the end of a silent client's lease until the client is removed.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Shortest interval between events for Stops and Pauses; the last one is always written. Repeated Stops must not
+/// Shortest interval between events for Stops and Pauses; the last event is always written. Repeated Stops must not
 /// displace other events from the journal.
 const HALTS_APART: Duration = Duration::from_millis(200);
-/// Interval at which the watcher checks for changes that the line does not announce.
+/// Interval at which the watcher checks for changes that the serial line does not announce.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Stage of a job.
@@ -52,7 +52,7 @@ pub enum Stage {
     Running,
     /// Completed.
     Finished,
-    /// Stopped by a client.
+    /// The job was stopped by a client.
     Stopped,
     /// Failed.
     Failed,
@@ -83,7 +83,7 @@ struct Kept {
     ended: Ended,
 }
 
-/// Numbers of ended jobs, by outcome.
+/// Numbers of jobs that have ended, one number per outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
     /// Number of completed jobs.
@@ -159,7 +159,7 @@ impl Jobs {
         Some(http_session)
     }
 
-    /// Returns the client with this key, and the time without a request after which its lease lapses.
+    /// Returns the client with this key, and the time without a request after which the client's lease lapses.
     pub fn http_session(&self, key: &str) -> Option<(Arc<HttpSession>, Duration)> {
         let found = self.lock().http_sessions.get(key).cloned()?;
         found.0.see();
@@ -307,7 +307,7 @@ struct Seen {
     lost: Option<String>,
 }
 
-/// Until the agent ends, writes changes on the line to the journal, and removes clients that do not reconnect.
+/// Until the agent ends, writes changes on the serial line to the journal, and removes clients that do not reconnect.
 fn watch(jobs: &Weak<Jobs>) {
     let (mut seen, mut looked) = (Seen::default(), Instant::now());
     loop {

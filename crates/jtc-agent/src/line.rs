@@ -1,9 +1,9 @@
 //! Shares the serial line of one controller between many clients. The module does not do I/O: its functions take the
 //! received bytes and the time, and return the bytes to write.
 //!
-//! Each client speaks the protocol of the line as if no other client existed, and receives every status with the
-//! records of its own frames only. Every program that can use a serial port can therefore use a shared line. The shared
-//! line decides which client may send which frame:
+//! Each client speaks the protocol of the line as if no other client existed, and receives every status, but only the
+//! records of its own frames. Every program that can use a serial port can therefore use a shared line. The shared line
+//! decides which client may send which frame:
 //!
 //! - every client may send queries, and a Stop or a Pause, which overtakes all other frames;
 //! - only the holder of the [`Lease`] may send all other frames.
@@ -58,7 +58,7 @@ struct Sent {
     kind: u8,
     /// `true` if the frame was aborted before its end. The controller then answers with an error record.
     abandoned: bool,
-    /// Time at which the line finishes the last byte.
+    /// Time at which the serial line finishes the last byte.
     at: Duration,
 }
 
@@ -80,7 +80,7 @@ pub struct SharedLine {
     last_turn: ClientId,
     lease: Option<Lease>,
     halts: StopQueue,
-    /// Last Stop or Pause: its number, the name of its client, and the command.
+    /// Last Stop or Pause, with its number, the name of its client, and the command.
     halted: (u64, String, ExecCommand),
     /// End of the hold-off. Until this time, only the client of the last Stop or Pause may begin a motion.
     calm_until: Duration,
@@ -96,13 +96,14 @@ pub struct SharedLine {
     counts: Counts,
 }
 
-/// Number of the line's owner. The owner acts for clients that are disconnected or have no connection of their own.
+/// Client number of the serial line's owner. The owner acts for clients that are disconnected or have no connection of
+/// their own.
 pub const OWNER: ClientId = ClientId(0);
 /// Placeholder for all clients that have requested a Stop or a Pause.
 const HALTS: ClientId = ClientId(u64::MAX);
 
 impl SharedLine {
-    /// Creates a line with this bit rate in Bd; `None` means that the line has no bit rate.
+    /// Creates a line with this bit rate in Bd; `None` means that the serial line has no bit rate.
     pub fn new(baud: Option<u32>) -> Self {
         Self {
             clients: BTreeMap::new(),
@@ -183,7 +184,8 @@ impl SharedLine {
         self.halt_by(client, client, name, command, now);
     }
 
-    /// Like [`halt`](Self::halt), for a requester without a connection to the line. The hold-off does not apply to `client`.
+    /// Like [`halt`](Self::halt), for a requester without a connection to the serial line. The hold-off does not apply
+    /// to `client`.
     pub fn halt_for(&mut self, client: Option<ClientId>, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(OWNER, client.unwrap_or(OWNER), name, command, now);
     }
@@ -309,7 +311,7 @@ impl SharedLine {
         if self.asked_after(id) == Some(NOT_ASKED) { POLICY } else { &self.halted.1 }
     }
 
-    /// Permits the client's next motion. `after` is the number of the last Stop or Pause that the client has seen. Any
+    /// Permits the client's next motion. `after` is the number of the last Stop or Pause that the client has seen. A
     /// later Stop or Pause revokes the permission, even while the request still waits.
     ///
     /// # Errors
@@ -367,8 +369,8 @@ impl SharedLine {
         self.asked_after(id).is_some_and(|number| number != self.halted.0)
     }
 
-    /// Returns the number of the last Stop or Pause before the client's last request for a motion. If the client has made no
-    /// request, returns the number of the last one before it connected.
+    /// Returns the number of the last Stop or Pause before the client's last request for a motion. If the client has
+    /// made no request, returns the number of the last Stop or Pause before the client connected.
     pub fn asked_after(&self, id: ClientId) -> Option<u64> {
         self.clients.get(&id).map(|client| client.asked_after)
     }
@@ -395,8 +397,8 @@ impl SharedLine {
     }
 
     /// Stops or pauses every motion on behalf of the owner. Sends the command even if the arm seems to be at rest,
-    /// because the last status is older than the last command. In this case the controller may refuse the command, and
-    /// other clients are not affected. Returns true if the arm may have been moving.
+    /// because the last status is older than the last command. If the arm is at rest, the controller may refuse the
+    /// command; other clients are not affected. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.motion_tracker.may_move(self.status.as_ref(), now);
         if moved {
@@ -413,7 +415,7 @@ impl SharedLine {
         self.motion_tracker.may_move(self.status.as_ref(), now)
     }
 
-    /// Returns true if no frame waits for the line and no Stop waits for the record of the controller.
+    /// Returns true if no frame waits for the serial line and no Stop waits for the record of the controller.
     pub fn is_idle(&self) -> bool {
         self.halts.are_done() && self.motion_tracker.due().is_none() && self.tx_queue.is_free()
     }

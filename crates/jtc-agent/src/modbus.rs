@@ -24,8 +24,8 @@ pub use server::Server;
 
 use crate::access::TokenError;
 
-/// Returns a random first sequence number for a new agent, so that a PLC that repeats old writes does not by chance
-/// send the next valid number.
+/// Returns a random first sequence number for a new agent. A PLC that repeats old writes is then unlikely to send the
+/// next valid number.
 ///
 /// # Errors
 ///

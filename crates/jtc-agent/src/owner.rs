@@ -12,11 +12,11 @@ use tokio::sync::watch;
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
 use crate::upload::Upload;
 
-/// Longest wait for bytes of the controller before the owner checks the requests of clients. This is also the longest
-/// time for which a Stop waits.
+/// Longest wait for bytes of the controller before the owner checks the requests of clients. A Stop also waits at most
+/// for this time.
 const TURN: Duration = Duration::from_millis(2);
 
-/// Longest time that the owner waits for data in flight before it ends.
+/// Longest time for which the owner waits for data in flight before the owner ends.
 const LAST_TURNS: Duration = Duration::from_secs(1);
 
 /// Callback for each event, on the owner's thread; the callback must return quickly.
@@ -60,7 +60,7 @@ impl Shared {
     }
 }
 
-/// Marks the port as lost on drop, even after a panic of its thread.
+/// Marks the port as lost on drop, even after a panic of the owner thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {
@@ -70,22 +70,22 @@ impl Drop for Gone<'_> {
     }
 }
 
-/// Handle through which clients and the API use the line. A thread owns the line.
+/// Handle through which clients and the API use the serial line. A thread owns the line.
 #[derive(Clone)]
 pub struct Line(Arc<Shared>);
 
 impl Line {
-    /// Returns the time of the line since the start of its owner thread.
+    /// Returns the time of the serial line since the start of its owner thread.
     pub fn now(&self) -> Duration {
         self.0.now()
     }
 
-    /// Calls a function with the line and the present time of the line.
+    /// Calls a function with the serial line and the present time of the line.
     pub fn with<T>(&self, act: impl FnOnce(&mut SharedLine, Duration) -> T) -> T {
         act(&mut self.0.lock().line, self.0.now())
     }
 
-    /// Returns the bit rate of the line in Bd, or `None` if it has no bit rate.
+    /// Returns the bit rate of the serial line in Bd, or `None` if it has no bit rate.
     pub fn baud(&self) -> Option<u32> {
         self.0.baud
     }
@@ -111,13 +111,13 @@ impl Line {
         self.0.wake();
     }
 
-    /// Returns the reason why the port was lost; `None` while it is available.
+    /// Returns the reason why the port was lost; `None` while the port is available.
     pub fn lost(&self) -> Option<String> {
         self.0.lock().lost.clone()
     }
 
     /// Returns the values in a status. Adds the commanded values, which a status does not contain, if the executed
-    /// trajectory was seen on the line. `delay_ticks` is the age of the measurements in ticks (J-62).
+    /// trajectory was seen on the serial line. `delay_ticks` is the age of the measurements in ticks (J-62).
     pub fn sample(&self, status: &Status, delay_ticks: u8) -> Sample {
         let given = self.0.upload.lock().unwrap_or_else(PoisonError::into_inner).trajectory(false);
         match given {
@@ -126,7 +126,7 @@ impl Line {
         }
     }
 
-    /// Returns the commanded joint positions, rad, if the executed trajectory was seen on the line.
+    /// Returns the commanded joint positions, rad, if the executed trajectory was seen on the serial line.
     pub fn commanded(&self, status: &Status) -> Option<[f64; JOINTS]> {
         let positions = self.sample(status, 0).joints.map(|joint| joint.set_position);
         positions.iter().all(|position| position.is_finite()).then_some(positions)
@@ -154,7 +154,7 @@ impl Line {
     }
 }
 
-/// Guard of a client on the line, which removes the client on drop.
+/// Guard of a client on the serial line, which removes the client on drop.
 pub struct Joined {
     line: Line,
     client: ClientId,
@@ -180,7 +180,7 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// Takes a port. `observer` receives every event on the line.
+    /// Takes a port. `observer` receives every event on the serial line.
     pub fn new(port: impl Port + Send + 'static, observer: Observer) -> Self {
         let shared = Arc::new(Shared {
             state: Mutex::new(State { line: SharedLine::new(port.baud()), lost: None }),
@@ -198,7 +198,7 @@ impl Owner {
         Self { line: Line(shared), thread: Some(thread) }
     }
 
-    /// Returns the line.
+    /// Returns the serial line.
     pub fn line(&self) -> Line {
         self.line.clone()
     }
@@ -277,7 +277,7 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
     Ok(())
 }
 
-/// Connection of a client to the line.
+/// Connection of a client to the serial line.
 pub struct ClientPort {
     joined: Joined,
     /// Bytes that were delivered but not read yet.
@@ -291,7 +291,7 @@ impl ClientPort {
         self.joined.client
     }
 
-    /// Returns the line of this connection.
+    /// Returns the serial line of this connection.
     pub fn line(&self) -> &Line {
         &self.joined.line
     }

@@ -99,8 +99,8 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     Ok(Json(DoctorObject { healthy, listened_s: time_s, statuses, findings }))
 }
 
-/// Returns the joints that the user has declared absent. Requests this list from the controller, because the status has
-/// no bit for an absent joint whose drive answers (J-53).
+/// Returns the joints that the user has declared absent. Requests this list from the controller, because the status
+/// does not show an absent joint whose drive answers (J-53).
 async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
         return Ok(labels::absent(status));

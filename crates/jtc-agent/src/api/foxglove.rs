@@ -46,9 +46,9 @@ const PERIOD: Duration = Duration::from_millis(40);
 const QUIET: Duration = Duration::from_millis(500);
 /// Interval at which the progress of a client is checked.
 const PING_TIME: Duration = Duration::from_millis(200);
-/// Time without reading after which a client gets no new data until it reads again.
+/// Time after which the agent sends no new data to a client that does not read.
 const LATE: Duration = Duration::from_millis(400);
-/// Time without reading after which a client is disconnected.
+/// Time after which the agent disconnects a client that does not read.
 const GONE: Duration = Duration::from_secs(10);
 /// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
@@ -80,7 +80,7 @@ pub(super) async fn foxglove(
     sockets.serve(caller.role, upgrade, async move |socket| serve(&agent, &caller, socket).await)
 }
 
-/// State that both directions of a socket share.
+/// State that both directions of a WebSocket share.
 struct Shared {
     wanted: Mutex<Wanted>,
     /// Notification that a message must be sent at once.
@@ -167,7 +167,7 @@ fn ask(shared: &Shared, text: &str) -> bool {
     }
 }
 
-/// Handles a binary message: Stop and Pause, if the client may send them.
+/// Handles a binary message, which is a Stop or a Pause if the client may send them.
 fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
     let Some(call) = Call::parse(bytes) else {
         return shared.warn("message ignored: this server accepts no messages on channels".to_owned());
@@ -348,7 +348,7 @@ impl Sender<'_> {
         }
     }
 
-    /// Sends a ping after the data. When the client answers the ping, it has read the data.
+    /// Sends a ping after the data. The client has read the data when it answers the ping.
     async fn ping(&mut self) -> Result<(), Gone> {
         let back = self.shared.read.load(Ordering::Relaxed) >= self.pinged;
         if !back || self.pinged_at.elapsed() < PING_TIME {

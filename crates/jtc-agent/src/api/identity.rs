@@ -1,4 +1,5 @@
-//! Identity of the controller and its arm. The agent reads it when needed, and uses the answer for all clients.
+//! Identity of the controller and its arm. The agent reads the identity when needed, and uses the answer for all
+//! clients.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -21,7 +22,7 @@ pub(super) struct Identity {
     asked: Option<Instant>,
     /// Identity that the controller reports; `None` if the controller has no extensions, or before its first answer.
     pub info: Option<Info>,
-    /// Arm of the controller, or the agent's arm if the controller cannot return its own.
+    /// Arm of the controller, or the agent's arm if the controller cannot return its arm.
     pub arm: Arc<Arm>,
     /// Hash of the controller's arm.
     hash: Option<u64>,

@@ -57,7 +57,8 @@ impl Halts for Agent {
 }
 
 impl Agent {
-    /// Returns the client of a lease key and renews its lease. Returns an error if the client does not hold the lease.
+    /// Returns the client of a lease key and renews the lease of this client. Returns an error if the client does not
+    /// hold the lease.
     pub(super) fn http_session(&self, asker: &Asker) -> Result<Arc<HttpSession>, Problem> {
         let (http_session, lasts) = self.client(asker)?;
         let held = self.line.with(|line, now| line.take_lease(http_session.client, Some(lasts), now));
@@ -80,7 +81,7 @@ impl Agent {
         Ok((http_session, turn))
     }
 
-    /// Returns the client of a lease key, and the time without a request after which its lease lapses.
+    /// Returns the client of a lease key, and the time without a request after which the client's lease lapses.
     pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<HttpSession>, Duration), Problem> {
         asker.caller.operator()?;
         let key = asker.key().ok_or(lease::Denied::NoKey)?;

@@ -1,4 +1,4 @@
-//! Flight recorder of the controller: its state, its log as a file, and restart.
+//! Flight recorder of the controller: state, log as a file, and restart.
 use std::io::Cursor;
 use std::path::Path;
 
@@ -181,7 +181,7 @@ pub(super) async fn values(
     from_log(&agent, &caller, last).await.map(Json)
 }
 
-/// Reads the log and converts it. Only operators may read the log, one request at a time.
+/// Reads the flight recorder log and converts it. Only operators may read the log, one request at a time.
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,

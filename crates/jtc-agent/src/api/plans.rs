@@ -311,7 +311,7 @@ fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Probl
     Ok((request, file))
 }
 
-/// Plans the motion and collects its results.
+/// Plans the motion and collects the results of the planning.
 fn planned(
     request: &PlanRequest,
     file: &WaypointFile,

@@ -238,7 +238,7 @@ pub(super) async fn begin_run(
     )
 }
 
-/// Returns the error for a number whose trajectory has been replaced.
+/// Returns the error for a trajectory number whose trajectory has been replaced.
 fn replaced(stored: &Stored) -> Problem {
     let Stored { number, name, digest, .. } = stored;
     let message = format!(

@@ -1,5 +1,5 @@
-//! Connection of a client to the line as a WebSocket: binary messages contain bytes of the line, text messages contain
-//! notices of the agent.
+//! Connection of a client to the serial line as a WebSocket: binary messages contain bytes of the line, text messages
+//! contain notices of the agent.
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ use crate::owner::Line;
 const MESSAGE_MAX: usize = 64 << 10;
 /// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
-/// Interval of the pings that check whether a client is alive.
+/// Interval of the pings that check if a client still answers.
 const PING_TIME: Duration = Duration::from_secs(1);
 /// Number of consecutive unanswered pings after which the client loses the lease.
 const SILENT_MAX: u32 = 4;
@@ -101,7 +101,7 @@ impl Notice {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Wish {
     Lease(LeaseWish),
-    /// Number of the last Stop or Pause that the client had seen when it decided to send its next frames.
+    /// Number of the last Stop or Pause that the client had seen when the client decided to send its next frames.
     AskedAfter(u64),
 }
 
@@ -110,11 +110,11 @@ enum Wish {
 enum LeaseWish {
     Take,
     Release,
-    /// Asks the holder of the lease to release it.
+    /// Requests the holder of the lease to release the lease.
     Ask,
 }
 
-/// Serves `GET /api/line`: a connection to the line for a client.
+/// Serves `GET /api/line`: a connection to the serial line for a client.
 pub(super) async fn line(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
@@ -151,8 +151,8 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
     note("left", json!({ "client": client.0, "name": name }));
 }
 
-/// Passes messages in both directions until one end disconnects. The directions do not wait for each other, so the
-/// agent receives a Stop even if the client does not read.
+/// Passes messages in both directions until the client or the line disconnects. The directions do not wait for each
+/// other, so the agent receives a Stop even if the client does not read.
 async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
     let alive = AtomicBool::new(true);
     let (to, from) = socket.split();
@@ -175,7 +175,7 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
     }
 }
 
-/// Sends the client its messages, and checks that it is alive.
+/// Sends the client its messages, and checks that the client still answers.
 async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);

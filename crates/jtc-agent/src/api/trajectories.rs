@@ -243,7 +243,8 @@ pub(super) async fn put(
     Ok(Json(kept.await?))
 }
 
-/// Stores the trajectory in `text` under a number. If `new` is `true`, stores it only if the number is free.
+/// Stores the trajectory in `text` under a number. If `new` is `true`, stores the trajectory only if the number is
+/// free.
 pub(super) fn keep(
     agent: &Agent,
     (number, new): (u16, bool),

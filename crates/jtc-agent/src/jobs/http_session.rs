@@ -1,4 +1,4 @@
-//! Session of an HTTP client, which has no connection to the line. Each request is a sign of life of the client.
+//! Session of an HTTP client, which has no connection to the serial line. Each request is a sign of life of the client.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -22,16 +22,16 @@ const MOTION_ENDED: &str = "motion-ended";
 /// Function that runs on the session of a client.
 type Work = Box<dyn FnOnce(&mut Session<ClientPort>) + Send>;
 
-/// Connection of a client to the line, with its session on a separate thread.
+/// Connection of a client to the serial line, with its session on a separate thread.
 pub struct HttpSession {
-    /// Number of the client on the line.
+    /// Number of the client on the serial line.
     pub client: ClientId,
     /// Name of the client that users see.
     pub name: String,
     work: SyncSender<Work>,
     /// Semaphore that permits one function at a time.
     free: Arc<Semaphore>,
-    /// Current job, and the queue of requests while it runs.
+    /// Current job, and the queue of requests while the job runs.
     job: Mutex<Option<(u64, SyncSender<Wish>)>>,
     seen: Mutex<Instant>,
     /// Policy of the client's lease.
@@ -56,12 +56,12 @@ pub struct Turn(#[expect(dead_code, reason = "held until it is over")] OwnedSema
 pub enum Unable {
     /// The session is busy. Contains the number of the job that uses the session, if any.
     Busy(Option<u64>),
-    /// The line was lost, or the client was disconnected.
+    /// The serial line was lost, or the client was disconnected.
     Gone,
 }
 
 impl HttpSession {
-    /// Adds a client to the line in the argument.
+    /// Adds a client to the serial line in the argument.
     pub fn new(line: &Line, introduction: Introduction) -> Arc<Self> {
         let (name, policy) = (introduction.name.clone(), introduction.policy);
         let port = line.connect(introduction);
@@ -148,15 +148,15 @@ impl HttpSession {
             // The session is free before the caller receives the result, so that the caller can send its next request
             // at once.
             drop(turn);
-            // The function has run even if its caller has disconnected.
+            // The function has run even if the caller has disconnected.
             let _ = done.send(came);
         });
         self.work.try_send(work).map_err(|_| Unable::Gone)?;
         result.await.map_err(|_| Unable::Gone)
     }
 
-    /// Runs a function on the session with this permit; the caller does not wait. The call has no effect if the line
-    /// was lost.
+    /// Runs a function on the session with this permit; the caller does not wait. The call has no effect if the serial
+    /// line was lost.
     pub fn tell(&self, turn: Turn, act: impl FnOnce(&mut Session<ClientPort>) + Send + 'static) {
         let work: Work = Box::new(move |session| {
             act(session);
@@ -218,8 +218,8 @@ impl HttpSession {
     }
 }
 
-/// Runs the queued functions until no caller remains. Between the functions, it reads the deliveries, because the line
-/// disconnects a client that does not read.
+/// Runs the queued functions until no caller remains. Between the functions, the thread reads the deliveries, because
+/// the serial line disconnects a client that does not read.
 fn serve(port: ClientPort, work: &Receiver<Work>) {
     let mut session = Session::new(port);
     loop {

@@ -23,12 +23,12 @@ use crate::owner::ClientPort;
 /// Interval at which the progress of a motion is reported.
 const MOVING: Duration = Duration::from_secs(1);
 
-/// Motion to run, and its options.
+/// Motion that the job runs, with the options of the motion.
 #[derive(Clone, Debug)]
 pub struct Order {
     /// Trajectory or target of the motion.
     pub course: Course,
-    /// `true` if the arm must first move to the first point when it is not there.
+    /// `true` if the arm first moves to the first point when it is at another position.
     pub approach: bool,
     /// Speed in % of the trajectory's own speed or of the limits. With `None`, a trajectory runs at its own speed, and
     /// a move or an approach at the default speed.
@@ -40,7 +40,7 @@ pub struct Order {
     pub accept_device_limits: bool,
 }
 
-/// Progress and results of a run.
+/// Progress and results of a run job.
 #[derive(Clone, Debug, Default)]
 pub struct Done {
     /// `true` if the run was completed.

@@ -30,8 +30,8 @@ struct State {
 pub struct Stops(Arc<Mutex<State>>);
 
 impl Stops {
-    /// Returns the cause of the current held Stop, and the age of this Stop in ms at the line's time `now`. Returns
-    /// `None` if no held Stop is active, or if its cause is not known.
+    /// Returns the cause of the current held Stop, and the age of this Stop in ms at the serial line's time `now`.
+    /// Returns `None` if no held Stop is active, or if its cause is not known.
     pub fn cause(&self, status: &Status, now: Duration) -> Option<(StopCause, u32)> {
         let state = self.lock();
         let (at, reactions) = state.told.as_ref().filter(|_| status.is_held_stop())?;
@@ -113,7 +113,7 @@ mod tests {
         stops.told(next, second(3), Some(reactions));
         assert_eq!(stops.begins(&held), None, "its cause is known");
         assert_eq!(stops.cause(&held, second(4)), Some((cause, 1500)));
-        // This status is newer than the last check.
+        // The status in this test is newer than the last check.
         assert_eq!(stops.cause(&free, second(4)), None);
         assert_eq!(stops.begins(&free), None);
         assert_eq!(stops.jumped(&free), 0b100, "it lasts beyond the held stop");

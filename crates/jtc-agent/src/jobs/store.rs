@@ -371,8 +371,8 @@ mod tests {
         assert!(store.delete(7).is_ok() && store.put_new(7, "pick", TEXT, false).is_ok());
     }
 
-    /// While the disk is full, the existing trajectory is kept, also after a restart of the agent. When space is free
-    /// again, the next trajectory is stored.
+    /// While the disk is full, the existing trajectory stays in the store, also after a restart of the agent. When
+    /// space is free again, the next trajectory is stored.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_full_disk_leaves_what_had_the_number() {

@@ -25,7 +25,7 @@ pub struct Task<'a> {
     pub line: &'a Line,
     /// Session of the job's client.
     pub http_session: &'a HttpSession,
-    /// Arm that is used if the controller cannot return its own arm.
+    /// Arm that is used if the controller cannot return an arm.
     pub arm: &'a Arm,
 }
 

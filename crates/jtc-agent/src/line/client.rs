@@ -1,4 +1,4 @@
-//! Client on the line, with its received frames and its waiting deliveries.
+//! Client on the serial line, with its received frames and its waiting deliveries.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -10,8 +10,8 @@ use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 use super::Denied;
 use super::frame_class::HostFrame;
 
-/// Largest number of waiting bytes of a client's frames. This is enough for the frames in flight of an upload, and some
-/// commands.
+/// Largest number of waiting bytes of a client's frames. This limit is enough for the frames in flight of an upload,
+/// and some commands.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
 /// Largest number of waiting frames of a client. Equals the number of frames that a client may send in one burst.
 const FRAMES_WAITING: usize = 500;
@@ -21,7 +21,7 @@ const UNREAD_MAX: usize = 1 << 20;
 /// Largest number of frames that a client may send, per second and in one burst.
 const FRAMES_PER_S: f64 = 250.0;
 const FRAMES_AT_ONCE: f64 = 500.0;
-/// Largest number of waiting records for refused frames; one is sent with each status.
+/// Largest number of waiting records for refused frames; with each status, one of these records is sent.
 const REFUSALS_MAX: usize = 600;
 
 /// Number of a client. Numbers are not reused.
@@ -44,7 +44,7 @@ pub enum Policy {
 }
 
 impl Policy {
-    /// Returns the command of the policy, if it has one.
+    /// Returns the command of the policy, if the policy has a command.
     pub(super) fn command(self) -> Option<ExecCommand> {
         match self {
             Self::Continue => None,
@@ -74,12 +74,12 @@ pub struct Introduction {
     pub policy: Policy,
 }
 
-/// Data that the line delivers to a client.
+/// Data that the serial line delivers to a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Delivery {
     /// Bytes from the controller: statuses, and answers to the client's own requests.
     Bytes(Vec<u8>),
-    /// Reason why a frame of the client was not passed on. The record of the frame follows in a status; it only
+    /// Reason why a frame of the client was not passed on. The record of the frame follows in a status; the record only
     /// contains "not allowed".
     Denied(Denied),
     /// Reason why a request about the lease was refused.
@@ -117,12 +117,12 @@ pub enum PutOut {
     Unread,
 }
 
-/// Client on the line.
+/// Client on the serial line.
 pub(super) struct Client {
     pub introduction: Introduction,
     /// Bytes of an incomplete frame.
     partial: Vec<u8>,
-    /// Frames that wait for the line.
+    /// Frames that wait for the serial line.
     pub waiting: VecDeque<HostFrame>,
     waiting_bytes: usize,
     /// Number of waiting frames that need the lease.
@@ -214,7 +214,7 @@ impl Client {
         self.refusals.pop_front()
     }
 
-    /// Queues a frame for the line.
+    /// Queues a frame for the serial line.
     pub(super) fn wait(&mut self, frame: HostFrame) -> Result<(), PutOut> {
         self.waiting_bytes += frame.bytes.len();
         self.commands += usize::from(frame.class.needs_lease());
@@ -246,7 +246,7 @@ impl Client {
         VecDeque::into(taken)
     }
 
-    /// Queues a delivery. Returns an error if the client has left too many bytes unread.
+    /// Queues a delivery. Returns an error if the number of unread bytes of the client exceeds the limit.
     pub(super) fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
         self.unread += delivery.len();
         self.deliveries.push_back(delivery);

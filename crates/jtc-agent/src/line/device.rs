@@ -1,4 +1,4 @@
-//! Controller side of the line: selects the next bytes to write, and the clients that receive each record.
+//! Controller side of the serial line: selects the next bytes to write, and the clients that receive each record.
 use std::time::Duration;
 
 use jtc_wire::{DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
@@ -19,7 +19,7 @@ impl SharedLine {
             due => due,
         };
         let lease = self.lease.as_ref().and_then(|lease| lease.until);
-        // A command that waits for the line is due as soon as the line is free.
+        // A command that waits for the serial line is due as soon as the line is free.
         let own = [self.halts.due(now), self.motion_tracker.due()].into_iter().flatten().min();
         let own = own.filter(|_| self.tx_queue.due(now).is_none());
         [line, lease, own].into_iter().flatten().min()
@@ -104,8 +104,8 @@ impl SharedLine {
         None
     }
 
-    /// Refuses queued frames of clients that have lost the lease. A client whose lease has lapsed takes the lease again,
-    /// if the lease is free and the client's policy lets its motion continue.
+    /// Refuses queued frames of clients that have lost the lease. A client whose lease has lapsed takes the lease
+    /// again, if the lease is free and the client's policy permits its motion to continue.
     fn refuse_without_lease(&mut self, now: Duration) {
         let holder = self.lease.as_ref().map(|lease| lease.holder);
         let waits = |client: &Client| client.waiting.front().is_some_and(|frame| frame.class.needs_lease());

@@ -1,9 +1,9 @@
-//! Events on the line.
+//! Events on the serial line.
 use jtc_wire::{FrameType, Response};
 
 use super::{ClientId, Denied, FrameClass, Lease, Policy, PutOut, Will};
 
-/// Numbers of events on a line since the thread that owns the line was started.
+/// Numbers of events on a line since the thread that owns the serial line was started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Number of written frames that change a state.
@@ -36,7 +36,7 @@ impl Counts {
     }
 }
 
-/// Event on the line.
+/// Event on the serial line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineEvent {
     /// Written frame that changes a state.

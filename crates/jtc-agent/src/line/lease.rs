@@ -1,4 +1,5 @@
-//! Lease of the line: only the client that holds it may send commands. All clients can see the holder's name.
+//! Lease of the serial line: only the client that holds the lease may send commands. All clients can see the holder's
+//! name.
 use std::time::Duration;
 
 use agent_kit::lease::Presence;
@@ -10,7 +11,7 @@ pub(super) const POLICY: &str = "the policy of a disconnected client";
 /// Special value instead of the number of a Stop: the policy of the client has cancelled the client's requests.
 pub(super) const NOT_ASKED: u64 = u64::MAX;
 
-/// Lease of a client on the line.
+/// Lease of a client on the serial line.
 pub type Lease = agent_kit::lease::Lease<ClientId>;
 
 /// Reason why a client may not command.
@@ -36,7 +37,7 @@ pub enum Denied {
     /// The client may only read and stop.
     #[error("this client can only read and stop: commands need the operator's token")]
     Viewer,
-    /// The arm was stopped or paused after the request, or by another client shortly before it (hold-off).
+    /// The arm was stopped or paused after the request, or by another client shortly before the request (hold-off).
     #[error(
         "{by} has stopped the arm: earlier requests were discarded, and motion requests are refused for 3 s"
     )]
@@ -63,7 +64,7 @@ pub enum Denied {
 }
 
 impl SharedLine {
-    /// Lease, if a client holds it.
+    /// Present lease; `None` if no client holds the lease.
     pub fn lease(&self) -> Option<&Lease> {
         self.lease.as_ref()
     }
@@ -74,7 +75,7 @@ impl SharedLine {
     ///
     /// # Errors
     ///
-    /// [`Denied`] if another client holds the lease, or if this client may not hold it. If another client holds the
+    /// [`Denied`] if another client holds the lease, or if this client may not take it. If another client holds the
     /// lease, the holder receives a request to release it.
     pub fn take_lease(
         &mut self,
@@ -105,8 +106,8 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Requests the lease from its holder. The first client that requests it stays first until it receives the lease,
-    /// disconnects, or is silent for the duration of its own lease.
+    /// Requests the lease from the client that holds it. The first client that requests the lease stays first until it
+    /// receives the lease, disconnects, or is silent for the duration of its own lease.
     ///
     /// # Errors
     ///

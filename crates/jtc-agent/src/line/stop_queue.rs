@@ -8,7 +8,8 @@ use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
 use super::ClientId;
 use super::frame_class::HostFrame;
 
-/// Time after which a frame without a record is sent again. The time that three statuses need on the line is added.
+/// Time after which a frame without a record is sent again. The time that three statuses need on the serial line is
+/// added.
 const AWAITED: Duration = Duration::from_millis(150);
 /// Number of times that a frame is sent with the interval [`AWAITED`].
 const TRIES: u32 = 20;
@@ -69,7 +70,7 @@ impl StopQueue {
         self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
     }
 
-    /// Records that the frame was written. The line finishes the last byte of the frame at `at`.
+    /// Records that the frame was written. The serial line finishes the last byte of the frame at `at`.
     pub(super) fn written(&mut self, at: Duration, baud: Option<u32>) {
         if let Some(mut halt) = self.waiting.take() {
             halt.tries += 1;

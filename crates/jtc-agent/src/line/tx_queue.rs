@@ -1,4 +1,4 @@
-//! Transmit queue of the line. The queue sends whole frames, one after the other, and passes their bytes to the
+//! Transmit queue of the serial line. The queue sends whole frames, one after the other, and passes their bytes to the
 //! operating system shortly before the line can send them.
 //!
 //! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] bytes are queued in the
@@ -12,7 +12,7 @@ use super::ClientId;
 use super::frame_class::HostFrame;
 
 /// Largest number of bytes that are queued in the operating system: 256 (J-05) minus a margin. Each delay of the system
-/// can delay the line by up to one byte more than estimated.
+/// can delay the serial line by up to one byte more than estimated.
 const AHEAD: usize = 250;
 /// Silence after an aborted frame: 5 ms (J-03), plus a margin because USB adapters may shorten the gap.
 const GAP: Duration = Duration::from_millis(8);
@@ -46,22 +46,22 @@ struct Writing {
     at: usize,
 }
 
-/// Transmit queue, which adapts the bytes that it writes to the rate of the line. An urgent frame can overtake the
-/// current frame.
+/// Transmit queue, which adapts the bytes that it writes to the rate of the serial line. An urgent frame can overtake
+/// the current frame.
 pub(super) struct TxQueue {
     baud: Option<u32>,
     urgent: Option<Outgoing>,
     writing: Option<Writing>,
-    /// Time at which the line will have sent all written bytes.
+    /// Time at which the serial line will have sent all written bytes.
     free_at: Duration,
-    /// Time at which the line begins to send the bytes that are currently passed to the operating system.
+    /// Time at which the serial line begins to send the bytes that are currently passed to the operating system.
     begins_at: Option<Duration>,
     /// End of the silence after an aborted frame.
     silent_until: Duration,
 }
 
 impl TxQueue {
-    /// Creates the queue of a line with this bit rate in Bd; `None` means that the line has no bit rate.
+    /// Creates the queue of a line with this bit rate in Bd; `None` means that the serial line has no bit rate.
     pub(super) fn new(baud: Option<u32>) -> Self {
         Self {
             baud,
@@ -73,7 +73,7 @@ impl TxQueue {
         }
     }
 
-    /// Returns the time at which the line will have sent all written bytes.
+    /// Returns the time at which the serial line will have sent all written bytes.
     pub(super) fn free_at(&self) -> Duration {
         self.free_at
     }
@@ -83,7 +83,7 @@ impl TxQueue {
         self.urgent = urgent;
     }
 
-    /// Returns the bit rate of the line in Bd, or `None` if it has no bit rate.
+    /// Returns the bit rate of the serial line in Bd, or `None` if it has no bit rate.
     pub(super) fn baud(&self) -> Option<u32> {
         self.baud
     }
@@ -104,8 +104,8 @@ impl TxQueue {
             return Some(self.silent_until);
         }
         if let Some(urgent) = &self.urgent {
-            // If the urgent frame replaces the current one, the current frame is aborted at the time at which its next
-            // piece could be written.
+            // If the urgent frame replaces the current frame, the current frame is aborted at the time at which its
+            // next piece could be written.
             let needed =
                 urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
             let ahead = AHEAD.saturating_sub(needed);
@@ -134,7 +134,7 @@ impl TxQueue {
                 return (bytes, passed);
             }
             // The urgent frame is written when it fits, with the remainder of the current frame, within the limit of
-            // queued bytes. Writing it earlier would not make it arrive sooner.
+            // queued bytes. If it were written earlier, it would not arrive sooner.
             let needed =
                 self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
             if queued == 0 || needed <= room {
@@ -168,8 +168,8 @@ impl TxQueue {
         (bytes, passed)
     }
 
-    /// Records that the operating system accepted the bytes only now. If the line was idle, it began to send later than
-    /// estimated, so it is also free later.
+    /// Records that the operating system accepted the bytes only now. If the serial line was idle, it began to send
+    /// later than estimated, so it is also free later.
     pub(super) fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);
@@ -191,13 +191,13 @@ impl TxQueue {
         Some(writing.outgoing.frame.bytes.len() - writing.at)
     }
 
-    /// Returns the current frame, and the number of its bytes that were written.
+    /// Returns the current frame, and the number of bytes of this frame that were written.
     pub(super) fn writing(&self) -> Option<(&Outgoing, usize)> {
         self.writing.as_ref().map(|w| (&w.outgoing, w.at))
     }
 }
 
-/// Returns the number of 8N1 bytes that the line sends in a time, rounded up.
+/// Returns the number of 8N1 bytes that the serial line sends in a time, rounded up.
 fn bytes_in(time: Duration, baud: Option<u32>) -> usize {
     baud.map_or(0, |baud| (time.as_secs_f64() * f64::from(baud) / 10.0).ceil() as usize)
 }

@@ -49,7 +49,7 @@ pub enum Applied {
     GoesOn,
     /// The motion was paused before, and the will leaves it paused.
     Paused,
-    /// This command was sent.
+    /// The command in this variant was sent.
     Sent(ExecCommand),
 }
 

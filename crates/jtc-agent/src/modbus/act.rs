@@ -1,4 +1,4 @@
-//! Execution of a PLC's commands, with one client of the line that all PLC connections share.
+//! Execution of a PLC's commands, with one client of the serial line that all PLC connections share.
 use std::sync::Arc;
 
 use agent_kit::api::Problem;
@@ -118,7 +118,7 @@ impl Plc {
         Ok(taken?)
     }
 
-    /// Returns an error if the arm was stopped after the command, or by another client shortly before it.
+    /// Returns an error if the arm was stopped after the command, or by another client shortly before the command.
     fn ask_to_move(&self, http_session: &HttpSession, halt: u64) -> Result<(), Refusal> {
         Ok(self.line.with(|line, now| line.ask_to_move(http_session.client, halt, now))?)
     }

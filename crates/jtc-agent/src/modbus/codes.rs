@@ -1,4 +1,4 @@
-//! Numbers of the commands of a PLC, and numbers of their outcomes and errors.
+//! Numbers of the commands of a PLC, and of the outcomes and errors of the commands.
 
 macro_rules! numbered {
     ($(#[$doc:meta])* $name:ident { $($(#[$meaning:meta])* $variant:ident = $code:literal, $text:literal;)+ }) => {

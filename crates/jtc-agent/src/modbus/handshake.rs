@@ -1,5 +1,5 @@
-//! Holding registers, and the handshake that turns them into commands. Each command is executed once, even if writes
-//! are repeated or answers are lost.
+//! Holding registers, and the handshake that converts register writes to commands. Each command is executed once, even
+//! if writes are repeated or answers are lost.
 use super::codes::{Command, Outcome};
 use super::map::{HOLDINGS, WATCHDOG_MIN, holding};
 use super::pdu::Exception;
@@ -17,7 +17,7 @@ pub struct Order {
     pub speed: u16,
     /// Number of runs.
     pub repeat: u16,
-    /// `true` if the arm must first move to the first point when it is not there.
+    /// `true` if the arm first moves to the first point when it is at another position.
     pub approach: bool,
     /// Watchdog, ms.
     pub watchdog_ms: u16,
@@ -69,7 +69,8 @@ impl Handshake {
         self.values[holding::WATCHDOG]
     }
 
-    /// Returns the last acknowledged sequence number, the outcome of that command, and the number of its error.
+    /// Returns the last acknowledged sequence number, the outcome of this command, and the number of the command's
+    /// error.
     pub fn last(&self) -> (u16, Outcome, u16) {
         (self.acknowledged, self.outcome, self.error)
     }
@@ -166,7 +167,7 @@ mod tests {
         assert_eq!(write(&mut handshake, holding::TRAJECTORY, &[4]), Ok(None));
         handshake.acknowledge(42, Outcome::Done, 0);
         assert_eq!((handshake.last(), handshake.is_pending()), ((42, Outcome::Done, 0), false));
-        // One write sets all registers.
+        // A single write sets all registers.
         let all = [500, 2, 5, 20, 7, 1, START, 43];
         let order = write(&mut handshake, 0, &all).expect("it may be").expect("a command");
         let whole = Order {
@@ -249,8 +250,8 @@ mod tests {
             let mut handshake = Handshake::new(first);
             let mut last = first;
             for (at, mut values, near) in writes {
-                // Sequence numbers near the last one are included. Otherwise the test would almost never use the next
-                // number.
+                // Sequence numbers near the last number are included. Otherwise the test would almost never use the
+                // next number.
                 let place = holding::SEQUENCE.checked_sub(usize::from(at)).filter(|place| *place < values.len());
                 if let Some(place) = place.filter(|_| near) {
                     values[place] = last.wrapping_add(values[place] % 3);

@@ -74,7 +74,7 @@ impl View {
         self.status(u32::from(UNKNOWN), |status| status.joints.get(n).map_or(u32::from(UNKNOWN), read))
     }
 
-    /// Returns the bits of a joint's measured value; NaN if it is not known.
+    /// Returns the bits of a joint's measured value; NaN if the value is not known.
     fn measured(&self, n: usize, read: impl FnOnce(&jtc_wire::JointStatus) -> f32) -> u32 {
         let known = |status: &Status| {
             let joint = status.joints.get(n).filter(|_| is_measured(status, n));
@@ -123,7 +123,7 @@ impl View {
     }
 }
 
-/// Format of a value in registers. The first of two registers has the upper 16 bits.
+/// Format of a value in registers. The first of two registers contains the upper 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// Single unsigned register.
@@ -150,7 +150,7 @@ impl Form {
     }
 }
 
-/// Input registers with one meaning.
+/// Group of input registers that have the same meaning.
 pub struct Input {
     /// Address of the first register, from 0.
     pub at: u16,

@@ -1,5 +1,5 @@
-//! Requests and responses of Modbus TCP. The module does not do I/O: it takes the bytes of a request and returns the
-//! bytes of the response.
+//! Requests and responses of Modbus TCP. The module does not do I/O: its functions take the bytes of a request and
+//! return the bytes of the response.
 //!
 //! The standard is the *Modbus Application Protocol* V1.1b3 with the *Messaging on TCP/IP Implementation Guide* V1.0b.
 //! A request is checked in the order of the standard's state diagrams (function, quantity, address) and then executed.

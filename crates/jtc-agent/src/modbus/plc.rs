@@ -19,7 +19,7 @@ use crate::owner::Line;
 /// Name of the PLC client on the line.
 const NAME: &str = "the PLC (Modbus)";
 /// Duration of silence after which a connection that sends commands counts as lost. The limit is `GONE`, or more if the
-/// watchdog time is longer. Without a watchdog it is `GONE_UNWATCHED`.
+/// watchdog time is longer. Without a watchdog, the limit is `GONE_UNWATCHED`.
 const GONE: Duration = Duration::from_secs(1);
 const GONE_UNWATCHED: Duration = Duration::from_secs(60);
 
@@ -78,8 +78,8 @@ impl Plc {
             handshake: Handshake::new(sequence),
             operator: None,
             coils: BTreeMap::new(),
-            // The client is added to the line now, so that Stops of other clients apply to it even before its first
-            // request.
+            // The client is added to the line now, so that Stops of other clients apply to this client even before its
+            // first request.
             http_session: http_session(&line),
             job: None,
             looked: 0,
@@ -100,7 +100,7 @@ impl Plc {
         response
     }
 
-    /// Removes a connection. The lease lasts until the watchdog ends it, so that the PLC can reconnect.
+    /// Removes a connection. The lease lasts until the watchdog time has passed, so that the PLC can reconnect.
     pub fn left(&self, connection: &Connection) {
         let mut state = self.lock();
         state.coils.remove(&connection.number);

@@ -20,7 +20,7 @@ use super::plc::{Connection, Plc};
 /// Largest number of connections.
 pub const CONNECTIONS_MAX: usize = 8;
 /// Duration of silence after which a connection may be closed for a new connection. Connections that send commands or
-/// hold the arm by a coil are excepted.
+/// hold the arm by a coil are never closed for this reason.
 const GIVES_WAY: Duration = Duration::from_secs(2);
 /// Duration of silence after which a connection is closed, which is longer than the longest watchdog time.
 const IDLE: Duration = Duration::from_secs(90);
@@ -137,8 +137,8 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
 }
 
 /// Ensures that another connection is possible, if necessary by closing an idle connection. Returns `false` if no
-/// connection can be closed, because each of them sends commands, holds the arm by a coil, or was not idle long enough.
-/// If all connections hold the arm, the arm is at rest and no motion can begin.
+/// connection can be closed, because each connection sends commands, holds the arm by a coil, or was not idle long
+/// enough. If all connections hold the arm, the arm is at rest and no motion can begin.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {
@@ -178,7 +178,7 @@ impl Drop for Gone {
     }
 }
 
-/// Answers requests until one end disconnects or the client sends invalid Modbus.
+/// Answers requests until the client or the server disconnects, or the client sends invalid Modbus.
 async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start: Instant) {
     // A response must be sent at once, without waiting for more data.
     let _ = stream.set_nodelay(true);
@@ -234,8 +234,8 @@ mod tests {
     fn whoever_asks_faster_than_it_may_waits() {
         let (mut pace, begin) = (Pace::new(), Instant::now());
         pace.at = begin;
-        // The client sends each request after the answer to the previous one. The first requests form a burst, and the
-        // later requests are sent at the limited rate.
+        // The client sends each request after the answer to the previous request. The first requests form a burst, and
+        // the later requests are sent at the limited rate.
         let mut now = begin;
         for _ in 0..1000 {
             now += pace.wait(now);

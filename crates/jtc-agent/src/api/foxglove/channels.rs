@@ -5,7 +5,7 @@ use jtc_host::recording::Topic;
 
 use super::protocol::{Channel, Service, Shape, Subscription};
 
-/// Number of the channel that carries the status as text. All other channels carry numeric values.
+/// Number of the channel that carries the status as text. All other channels transmit numeric values.
 pub(super) const STATUS: u32 = Topic::ALL.len() as u32 + 1;
 const STATUS_SCHEMA: &str = r#"{
   "type": "object",

@@ -28,7 +28,7 @@ pub struct Entry<E> {
     pub event: E,
 }
 
-/// Events from a number on.
+/// Excerpt of a journal: the events after a number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Excerpt<E> {
     /// Events, oldest first.

@@ -3,8 +3,8 @@
 //!
 //! Variables exist only for options that name a port, address, folder, file or format, and for a few options with
 //! harmless numbers. Options that move, reset, number, program, enable outputs, set bits, answer a confirmation or
-//! override a check have no variable, because a variable stays set for later commands in the shell. `audit` checks this
-//! for all options of a command line.
+//! override a check have no variable, because a variable stays set for later commands in the shell. `audit` checks
+//! these rules for all options of a command line.
 
 #[cfg(feature = "trial")]
 pub mod audit;

@@ -4,7 +4,8 @@ use std::io::{Result, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a file completely, or leaves the old file unchanged. If the path is a link, the target of the link is
-/// written. The mode of an existing file is not changed. Pipes and terminals are written to, not replaced.
+/// written. The mode of an existing file is not changed. Pipes and terminals are not replaced; the data is written to
+/// them.
 ///
 /// # Errors
 ///

@@ -5,7 +5,7 @@
 pub struct Facts {
     /// Number of the board.
     pub board: Option<u8>,
-    /// Joint, 1 to 6 from the base.
+    /// Number of the joint, 1 to 6 from the base.
     pub joint: Option<u8>,
     /// Index of the trajectory point, from 0; during a motion, index of the 1 ms point.
     pub point: Option<u32>,

@@ -5,7 +5,7 @@
 //! records of its own frames. Every program that can use a serial port can therefore use a shared line. The shared line
 //! decides which client may send which frame:
 //!
-//! - every client may send queries, and a Stop or a Pause, which overtakes all other frames;
+//! - every client may send queries, and a Stop or a Pause, which is sent before all other frames;
 //! - only the holder of the [`Lease`] may send all other frames.
 //!
 //! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last Stop or

@@ -7,8 +7,8 @@ use serde_json::Value;
 
 /// Number of lines per kind and sender that are written before repetitions are only counted.
 const FIRST: u32 = 10;
-/// Interval between lines with a count. After this time without a line, the next lines of a sender are again written in
-/// full.
+/// Interval between log lines that contain a count. After this time without a line, the next lines of a sender are
+/// again written in full.
 const PERIOD: Duration = Duration::from_secs(60);
 /// Number of senders that are counted separately; all other senders are counted together.
 const SENDERS_MAX: usize = 256;
@@ -28,7 +28,7 @@ struct Count {
 #[derive(Default)]
 pub(super) struct Repeats {
     counts: BTreeMap<(&'static str, String), Count>,
-    /// Earliest time at which a line with a count is due.
+    /// Earliest time at which a log line with a count is due.
     next: Option<Instant>,
 }
 
@@ -57,7 +57,7 @@ impl Repeats {
         None
     }
 
-    /// Returns the lines with counts that are due. Each contains the data of the last repetition and `times`.
+    /// Returns the log lines with counts that are due. Each contains the data of the last repetition and `times`.
     pub(super) fn due(&mut self, now: Instant) -> Vec<(&'static str, Value)> {
         if self.next.is_none_or(|next| now < next) {
             return Vec::new();

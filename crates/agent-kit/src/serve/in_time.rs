@@ -78,7 +78,7 @@ impl<S> Taken<S> {
         Self { stream, released, since: None, waited: Duration::ZERO, bytes: 0, timer }
     }
 
-    /// Returns the total waiting time that the number of bytes read so far allows.
+    /// Returns the total waiting time that is allowed for the number of bytes read so far.
     fn patience(&self) -> Duration {
         TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S)
     }

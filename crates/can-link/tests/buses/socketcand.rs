@@ -212,8 +212,8 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     });
     let mut node = waited.recv_timeout(LONGEST).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
-    // The client that slept is still connected, and reads the oldest waiting frames. When the queue of the client has
-    // space again, the client receives new frames.
+    // The client that did not read is still connected, and now reads the oldest waiting frames. When the queue of the
+    // client has space again, the client receives new frames.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
     until(|| {
         sleeper.read();

@@ -1,4 +1,4 @@
-//! Live data for Foxglove, Lichtblick and PlotJuggler: the Foxglove WebSocket protocol, with the messages of
+//! Live data for Foxglove, Lichtblick and PlotJuggler over the Foxglove WebSocket protocol, with the message types of
 //! recordings.
 //!
 //! A client receives the latest values at most 25 times a second. Pings show how far the client has read. While a ping

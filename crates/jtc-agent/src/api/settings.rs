@@ -108,7 +108,7 @@ pub(super) struct SettingsRequest {
 }
 
 impl SettingsRequest {
-    /// Returns the values in the form of the protocol.
+    /// Converts the values to the form of the protocol.
     fn values(&self) -> Result<Vec<SettingValue>, Problem> {
         let count = self.settings.len();
         if !(1..=SET_VALUES_MAX).contains(&count) {

@@ -158,7 +158,7 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Checks that the client holds the lease, or could take it.
+    /// Checks that the client holds the lease or could take the lease.
     pub(super) fn could_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         if self.introduction(id).ok_or(Denied::Gone)?.role != Role::Operator {
             return Err(Denied::Viewer);

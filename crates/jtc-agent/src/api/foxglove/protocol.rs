@@ -1,5 +1,5 @@
-//! Messages of the Foxglove WebSocket protocol, version 1. Text messages are JSON with an `op`; binary messages begin
-//! with a byte for their type. Numbers are little-endian.
+//! Messages of the Foxglove WebSocket protocol, version 1. Text messages are JSON objects with the key `op`; the first
+//! byte of a binary message is its type. Numbers are little-endian.
 use std::collections::BTreeMap;
 
 /// Names of the protocol in the handshake; both are accepted.

@@ -375,7 +375,7 @@ impl SharedLine {
         self.clients.get(&id).map(|client| client.asked_after)
     }
 
-    /// Returns the Stops and Pauses of other clients since this client connected.
+    /// Returns the number of Stops and Pauses of other clients since this client connected.
     pub fn halts_of_others(&self, id: ClientId) -> jtc_host::port::Halts {
         self.clients.get(&id).map(|client| client.halts).unwrap_or_default()
     }

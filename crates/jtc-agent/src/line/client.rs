@@ -136,7 +136,7 @@ pub(super) struct Client {
     pub calm_until: Duration,
     /// Number of the last Stop or Pause that the client knew when it sent its present requests.
     pub asked_after: u64,
-    /// Stops and Pauses of other clients since this client connected.
+    /// Number of Stops and Pauses of other clients since this client connected.
     pub halts: Halts,
     /// Last sign of life of the client, and the duration of its lease.
     pub presence: Presence,

@@ -1,4 +1,4 @@
-//! Held stops (J-69): moving joints come to rest, the arm is held, and the cause is kept for the host.
+//! In a held stop (J-69), moving joints come to rest, the arm is held, and the cause is stored for the host.
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, Reactions, StopCause, StopKind};
 
 use crate::controller::Controller;
@@ -13,7 +13,7 @@ fn errors_of(joints: u8, error: u16) -> [u16; JOINTS] {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Begins a held stop. `errors`: joint errors to show.
+    /// Begins a held stop. `errors` are the joint errors to show.
     pub(crate) fn hold_stop(&mut self, errors: &[u16; JOINTS], kind: StopKind) {
         let joint = errors.iter().position(|bits| *bits != 0).unwrap_or(0);
         let (value, limit) = self.measure(kind, joint);
@@ -32,7 +32,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Brings moving joints to rest, and holds the arm.
     pub(crate) fn rest_and_hold(&mut self, errors: &[u16; JOINTS]) {
         self.errors.hold_joints(errors, self.config.protective_stop_latches);
-        // A waiting teach request begins its wait again.
+        // The waiting time of a pending teach request starts again.
         self.teaching_waits_ms = 0;
         if self.trajectory == TrajectoryState::Execute && self.phase.leave().is_none() {
             self.leave_path(ExecCommand::Pause);
@@ -56,14 +56,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Ends Teaching if a joint is led too fast, before its over-speed would release the arm (J-25). The arm comes to rest and is held.
-    /// `late`: delay of this tick, ms.
+    /// Ends Teaching if a hand leads a joint too fast, before the over-speed of the joint would release the arm (J-25). The arm comes to
+    /// rest and is held. `late` is the delay of this tick in ms.
     pub(crate) fn end_fast_teaching(&mut self, late: u16) {
         let speeds = self.motion.law.hear_led_joints(&self.nodes, late);
         for j in 0..JOINTS {
             let speed = f64::from(speeds[j]);
             let limit = too_fast(&self.config.joints[j], &self.config);
-            // The speed that the drive reports is older, but it shows that the encoder has not jumped.
+            // The speed reported by the drive is older than the computed speed, but it shows that the encoder has not jumped.
             if speed.abs() > limit && self.nodes.node(j).report.velocity * speed.signum() > 0.5 * limit {
                 self.teaching = false;
                 let cause = self.cause(StopKind::Shove, j, speed, limit);
@@ -73,7 +73,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Refuses to execute a trajectory while the positions are not trusted (J-35), and shows that as an error that has occurred.
+    /// Refuses to execute a trajectory while the positions are not trusted (J-35), and records this as an occurred error.
     pub(crate) fn check_trust(&mut self) -> Result<(), DataStatus> {
         match self.nodes.untrusted() {
             0 => Ok(()),
@@ -84,19 +84,19 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns the cause of a joint with this index.
+    /// Creates the stop cause for the joint with this index.
     pub(crate) fn cause(&self, kind: StopKind, joint: usize, value: f64, limit: f64) -> StopCause {
         StopCause { kind, joint: joint as u8 + 1, value: value as f32, limit: limit as f32 }
     }
 
-    /// Keeps this cause as the last one.
+    /// Stores this cause as the last cause of a held stop.
     pub(crate) fn keep_cause(&mut self, cause: StopCause) {
         self.last_stop = LastStop { cause, tick: self.observed.tick };
     }
 
-    /// Returns the measured value of a joint and its limit, in the unit of the kind of the cause.
+    /// Returns the measured value of a joint and the limit of that value, in the unit of this kind of cause.
     fn measure(&self, kind: StopKind, joint: usize) -> (f64, f64) {
-        // The index comes from this crate. This form lets the compiler see that it is in range.
+        // The index comes from this crate. With `min`, the compiler can see that the index is in range.
         let j = joint.min(JOINTS - 1);
         let limits = &self.config.joints[j];
         let (law, set) = (&self.motion.law, &self.motion.set);
@@ -117,12 +117,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             StopKind::Velocity | StopKind::FrictionTable => (of(&set.point.velocity), limits.velocity_max),
             StopKind::Acceleration => (of(&set.point.acceleration), limits.acceleration_max),
-            // The caller sets the values of these kinds, or they have none.
+            // For these kinds of causes, the caller sets the value, or no value exists.
             _ => (0.0, 0.0),
         }
     }
 
-    /// Returns the reactions of the controller that are in progress, and the cause of the last held stop, for Info (J-69).
+    /// Returns the data for Info (J-69): the present reactions of the controller, and the cause of the last held stop.
     pub fn reactions(&self) -> Reactions {
         let LastStop { cause, tick } = self.last_stop;
         let ago = self.observed.tick.saturating_sub(tick).min(u32::MAX.into()) as u32;

@@ -2,30 +2,30 @@
 //!
 //! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
 //! path needs less torque: the torque for inertia falls with the square of the rate. Therefore path time slows down as much as the joints
-//! at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its rate when no joint is at its
-//! limit any more.
+//! at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its normal rate when no joint is
+//! at its torque limit any more.
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 use crate::path::PathClock;
 
 /// Time for which the inertia of the arm is assumed to be constant, ms.
 const INERTIA_MS: u16 = 60;
-/// Time after the last joint has left its limit until the path returns to its rate, ms.
+/// Time from the moment when the last joint leaves its limit until the path returns to its normal rate, ms.
 const QUIET_MS: u16 = 200;
 /// Longest time for which joints may be at their limits without interruption, ms.
 const PRESSED_MS: u16 = 250;
-/// Longest total time for which the path may be held back in one run, ms.
+/// Longest total time for which the path may be slowed down during one run of the path, ms.
 const RUN_MS: u16 = 5_000;
-/// Rate below which the path is considered at rest, and longest time at such a rate before the path returns to its normal rate, ms. Without
-/// this time, a path whose torque just suffices to hold the arm could rest for ever.
+/// Rate below which the path is considered at rest, and longest time at such a rate before the arm stops, ms. Without this limit, a path
+/// could rest for ever if the torque is just sufficient to hold the arm.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
-/// State of holding back the path.
+/// State of the function that slows down the path.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HoldBack {
     active: bool,
-    /// `restores`: the path returns to its rate. `stands_ms`: time for which the path has been at rest.
+    /// `restores` means that the path is returning to its normal rate. `stands_ms` is the time for which the path has been at rest.
     restores: bool,
     stands_ms: u16,
     /// Ticks since the inertia was computed.
@@ -34,22 +34,22 @@ pub(crate) struct HoldBack {
     pressed_ms: u16,
     /// Ticks since a joint was last at its limit.
     quiet_ms: u16,
-    /// Ticks of this run in which the path was held back.
+    /// Ticks of this run of the path in which the path was held back.
     run_ms: u16,
-    /// Joints that have been at their limits since holding back began, a bit each.
+    /// Mask of the joints that have been at their torque limits since the path was first held back.
     pressed: u8,
 }
 
 bit_codec!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_ms, run_ms, pressed });
 
-/// Result of a tick.
+/// Result of one tick of `step`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     /// The path continues as before.
     Nothing,
-    /// The path returns to its rate.
+    /// The path returns to its normal rate.
     Restore,
-    /// The arm stops, because holding back does not help.
+    /// The arm stops, because a slower path does not relieve the joints.
     Stop,
 }
 
@@ -64,7 +64,7 @@ impl HoldBack {
         self.active | self.restores
     }
 
-    /// Begins to hold back because a joint is overloaded. Returns `true` if the inertia of the arm must be computed.
+    /// Begins to slow down the path because a joint is overloaded. Returns `true` if the inertia of the arm must be computed.
     pub(crate) fn begin(&mut self) -> bool {
         if self.active && self.since_ms < INERTIA_MS {
             return false;
@@ -76,22 +76,22 @@ impl HoldBack {
         true
     }
 
-    /// Ends holding back because the path stops. The time so far remains part of the run.
+    /// Stops holding back the path, because the path stops. The time so far still counts for the present run of the path.
     pub(crate) fn end(&mut self) {
         (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
 
-    /// Returns the time for which the path was held back in this run, ms.
+    /// Returns the time for which the path was held back in this run of the path, ms.
     pub(crate) fn run_ms(&self) -> u16 {
         self.run_ms
     }
 
-    /// Returns `true` if the joint has been at its limit since holding back began.
+    /// Returns `true` if the joint has been at its torque limit since the path was first held back.
     pub(crate) fn has_pressed(&self, joint: usize) -> bool {
         self.pressed & (1 << joint) != 0
     }
 
-    /// Runs one tick on the path. `joints`: `true` for those at their torque limits; `clock`: the clock of the motion.
+    /// Runs one tick on the path. `joints` is `true` for each joint at its torque limit. `clock` is the clock of the motion.
     pub(crate) fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
         for (j, at_limit) in joints.iter().enumerate() {
             self.pressed |= u8::from(*at_limit) << j;

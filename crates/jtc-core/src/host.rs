@@ -24,11 +24,11 @@ use line_upload::LineUpload;
 use priority::Priority;
 use slices::{SliceOutcome, SliceProgress};
 
-/// Joints and gripper in a mask of nodes.
+/// Bits of the joints and of the gripper in a mask of nodes.
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
-/// Returns the data status for existing hosts, which know no value above 6 (J-51).
+/// Returns the data status for existing hosts, which do not know values above 6 (J-51).
 pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     match data {
         DataStatus::NotAllowed | DataStatus::StartPositionMismatch => DataStatus::IncorrectValue,
@@ -36,19 +36,19 @@ pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     }
 }
 
-/// Cost of an event that was served.
+/// Part of the tick that an event has used.
 enum Served {
     /// The event took a few instructions, so the tick has time for another one.
     Quickly,
     /// The event took the full budget of a tick.
     Fully,
-    /// The event was served in part. The remainder takes more ticks.
+    /// Only a part of the event was executed. The remainder needs more ticks.
     Partly,
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Serves urgent commands first, then the oldest events of the host link: short events up to the first long one, or one slice of a long
-    /// event. Returns the number of events that are done.
+    /// Executes urgent commands first, then the oldest events of the host link: short events up to the first long event, or one slice of a
+    /// long event. Returns the number of completed events.
     pub(crate) fn serve_host(&mut self, inputs: &Inputs<'_>) -> usize {
         for (line, commands) in inputs.urgent.iter().enumerate() {
             for (command, count) in commands.iter() {
@@ -56,7 +56,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
         }
         if inputs.host.is_empty() {
-            // Most ticks return here, because the loop needs much preparation.
+            // Most ticks return here and so avoid the loop, which needs much preparation.
             return 0;
         }
         let mut done = 0;
@@ -70,7 +70,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         done
     }
 
-    /// Executes Stop and Pause at once (J-04). Their records are sent when it is the turn of their frames.
+    /// Executes Stop and Pause at once (J-04). The response records of Stop and Pause are sent later, when their frames are processed.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
         let stops = command == UrgentCommand::Stop;
         self.overtaking.iter_mut().for_each(|overtaking| overtaking.stopped |= stops);
@@ -81,7 +81,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Serves one event or a slice of it. When the event is done, its record is queued.
+    /// Executes one event or a slice of the event. When the event is completed, its response record is queued.
     fn serve(&mut self, received: &HostEvent<'_>) -> Served {
         let Some(overtaking) = self.overtaking.get_mut(received.line) else { return Served::Quickly };
         let mut plain = received.plain;
@@ -103,7 +103,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (overtaking.overtaken(exec, self.trajectory).into(), Served::Quickly)
                             }
-                            // The Jog is older than a Stop or a Pause that has acted.
+                            // The Jog was received before a Stop or a Pause that has already taken effect.
                             Command::Jog(_) if received.overtaken => {
                                 (SliceOutcome::Refused(DataStatus::NotAllowed), Served::Quickly)
                             }
@@ -118,8 +118,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // A command that is refused because of the state took no time. Only a Jog may have been computed before it was
-                            // refused.
+                            // A command that the state does not allow is refused without computation. Only a Jog may have been computed
+                            // before it was refused.
                             SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }
@@ -140,8 +140,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         served
     }
 
-    /// Returns `true` if the command takes a few instructions and does not change the state of the controller. The next command may depend
-    /// on that state.
+    /// Returns `true` if the command takes only a few instructions and does not change the controller state, on which the next command may
+    /// depend.
     fn is_quick(&self, command: &Command<'_>) -> bool {
         match command {
             Command::ClearCurrentErrors { .. } | Command::ClearOccurredErrors => {
@@ -190,7 +190,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
-            // J-53: joints are absent, so the drives on the bench do not carry the load of the model.
+            // J-53: if joints are absent, the drives on the bench do not carry the load of the model.
             Command::TeachingModeEnable
                 if self.state == ControllerState::HoldPos
                     && !self.joints_absent()
@@ -215,7 +215,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::ResetCanDevices { nodes } => {
                 self.nodes.reset(nodes);
-                // The pump must not start by itself when the gripper is back.
+                // The pump must not start by itself when the gripper is ready again.
                 self.pump &= nodes & GRIPPER_MASK == 0;
                 SliceOutcome::Done
             }
@@ -234,8 +234,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Clears errors (J-21). A fault that a joint still reports is raised again in this tick. If `clear` has no effect because of that, it
-    /// is refused, and it is not executed later either, when the joint has been cleared.
+    /// Clears errors (J-21). A fault that a joint still reports is raised again in this tick. If `clear` has no effect for this reason, the
+    /// command is refused. The command is also not executed later, after the joint has been cleared.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);
@@ -248,12 +248,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Takes friction, gains or model.
+    /// Accepts or refuses a frame with friction, gains or a model.
     fn take_parameters(&mut self, command: &Command<'_>) -> SliceOutcome {
         self.extensions.forget_hash();
         if command.frame_type().is_default() {
             if self.extensions.unusable {
-                // The built-in arm is not the arm that was stored (J-54).
+                // The built-in arm differs from the stored arm (J-54).
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
             if self.extensions.stored.is_there() {
@@ -273,7 +273,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Takes friction, in slices.
+    /// Checks and copies friction parameters in slices.
     fn take_friction(&mut self, command: &Command<'_>) -> SliceOutcome {
         let (parameters, config) = (&mut self.parameters, &self.config);
         match *command {
@@ -285,7 +285,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Takes a model in slices. `taken` passes a slice to the parameters.
+    /// Checks and copies a model in slices. `taken` passes one slice to the parameters.
     fn take_model(
         &mut self,
         taken: impl FnOnce(&mut HostParameters, SliceProgress, Option<&[f64; JOINTS]>, &Config) -> SliceOutcome,
@@ -295,7 +295,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.model_taken(outcome)
     }
 
-    /// Reports an accepted model to the control law of an arm under torque.
+    /// Informs the control law about an accepted model while the arm has torque.
     fn model_taken(&mut self, outcome: SliceOutcome) -> SliceOutcome {
         if self.powered() && matches!(outcome, SliceOutcome::Done) {
             self.motion.law.change_model();
@@ -303,7 +303,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         outcome
     }
 
-    /// Takes gains. Under torque they must hold the present torque, and are on trial (J-71).
+    /// Takes gains. If the arm has torque, new gains must hold the present torque, and are on trial (J-71).
     #[inline(never)]
     fn take_gains(&mut self, gains: &[PidGains; JOINTS]) -> Result<(), DataStatus> {
         self.parameters.check_pid(gains, &self.config)?;
@@ -319,7 +319,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Takes a default from the stored arm, if an arm is stored (J-54).
+    /// Uses a default of the stored arm, if an arm is stored (J-54).
     #[inline(never)]
     fn use_stored(&mut self, frame_type: FrameType) -> SliceOutcome {
         let Self { extensions, parameters, config, nodes, .. } = self;
@@ -335,7 +335,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let outcome = parameters.take_model(&arm.model, self.slice_progress, at, config);
                 self.model_taken(outcome)
             }
-            // The stored arm has one kind of friction. This kind is used for both requests of a host.
+            // The stored arm contains one kind of friction, which is used for both friction requests of a host.
             _ => match arm.friction {
                 FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
                 FrictionImage::Table(floats) => parameters.take_table(&floats, self.slice_progress, config),
@@ -357,20 +357,20 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         // J-30: this also applies while joints are jogged.
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
-        // A Stop or a Pause holds the arm. Therefore it also ends Teaching, or cancels Teaching that has not begun yet.
+        // A Stop or a Pause holds the arm. Therefore both commands also end Teaching, or cancel Teaching that has not begun yet.
         let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);
         if command != ExecCommand::Execute && self.stop_jog() {
             return Ok(());
         }
         match (self.trajectory, command) {
-            // J-33: a path that is being stopped must not become a paused one.
+            // J-33: a Pause must not turn a stop of the path into a pause.
             (TrajectoryState::Execute, ExecCommand::Pause)
                 if self.phase.leave() == Some(TrajectoryState::Stop) =>
             {
                 Err(DataStatus::NotAllowed)
             }
-            // Three cases: Teaching was accepted and begins as soon as the arm is held; a hand was leading the arm, and the arm is not at
-            // rest yet; or joints are absent (J-53).
+            // Execute is refused, for example, if Teaching was accepted and begins as soon as the arm is held, or if joints are absent
+            // (J-53). The command is also refused if a hand was leading the arm and the arm is not at rest yet.
             (_, ExecCommand::Execute)
                 if self.teaching
                     || self.motion.set.is_led()
@@ -380,7 +380,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 Err(DataStatus::NotAllowed)
             }
-            // J-30: the Stop during its upload applied to this trajectory.
+            // J-30: a Stop arrived during the upload of this trajectory.
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute)
                 if self.store.stopped() =>
             {
@@ -415,8 +415,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Refuses a trajectory that was stored although the check had found a violation (J-36). The violation is shown as an error that has
-    /// occurred.
+    /// Refuses a trajectory that was stored although the check had found a violation (J-36). The violation is recorded as an occurred
+    /// error.
     fn check_verdict(&mut self) -> Result<(), DataStatus> {
         let Some(violation) = self.store.refused() else { return Ok(()) };
         let error = |j: usize| if j == violation.joint { violation.joint_error() } else { 0 };
@@ -425,8 +425,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Err(DataStatus::IncorrectValue)
     }
 
-    /// Checks J-36: the bearing temperatures must be inside the friction table. If friction was received since the trajectory was loaded,
-    /// the velocities of the path must be inside as well. No other parameter that is accepted in HoldPos affects this check.
+    /// Checks whether the bearing temperatures are inside the friction table (J-36). If friction was received after the trajectory was
+    /// loaded, the velocities of the path must also be inside the table. No other parameter that is accepted in HoldPos affects this check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
         let Some(tables) = self.parameters.tables_in_use() else { return Ok(()) };
         let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));

@@ -1,4 +1,4 @@
-//! Parameters received from the host: gains, model and friction. Each is accepted completely or not at all (J-06).
+//! Parameters received from the host: gains, model and friction. Each parameter is accepted completely or not at all (J-06).
 mod floats;
 mod frames;
 
@@ -16,19 +16,19 @@ use crate::motion::ControlParameters;
 use crate::parameters::{PidGains, TableOf};
 use crate::payload::{BlendState, PayloadBlend};
 
-/// Floats in the friction table of one joint. A tick checks or copies the table of one joint.
+/// Number of floats in the friction table of one joint. A tick checks or copies the table of one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
-/// Placeholder for a table that was not received; not in use.
+/// Placeholder for a table that was not received. The control law does not use this table.
 const NO_TABLE: TableOf<f32> =
     TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
 
-/// Parameters in use (the defaults if the host has sent none), and a record of those that the host has sent.
+/// Parameters in use (the defaults if the host has sent none), and a record of the parameters that the host has sent.
 #[derive(Clone, Debug)]
 pub(crate) struct HostParameters {
-    /// Parameters that were received, one bit each ([`missing_parameter`]).
+    /// Mask of the received parameters ([`missing_parameter`]).
     received: u8,
-    /// Parameters that were received since the start, even if they have been withdrawn since.
+    /// Mask of the parameters that were received since the start, including withdrawn parameters.
     given: u8,
     /// Model from which `dynamics` was computed.
     model: ArmModel,
@@ -41,14 +41,14 @@ pub(crate) struct HostParameters {
     /// Trial of gains that were received under torque.
     pub trial: Trial,
     polynomial: [[f64; 6]; JOINTS],
-    /// Zeros until tables are received.
+    /// Friction tables, which contain zeros until tables are received.
     pub tables: [TableOf<f32>; JOINTS],
     pub friction_is_table: bool,
-    /// Friction was received since the trajectory was checked.
+    /// Friction parameters were received after the last check of the trajectory.
     pub friction_is_new: bool,
 }
 
-/// State of the parameters without their values, which are part of the arm.
+/// State of the parameters. The values are part of the arm and are not included.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HostParametersState {
     received: u8,
@@ -63,14 +63,14 @@ pub(crate) struct HostParametersState {
 bit_codec!(HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial });
 
 impl HostParameters {
-    /// Returns the state of the parameters, without their values.
+    /// Returns the state of the parameters without the values.
     pub(crate) fn state(&self) -> HostParametersState {
         let Self { received, given, friction_is_table, friction_is_new, felt, trial, .. } = *self;
         let payload = self.payload.state();
         HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial }
     }
 
-    /// Restores the state, with the payload in these settings.
+    /// Restores the state of the parameters, with the payload in these settings.
     pub(crate) fn restore(&mut self, state: &HostParametersState, config: &Config) {
         let HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial } =
             *state;
@@ -81,12 +81,12 @@ impl HostParameters {
         (self.friction_is_table, self.friction_is_new) = (friction_is_table, friction_is_new);
     }
 
-    /// Returns for gains, model and polynomial whether each is the built-in one.
+    /// Returns three values that are `true` if the gains, the model and the polynomial are the built-in ones.
     pub(crate) fn built_in(&self) -> [bool; 3] {
         [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
     }
 
-    /// Uses the built-in gains, model or polynomial if the value is `true`.
+    /// Uses the built-in gains, model or polynomial for each value that is `true`.
     pub(crate) fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
         if pid {
             self.pid = defaults::PID;
@@ -99,7 +99,7 @@ impl HostParameters {
         }
     }
 
-    /// Creates the parameters in the state before any was received.
+    /// Creates the parameters in the state before any parameter was received.
     pub(crate) fn new(config: &Config) -> Self {
         let dynamics = dynamics(&defaults::MODEL, config);
         Self {
@@ -119,7 +119,7 @@ impl HostParameters {
         }
     }
 
-    /// Resets the parameters in place, as if none had been received.
+    /// Resets the parameters in place, as if no parameter had been received.
     pub(crate) fn begin(&mut self, config: &Config) {
         self.model = defaults::MODEL;
         self.set_gravity(config);
@@ -129,18 +129,19 @@ impl HostParameters {
         self.forget();
     }
 
-    /// Marks the parameters as not sent by a host, because they were loaded.
+    /// Marks the parameters as loaded from storage, not sent by a host.
     pub(crate) fn forget(&mut self) {
         (self.received, self.given) = (0, 0);
         (self.friction_is_table, self.friction_is_new) = (false, false);
     }
 
-    /// Returns the byte of the status: a bit is 1 if the parameter is missing.
+    /// Returns the status byte in which the bit of each missing parameter is 1.
     pub(crate) fn missing(&self) -> u8 {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
     }
 
-    /// Returns `true` if each parameter was received since the start. Then no built-in value is in use that a host has not requested.
+    /// Returns `true` if each parameter was received since the start. In this case, the controller uses no built-in value without a request
+    /// from a host.
     pub(crate) fn all_given(&self) -> bool {
         self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
     }
@@ -150,7 +151,7 @@ impl HostParameters {
         self.given |= part;
     }
 
-    /// Returns the friction tables, unless polynomials are in use.
+    /// Returns the friction tables, or `None` if polynomials are in use.
     pub(crate) fn tables_in_use(&self) -> Option<&[TableOf<f32>; JOINTS]> {
         self.friction_is_table.then_some(&self.tables)
     }
@@ -167,12 +168,12 @@ impl HostParameters {
         holdable(&self.dynamics, position, config)
     }
 
-    /// Withdraws the model, so that the host must send it again.
+    /// Withdraws the model, so that the host must send the model again.
     pub(crate) fn withdraw_model(&mut self) {
         self.received &= !missing_parameter::MODEL;
     }
 
-    /// Withdraws all parameters, so that the host must send them again.
+    /// Withdraws all parameters, so that the host must send all parameters again.
     pub(crate) fn withdraw_all(&mut self) {
         self.received = 0;
     }
@@ -183,31 +184,31 @@ impl HostParameters {
         self.payload.forget();
     }
 
-    /// Returns `true` if every joint can hold the payload in these settings at `at` (rad), or needs less torque than now (J-60). Also
-    /// returns `true` while it cannot be decided: before all positions are known and the model is received. The payload is checked again
-    /// when Init ends.
+    /// Returns `true` if every joint can hold the payload in these settings at `at` (rad), or needs less torque than now (J-60). Before all
+    /// positions are known and the model is received, this cannot be checked, so `true` is returned. The payload is checked again when Init
+    /// ends.
     pub(crate) fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
         let now = self.dynamics.gravity_torque(at);
-        // With this comparison NaN is too much. An absent joint holds nothing (J-53).
+        // With this comparison, NaN counts as too much torque. An absent joint does not hold any load (J-53).
         let held =
             |j: usize| config.absent[j] || next[j].abs() <= config.joints[j].torque_max.max(now[j].abs());
         (0..JOINTS).all(held)
     }
 
-    /// Begins to blend the payload in these settings into the model, over half a second (J-60). `heavier`: its mass minus the mass of the
-    /// last one, kg.
+    /// Begins to blend the payload in these settings into the model, over half a second (J-60). `heavier` is the mass of this payload minus
+    /// the mass of the last payload, kg.
     pub(crate) fn change_payload(&mut self, config: &Config, heavier: f64) {
         self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
     }
 
-    /// Runs one tick of the payload blend. The arm is held or taught.
+    /// Runs one tick of the payload blend. The arm is in HoldPos or in Teaching.
     pub(crate) fn blend_payload(&mut self) {
         self.payload.step(&mut self.dynamics);
     }
 
-    /// Ends the blend in a tick without torque: the payload is added completely.
+    /// Ends the blend in a tick without torque. The model then contains the whole payload.
     pub(crate) fn end_blend(&mut self) {
         self.payload.end(&mut self.dynamics);
     }
@@ -217,7 +218,7 @@ impl HostParameters {
         self.payload.next_mass()
     }
 
-    /// Returns the time until the payload is completely in the model, ms; 0 if it is.
+    /// Returns the time until the model contains the whole payload, ms. Returns 0 after the blend.
     pub(crate) fn blend_left_ms(&self) -> u16 {
         self.payload.left_ms()
     }
@@ -236,8 +237,8 @@ impl HostParameters {
             && (!has(missing_parameter::MODEL) || bounds.check_masses(&self.model).is_ok())
     }
 
-    /// Returns `true` if the friction table of the joint with this index is within the bounds. Also returns `true` if tables are not in
-    /// use.
+    /// Returns `true` if the friction table of the joint with this index is within the bounds. Also returns `true` if friction tables are
+    /// not in use.
     pub(crate) fn table_fits(&self, j: usize, config: &Config) -> bool {
         let table = self.tables_in_use().and_then(|tables| tables.get(j)).zip(config.joints.get(j));
         table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
@@ -252,20 +253,21 @@ impl HostParameters {
         borne.then_some(()).ok_or(DataStatus::IncorrectValue)
     }
 
-    /// Runs one tick under torque after gains were received. Returns the gains of this tick while they are blended in. `held`: all joints
-    /// have settled, and none yields.
+    /// Runs one tick with torque after gains were received. Returns the gains of this tick while new gains are blended in. `held` means
+    /// that all joints have settled and no joint yields.
     #[inline(never)]
     pub(crate) fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
         self.trial.step(held);
         self.trial.blended(&self.pid)
     }
 
-    /// Returns `true` if the joints of the model in use are heavy enough for the gains, with the present settings.
+    /// Returns `true` if the joints of the present model have enough inertia for the gains, with the present settings.
     pub(crate) fn gains_are_borne(&self, config: &Config) -> bool {
         self.felt.is_known() && self.felt.bears(&self.pid, config)
     }
 
-    /// Returns `true` if the joints of the model that was checked last, accepted or not, are too light for the gains.
+    /// Returns `true` if the joints of the last checked model have too little inertia for the gains. That model may have been accepted or
+    /// refused.
     #[cfg(test)]
     pub(crate) fn gains_were_too_much(&self, config: &Config) -> bool {
         self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
@@ -277,8 +279,8 @@ impl HostParameters {
         self.receive(missing_parameter::PID);
     }
 
-    /// Computes the inertia of a model with these settings, one pose per slice (J-71). Then the model is refused if the received gains need
-    /// more inertia; otherwise `used` is called.
+    /// Computes the inertia of a model with these settings, one pose per slice (J-71). After that, refuses the model if the received gains
+    /// need more inertia, and calls `used` otherwise.
     fn look_at(
         &mut self,
         model: &ArmModel,
@@ -322,7 +324,7 @@ impl HostParameters {
             return SliceOutcome::Done;
         }
         if self.missing() & missing_parameter::MODEL != 0 {
-            // The model is checked when it is received again.
+            // The model is checked when the host sends the model again.
             self.felt = FeltInertia::NONE;
             return SliceOutcome::Done;
         }
@@ -330,7 +332,7 @@ impl HostParameters {
         self.look_at(&model, progress, config, |_| Ok(()))
     }
 
-    /// Takes a model in slices. `at`: measured positions (rad), if all are known.
+    /// Checks and copies a model in slices. `at` contains the measured positions (rad) if all positions are known.
     pub(crate) fn set_model(
         &mut self,
         model: &ArmModel,
@@ -355,7 +357,7 @@ impl HostParameters {
         config: &Config,
     ) -> Result<(), DataStatus> {
         let dynamics = dynamics(model, config);
-        // Before all positions are known this cannot be decided. The model is checked again when Init ends.
+        // Before all positions are known, the holding torque cannot be checked. The model is checked again when Init ends.
         if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
             return Err(DataStatus::IncorrectValue);
         }
@@ -376,13 +378,13 @@ impl HostParameters {
         Ok(())
     }
 
-    /// Takes the default tables in the same way.
+    /// Checks and copies the default tables, like received tables.
     pub(crate) fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
         self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
     }
 
-    /// Takes the table of one joint per tick. All tables are checked before the first one is copied, so that a refused table changes
-    /// nothing.
+    /// Checks or copies the table of one joint per tick. All tables are checked before the first one is copied, so that a refused table
+    /// changes nothing.
     fn take_tables(
         &mut self,
         table: impl Fn(usize) -> Result<TableOf<f32>, DataStatus>,
@@ -443,7 +445,7 @@ fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
 /// Returns `true` if the torque limits suffice to hold an arm with these dynamics at `position` (rad) (J-06).
 fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> bool {
     let gravity = dynamics.gravity_torque(position);
-    // With this comparison NaN is too much. An absent joint holds nothing (J-53).
+    // With this comparison, NaN counts as too much torque. An absent joint does not hold any load (J-53).
     (0..JOINTS).all(|j| config.absent[j] || gravity[j].abs() <= config.joints[j].torque_max)
 }
 

@@ -1,8 +1,9 @@
-//! Set values between two trajectory points (J-32).
+//! Computes the set values between two trajectory points (J-32).
 //!
-//! Each channel has its own interpolation. The position is the quintic through the positions, velocities and accelerations of both points,
-//! the velocity is the cubic through their velocities and accelerations, and the acceleration is a straight line. No channel is the
-//! derivative of another, because the derivative of the int16 grid of the positions (96 µrad) would reach tens of rad/s².
+//! Position, velocity and acceleration are interpolated separately. The position is the quintic polynomial through the positions,
+//! velocities and accelerations of both points. The velocity is the cubic polynomial through the velocities and accelerations of both
+//! points. The acceleration is a straight line. The velocity and the acceleration are not computed as derivatives, because derivatives of
+//! the int16 grid of the positions (96 µrad) would reach tens of rad/s².
 use core::array::from_fn;
 
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
@@ -24,7 +25,7 @@ pub struct SetPoint {
 bit_codec!(SetPoint { position, velocity, acceleration });
 
 impl SetPoint {
-    /// Returns a standstill at `position`.
+    /// Returns the set values of an arm at rest at `position`.
     pub fn still(position: [f64; JOINTS]) -> Self {
         Self { position, ..Self::default() }
     }
@@ -43,13 +44,14 @@ impl From<&RawPoint> for SetPoint {
 /// Largest increase of a value between two points due to rounding, in rad and rad/s. This amount is too small to matter for any limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
-/// Rises from 0 to 1 with zero slope at both ends.
+/// Returns a smooth value that rises from 0 to 1 with zero slope at both ends.
 pub(crate) fn smooth(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Weights of the samples of both points in the channels at one place between the points (Hermite basis). All joints have the same weights.
+/// Weights of the samples of both points in position, velocity and acceleration at one time between the points (Hermite basis). The weights
+/// apply to all joints.
 struct Weights {
     /// Weights of the positions, the velocities and the accelerations in the position.
     position: [[f64; 2]; 3],
@@ -59,15 +61,15 @@ struct Weights {
     acceleration: [f64; 2],
 }
 
-/// Units of the samples, and the changes that they cause in a step. Units and changes are constant for a trajectory.
+/// Units of the samples, and the changes that one unit causes in a step. Units and changes are constant for a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Units {
     /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one unit.
     position: f64,
     velocity: f64,
     acceleration: f64,
-    /// Changes in a step: distance due to one unit of velocity (rad), half of the distance due to one unit of acceleration (rad), and
-    /// change of the velocity due to one unit of acceleration (rad/s).
+    /// Changes in a step. `way` is the distance (rad) due to one unit of velocity, and `half_way` is half of the distance (rad) due to one
+    /// unit of acceleration. `change` is the change of the velocity (rad/s) due to one unit of acceleration.
     way: f64,
     half_way: f64,
     change: f64,
@@ -119,14 +121,14 @@ impl Weights {
 /// The step between the points of a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step {
-    /// Length of the step, ms, and its reciprocal.
+    /// Length of the step in ms, and the reciprocal of the length.
     pub ms: u16,
     pub per_ms: f64,
     units: Units,
 }
 
 impl Step {
-    /// Creates a step of `ms` milliseconds; 0 is taken as 1.
+    /// Creates a step of `ms` milliseconds. A length of 0 is replaced by 1.
     pub(crate) fn new(ms: u16) -> Self {
         let ms = ms.max(1);
         let [position, velocity, acceleration] =
@@ -157,8 +159,8 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     out
 }
 
-/// Returns the derivative of the position (rad/s) at the place of [`interpolate`]: the velocity of the cubic, plus the part due to the
-/// distance that the velocities of both points do not explain.
+/// Returns the derivative of the position (rad/s) at the time of [`interpolate`]. The derivative is the velocity of the cubic polynomial,
+/// plus the part due to the distance that the velocities of both points do not explain.
 pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
     let cubic = interpolate(a, b, h, u).velocity;
     from_fn(|j| {
@@ -208,7 +210,8 @@ mod tests {
             }
         }
 
-        /// A motion with a quintic position is reproduced in the position; a motion with a cubic velocity is reproduced in the velocity.
+        /// If the position of a motion is a quintic polynomial, the interpolation reproduces this position. If the velocity is a cubic
+        /// polynomial, the interpolation reproduces this velocity.
         #[test]
         fn j32_reproduces_polynomials(c in prop::array::uniform6(-1.0..1.0f64), h in 0.005..0.5f64, u in 0.0..1.0f64) {
             let at = |t: f64| {
@@ -220,7 +223,7 @@ mod tests {
             let knot = |t: f64| { let (p, v, a) = at(t); SetPoint { position: [p; 6], velocity: [v; 6], acceleration: [a; 6] } };
             let got = interpolate(&knot(0.0), &knot(h), h, u);
             prop_assert!((got.position[3] - at(u * h).0).abs() < 1e-12);
-            // Compares the velocity with a motion whose velocity is a cubic.
+            // Compares the velocity with a motion whose velocity is a cubic polynomial.
             let cubic = |t: f64| (c[1] + t * (c[2] + t * (c[3] + t * c[4])), c[2] + t * (2.0 * c[3] + t * 3.0 * c[4]));
             let knot = |t: f64| SetPoint { position: [0.0; 6], velocity: [cubic(t).0; 6], acceleration: [cubic(t).1; 6] };
             let got = interpolate(&knot(0.0), &knot(h), h, u);
@@ -228,7 +231,8 @@ mod tests {
             prop_assert!((got.acceleration[0] - (cubic(0.0).1 + u * (cubic(h).1 - cubic(0.0).1))).abs() < 1e-12);
         }
 
-        /// Points in the wire format give the same result, up to a rounding error far below the allowance in the limits.
+        /// Points in the wire format give the result of the real numbers, except for a rounding error far below the tolerance of the
+        /// limits.
         #[test]
         fn j32_points_of_the_wire_are_interpolated_alike(
             (a, b) in (raw(), raw()), ms in prop::sample::select(&[1, 2, 7, 10, 100, u16::MAX][..]), u in 0.0..1.0f64,
@@ -236,7 +240,7 @@ mod tests {
             let wanted = interpolate(&SetPoint::from(&a), &SetPoint::from(&b), f64::from(ms) * 1e-3, u);
             let mut got = SetPoint::default();
             Step::new(ms).between(&a, &b, u, &mut got);
-            // In a step of a minute the values between the points are far from those at its ends.
+            // In a step of one minute, the values between the points differ greatly from the values at both ends of the step.
             let rounding = 0.01 * ROUNDING * (1.0 + f64::from(ms) * 1e-3).powi(2);
             for j in 0..JOINTS {
                 prop_assert!((got.position[j] - wanted.position[j]).abs() < rounding);
@@ -245,7 +249,7 @@ mod tests {
             }
         }
 
-        /// At a point of the trajectory the result equals the point bit for bit, and a point at rest gives a standstill.
+        /// At a trajectory point, the result is identical to the point in every bit. A point at rest gives zero velocity and acceleration.
         #[test]
         fn j32_points_of_the_wire_are_met(a in raw(), b in raw(), ms in 1..=u16::MAX) {
             let (step, mut at) = (Step::new(ms), SetPoint::default());
@@ -255,7 +259,7 @@ mod tests {
             prop_assert_eq!(at, SetPoint::from(&b));
         }
 
-        /// The position speed equals the derivative of the position.
+        /// The computed position speed equals the derivative of the position.
         #[test]
         fn j32_the_speed_of_the_position_is_its_slope(a in point(), b in point(), h in 0.01..0.5f64, u in 0.01..0.99f64) {
             let at = |u| interpolate(&a, &b, h, u).position[2];

@@ -1,4 +1,4 @@
-//! Inputs and outputs of a tick.
+//! Inputs and outputs of one control tick.
 use jtc_bus::Frame;
 use jtc_wire::{LinkEvent, UrgentCommands};
 
@@ -16,13 +16,13 @@ pub struct BusState {
 /// Event on a host line. The events of a line are in the order of their arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HostEvent<'a> {
-    /// The line, which gets the response record.
+    /// Number of the host line that gets the response record.
     pub line: usize,
-    /// The event was received before an urgent command that was an input of this tick or an earlier one. An overtaken Execute is not
+    /// The event was received before an urgent command that was an input of this tick or of an earlier tick. An overtaken Execute is not
     /// executed any more, and an overtaken Stop or Pause has already taken effect (J-04).
     pub overtaken: bool,
-    /// The frame came on a plain line: no extension request was received in the 2 s before its first byte (J-51). Its record contains no
-    /// data status above 6, and segment 0 acts as a Stop in Operate (J-30).
+    /// The frame came on a plain line: no extension request was received in the 2 s before the first byte of the frame (J-51). The record
+    /// of such a frame does not contain a data status above 6, and segment 0 acts as a Stop in Operate (J-30).
     pub plain: bool,
     /// The event.
     pub event: LinkEvent<'a>,
@@ -38,20 +38,20 @@ pub struct Inputs<'a> {
     /// Level of the safety input: `true` means no error (J-22). A board that latches pulses shorter than a tick reports `false` in the tick
     /// after such a pulse.
     pub safety_input: bool,
-    /// Number of ticks since the last one that were missed, or were at least half a tick late (J-12).
+    /// Number of ticks that were missed since the last tick, or were at least half a tick late (J-12).
     pub missed_ticks: u16,
     /// Stop and Pause commands that have arrived on each line since the last tick. These commands take effect in this tick, before all
-    /// waiting events (J-04). Their frames also appear as events when it is their turn.
+    /// waiting events (J-04). The frames of these commands also appear as events in the order of arrival.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. Offer the events that are not done again
-    /// in the next tick.
+    /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. In the next tick, the caller offers the
+    /// uncompleted events again.
     pub host: &'a [HostEvent<'a>],
-    /// The serial transmitters can take a status now.
+    /// The serial transmitters can accept a status now.
     pub status_free: bool,
 }
 
 impl Inputs<'_> {
-    /// Inputs of a tick without frames, events and faults.
+    /// Inputs of a tick without any frames, events and faults.
     pub const QUIET: Self = Inputs {
         bus: &[],
         bus_state: BusState { acknowledged: true, bus_off: false },
@@ -71,15 +71,16 @@ pub struct Outputs {
     /// Level of the safety output: `true` means no error (J-22).
     pub safety_output: bool,
     /// A JtcStatus frame must be sent now. [`Controller::status_frame`](crate::Controller::status_frame) returns it. The outputs do not
-    /// contain the frame, because they are copied in every tick and few ticks have a status.
+    /// contain the frame, because the outputs are copied in every tick and only a few ticks have a status.
     pub status: bool,
-    /// Line that gets the response record in that status; the other line gets the status without it. `None` if the status has no record.
+    /// Line that gets the status with the response record. The other line gets the status without the record. `None` if the status does not
+    /// contain a record.
     pub record_line: Option<usize>,
-    /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). This output is never set
-    /// together with `status`.
+    /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). This output and `status`
+    /// are never set in the same tick.
     pub answer_line: Option<usize>,
     /// [`Controller::stored_arm`](crate::Controller::stored_arm) must be written to non-volatile memory (J-54).
     pub store: bool,
-    /// Number of host events that are done, from the oldest on. Release them.
+    /// Number of completed host events, counted from the oldest event. Release them.
     pub host_done: usize,
 }

@@ -1,6 +1,6 @@
-//! Jogging: commanded joint velocities, the only motion without a trajectory (J-58). Each joint follows its velocity along ramps of bounded
-//! acceleration and jerk, and slows down by itself before the end of its range. When the jog ends, its clock comes to rest like path time,
-//! so that all joints stop as quickly as on a path (J-33).
+//! Jogging moves joints at commanded velocities and is the only motion without a trajectory (J-58). Each joint reaches its velocity with
+//! bounded acceleration and jerk, and slows down automatically before the end of its range. When the jog ends, its clock comes to rest like
+//! path time, so that all joints stop as quickly as on a path (J-33).
 use jtc_dynamics::sqrt;
 
 use crate::bit_codec::bit_codec;
@@ -14,10 +14,10 @@ use crate::{DT, JOINTS};
 pub(crate) const LASTS_MS: u16 = 200;
 /// Highest acceleration, as a share of the joint's limit.
 const ACCELERATION: f64 = 0.2;
-/// Time in which that acceleration is reached, s.
+/// Time in which a joint reaches the highest acceleration, s.
 const RISE_S: f64 = 0.1;
 
-/// Returns the highest acceleration of a joint while the torque limits leave enough torque for it, rad/s².
+/// Returns the highest acceleration of a joint, rad/s², if the torque limits leave enough torque for this acceleration.
 pub(crate) fn hardest(limits: &JointConfig) -> f64 {
     ACCELERATION * limits.acceleration_max
 }
@@ -39,7 +39,7 @@ pub(crate) fn jerk(limits: &JointConfig) -> f64 {
     hardest(limits) / RISE_S
 }
 
-/// Jog of all joints, from the first command until they are at rest.
+/// Jog of all joints, from the first command until all joints are at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jog {
     joints: [JointJog; JOINTS],
@@ -58,7 +58,7 @@ impl Jog {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// Commands velocities, rad/s, and the highest accelerations, rad/s². Commands that arrive while the joints come to rest take effect
+    /// Commands velocities, rad/s, and the highest accelerations, rad/s². A command that arrives while the joints come to rest takes effect
     /// when the joints are at rest.
     pub(crate) fn command(
         &mut self,
@@ -70,7 +70,7 @@ impl Jog {
         self.silent_ms = 0;
         for (j, joint) in self.joints.iter_mut().enumerate() {
             joint.wanted = wanted[j];
-            // A joint that could not stop within its range at this acceleration keeps the previous one.
+            // If a joint could not stop within its range at this acceleration, the previous acceleration limit stays valid.
             let (softer, jerk) = (JointJog { most: acceleration[j], ..*joint }, jerk(&config.joints[j]));
             let (low, high) = config.position_range(j);
             let rest = position[j] + softer.stopping_way(jerk);
@@ -114,7 +114,7 @@ impl Jog {
         !self.is_wanted() && (self.clock.standing() || self.joints.iter().all(rests))
     }
 
-    /// Runs one tick: moves `point`. `ramp` advances the clock while it ramps to another rate.
+    /// Runs one tick, which moves `point`. `ramp` advances the clock while the clock changes to another rate.
     pub(crate) fn step(
         &mut self,
         point: &mut SetPoint,
@@ -147,7 +147,8 @@ impl Jog {
 }
 
 impl JointJog {
-    /// Runs one tick that takes `tick` seconds of the jog's clock. While the jog `goes` on, the joint approaches the commanded velocity.
+    /// Runs one tick that lasts `tick` seconds of the jog's clock. If `goes` is `true`, the jog continues and the joint approaches the
+    /// commanded velocity.
     fn step(
         &mut self,
         position: &mut f64,
@@ -159,26 +160,26 @@ impl JointJog {
         let jerk = jerk(limits);
         let wanted = if goes { self.wanted } else { 0.0 };
         let wanted = wanted.max(-limits.velocity_max).min(limits.velocity_max);
-        // The joint approaches the commanded velocity as long as it could still stop inside its range afterwards.
+        // The joint approaches the commanded velocity as long as the joint could still stop inside its range afterwards.
         let onward = self.toward(wanted, jerk, limits.velocity_max, tick);
         let way = self.way(&onward, tick) + onward.stopping_way(jerk);
         let room = if way < 0.0 { low - *position } else { high - *position };
         let onward_fits = way.abs() < room.abs() && way * room >= 0.0;
         let next = if onward_fits { onward } else { self.toward(0.0, jerk, limits.velocity_max, tick) };
-        // The joint never leaves its range. A joint that is outside only moves back into it.
+        // The joint never leaves its range. A joint outside its range only moves back towards the range.
         let reached = *position + self.way(&next, tick);
         let within = reached.max(low.min(*position)).min(high.max(*position));
         *self = if within == reached { next } else { Self { velocity: 0.0, acceleration: 0.0, ..next } };
         *position = within;
     }
 
-    /// Returns the distance that the joint moves in `tick` seconds until it is in the state `next`, rad.
+    /// Returns the distance that the joint moves in the `tick` seconds before it reaches the state `next`, rad.
     fn way(&self, next: &Self, tick: f64) -> f64 {
         0.5 * (self.velocity + next.velocity) * tick
     }
 
-    /// Returns the state after `tick` seconds of the approach to a velocity (rad/s), with at most this `jerk` (rad/s³), and never faster
-    /// than `fastest` (rad/s).
+    /// Returns the state after the joint has approached a velocity (rad/s) for `tick` seconds. The jerk is at most `jerk` (rad/s³), and the
+    /// speed is at most `fastest` (rad/s).
     fn toward(&self, target: f64, jerk: f64, fastest: f64, tick: f64) -> Self {
         if tick <= 0.0 {
             return *self;
@@ -194,7 +195,8 @@ impl JointJog {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
             // A joint that still accelerates when its jog ends becomes faster until its acceleration is zero. The joint then reaches the
-            // velocity that was commanded before. Rounding to whole ticks can add a few µrad/s, which the limit does not allow.
+            // velocity that was commanded before. Rounding to whole ticks can add a few µrad/s above the velocity limit, so the velocity is
+            // bounded.
             let reached = self.velocity + next * tick;
             let velocity = reached.max(-fastest).min(fastest);
             let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / tick };
@@ -203,7 +205,7 @@ impl JointJog {
     }
 
     /// Returns the stopping distance of a joint that stops at once, rad. With this `jerk` (rad/s³) the acceleration falls to its limit
-    /// against the motion, stays there, and rises to zero. A small margin is added for the effect of whole ticks.
+    /// against the motion, stays at the limit, and rises to zero. A small margin is added for the effect of whole ticks.
     fn stopping_way(&self, jerk: f64) -> f64 {
         let sign = if self.velocity == 0.0 { self.acceleration } else { self.velocity };
         let (v, a) = if sign < 0.0 {
@@ -211,8 +213,8 @@ impl JointJog {
         } else {
             (self.velocity, self.acceleration)
         };
-        // The distance is measured from the point of zero acceleration, which is ahead of a joint that accelerates, and which a joint that
-        // brakes has passed.
+        // The distance is measured from the point of zero acceleration. A joint that accelerates has not reached this point yet, and a
+        // joint that brakes has passed the point.
         let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
         let rise = self.most / jerk;
         let rest = if peak >= self.most * rise {
@@ -237,13 +239,13 @@ mod tests {
         Config::avena()
     }
 
-    /// A command that the torque limits do not restrict.
+    /// Returns a jog command that the torque limits do not restrict.
     fn command(jog: &mut Jog, wanted: &[f64; JOINTS], position: &[f64; JOINTS], config: &Config) {
         let acceleration = core::array::from_fn(|j| hardest(&config.joints[j]));
         jog.command(wanted, &acceleration, position, config);
     }
 
-    /// Runs a tick that moves `position`, for joints without inertia. Returns their velocities and accelerations.
+    /// Runs a tick that moves `position`, for joints without inertia. Returns the velocities and accelerations of the joints.
     fn tick(jog: &mut Jog, position: &mut [f64; JOINTS], config: &Config) -> ([f64; JOINTS], [f64; JOINTS]) {
         let mut point = SetPoint::still(*position);
         jog.ends();
@@ -254,8 +256,8 @@ mod tests {
     }
 
     proptest! {
-        /// For any commands at any time, the joints stay within the range and the limits of velocity, acceleration and jerk. The joints are
-        /// at rest soon after the last command.
+        /// For any commands at any time, the joints stay within the position range and within the limits of velocity, acceleration and
+        /// jerk. The joints are at rest soon after the last command.
         #[test]
         fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(
             start in prop::array::uniform6(-1.0..1.0f64),
@@ -281,7 +283,7 @@ mod tests {
                 let ramps = was_ramping || jog.clock.ramping();
                 for j in 0..JOINTS {
                     let (limits, (low, high)) = (&config.joints[j], config.position_range(j));
-                    // While the jog comes to rest, it may brake as hard as a path.
+                    // While a jog comes to rest, the joints may decelerate as fast as on a path.
                     let most = if ramps { limits.acceleration_max } else { ACCELERATION * limits.acceleration_max };
                     assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
                     assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
@@ -318,7 +320,7 @@ mod tests {
         }
     }
 
-    /// Limits as imported from the UR5 and Z1 models, in wide ranges.
+    /// Joint limits as imported from the UR5 and Z1 models, with wide position ranges.
     fn arms() -> [Config; 3] {
         let avena = config();
         let with = |velocity: [f64; JOINTS], acceleration: f64| {
@@ -348,14 +350,15 @@ mod tests {
         Rate(f64),
     }
 
-    /// Ticks after the end of a jog: silence is noticed after [`LASTS_MS`], and then the acceleration takes [`RISE_S`] to reach zero.
+    /// Number of ticks after the end of a jog. The controller detects silence after [`LASTS_MS`], and then the acceleration needs
+    /// [`RISE_S`] to reach zero.
     const AFTER: u16 = LASTS_MS + 120;
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// A joint is jogged at its velocity limit, or up to a thousandth below it, and still accelerates when the jog ends. In whichever
-        /// tick that is, the set velocity stays within the limit, and no limit of J-43 is violated.
+        /// A joint is jogged at its velocity limit, or up to a thousandth below it, and still accelerates when the jog ends. For any tick
+        /// in which the jog ends, the set velocity stays within the limit, and no limit of J-43 is violated.
         #[test]
         fn j58_the_set_velocity_never_exceeds_its_limit_whenever_a_jog_ends(
             arm in 0..3usize,
@@ -488,8 +491,8 @@ mod tests {
         }
     }
 
-    /// A key is pressed before the arm is at rest: the same key, the opposite one or another. The arm comes to rest first, and no joint
-    /// becomes faster meanwhile. A joint that moves afterwards keeps to the acceleration of a jog.
+    /// Before the arm is at rest, the operator presses the same jog key, the opposite key or another key. The arm comes to rest first, and
+    /// no joint becomes faster meanwhile. A joint that moves afterwards does not exceed the acceleration of a jog.
     #[test]
     fn j58_a_jog_that_is_commanded_on_the_way_to_rest_begins_when_the_arm_stands() {
         let then = [[1.0, 0.0], [-0.4, 0.0], [0.0, 1.0]];

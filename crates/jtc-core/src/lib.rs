@@ -66,11 +66,11 @@ pub use parameters::{Friction, Parameters, PidGains, TableOf};
 pub use response_queue::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};
 
-/// Joints of the arm.
+/// Number of joints of the arm.
 pub const JOINTS: usize = 6;
-/// Joints and the gripper.
+/// Number of nodes: the joints and the gripper.
 pub const NODES: usize = 7;
-/// Points that the trajectory store holds (J-30).
+/// Highest number of points in the trajectory store (J-30).
 pub const POINTS_MAX: usize = 12_000;
 /// Highest number of segments of a trajectory (J-30).
 pub const SEGMENTS_MAX: usize = 100;

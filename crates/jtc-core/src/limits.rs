@@ -1,4 +1,4 @@
-//! Limits of a joint (J-43), and its other settings.
+//! Limits of a joint (J-43), and the other settings of the joint.
 use crate::bit_codec::bit_codec;
 use crate::interpolation::ROUNDING;
 use crate::joint_error;
@@ -23,27 +23,27 @@ pub struct JointConfig {
     /// Torque that is requested from the drive, as a multiple of the commanded torque at the joint (J-61). Drives that deliver less torque
     /// than requested need a value above 1.
     pub torque_gain: f64,
-    /// Damping in Teaching, N·m·s/rad (J-25). The damping is reduced if the joint is too light for it.
+    /// Damping in Teaching, N·m·s/rad (J-25). The damping is reduced if the inertia of the joint is too low for this damping.
     pub teach_damping: f64,
 }
 
-/// Rotor inertia of a drive for which none is configured, kg·m²: the value of the known drives.
+/// Rotor inertia for a drive without a configured value, kg·m². This is the value of the known drives.
 const UNKNOWN_ROTOR: f64 = 0.7;
 
 impl JointConfig {
-    /// Returns the rotor inertia to compute with, kg·m². A drive also has a rotor if no value is configured.
+    /// Returns the rotor inertia that the controller uses, kg·m². If no value is configured, the drive has a rotor nevertheless.
     pub fn counted_rotor(&self) -> f64 {
         if self.rotor_inertia > 0.0 { self.rotor_inertia } else { UNKNOWN_ROTOR }
     }
 }
 
-/// Number of ticks in the window.
+/// Number of ticks in the observed window.
 const WINDOW: u16 = 100;
 
-/// Ticks with a property among the last [`WINDOW`] ticks.
+/// Record of the ticks with a certain property among the last [`WINDOW`] ticks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Recent {
-    /// Ticks with the property, as a mask; the last tick is bit 0.
+    /// Mask of the ticks with the property. Bit 0 is the last tick.
     history: u128,
     count: u16,
 }
@@ -51,8 +51,8 @@ pub(crate) struct Recent {
 bit_codec!(Recent { history, count });
 
 impl Recent {
-    /// Adds a tick to the window. `has`: the tick has the property. Returns `true` if it has, and more than `most` of the last 100 ticks
-    /// have it.
+    /// Adds a tick to the window. `has` means that the tick has the property. Returns `true` if this tick and more than `most` of the last
+    /// 100 ticks have the property.
     #[inline]
     pub(crate) fn exceeds(&mut self, has: bool, most: u16) -> bool {
         if has | (self.count > 0) {
@@ -69,7 +69,7 @@ impl Recent {
     }
 }
 
-/// State of a joint's torque at its limit, with the recent ticks at the limit.
+/// State of the torque limit of one joint, with the recent ticks in which the torque was at the limit.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Saturation {
     /// The last torque was above the limit, so the integral does not change (J-41).
@@ -80,9 +80,9 @@ pub(crate) struct Saturation {
 bit_codec!(Saturation { saturated, over });
 
 impl Saturation {
-    /// Returns the torque to command, within its limit, and `true` if the joint is overloaded: the computed torque was above the limit,
-    /// with either sign, in more than `over_ms_max` of the last 100 ticks. For NaN no torque is commanded. While the arm is `braking` with
-    /// all available torque (J-33), ticks are not counted.
+    /// Returns the torque to command within the limit, and `true` if the joint is overloaded. A joint is overloaded if the computed torque
+    /// was above the limit, with either sign, in more than `over_ms_max` of the last 100 ticks. If the torque is NaN, the commanded torque
+    /// is zero. While the arm is `braking` with all available torque (J-33), ticks are not counted.
     pub(crate) fn limit(
         &mut self,
         torque: f64,
@@ -91,7 +91,7 @@ impl Saturation {
         braking: bool,
     ) -> (f64, bool) {
         let limit = limits.torque_max;
-        // With this comparison NaN is above the limit.
+        // With this comparison, NaN counts as above the limit.
         let within = torque.abs() <= limit;
         self.saturated = !within;
         let overloaded = self.over.exceeds(self.saturated & !braking, over_ms_max);
@@ -105,25 +105,24 @@ impl Saturation {
     }
 }
 
-/// Time within which a torque that reaches both limits, twice each, shows an unstable loop, ticks.
+/// Longest time (ticks) in which a torque must reach each limit twice to show an unstable loop.
 const TURNS_MS: u32 = 200;
 
 /// Changes of a joint's torque from one limit to the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turns {
-    /// Ticks in which the torque reached one limit after the other: the last three, oldest first.
+    /// Last three ticks in which the torque changed from one limit to the other, oldest first.
     at: [u32; 3],
-    /// Number of entries in `at`, three at most.
+    /// Number of entries in `at`, at most three.
     count: u8,
-    /// In the last of these ticks the torque was at the upper limit.
+    /// The torque was at the upper limit in the last of the ticks in `at`.
     upper: bool,
 }
 
 bit_codec!(Turns { at, count, upper });
 
 impl Turns {
-    /// Records a tick in which the torque is at a limit. Returns `true` if the torque has been at both limits, twice each, within
-    /// [`TURNS_MS`].
+    /// Records a tick in which the torque is at a limit. Returns `true` if the torque has reached each limit twice within [`TURNS_MS`].
     pub(crate) fn hits(&mut self, upper: bool, tick: u32) -> bool {
         if self.count > 0 && self.upper == upper {
             return false;
@@ -137,11 +136,12 @@ impl Turns {
 }
 
 /// Returns a joint error for each set value (position, velocity, acceleration) outside its limits, and for a position `error` (rad, J-62)
-/// above its limit. The position limit applies only to `commanded` positions: an arm that is already outside is held at its position,
-/// because otherwise it could never be moved back. Rounding between two points that have passed the check of J-36 is not an error.
+/// above its limit. The position limit applies only to `commanded` positions. An arm that is already outside the limit is held at its
+/// position, because otherwise the host could never move the arm back. Rounding between two points that have passed the check of J-36 is
+/// not an error.
 pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
-    // With these comparisons NaN is outside.
+    // With these comparisons, NaN counts as outside the limits.
     let (low, high) = (limits.position_min - ROUNDING, limits.position_max + ROUNDING);
     let inside = (position >= low) & (position <= high);
     bit(inside | !commanded, joint_error::POSITION)
@@ -150,7 +150,7 @@ pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, 
         | bit(error.abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
 }
 
-/// Returns the part of the `wanted` torque that fits within the limit if it is added to the present `torque`, N·m.
+/// Returns the part of the `wanted` torque that can be added to the present `torque` without exceeding the limit, N·m.
 pub(crate) fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
     let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn j43_torque_at_its_limit_counts_within_any_100_ms_whichever_sign() {
-        // Ten ticks in 100 ms are allowed, in any pattern and for ever; eleven are not.
+        // In any pattern and for any length of time, ten ticks in 100 ms are allowed, but eleven ticks are not allowed.
         for (period, allowed) in [(10, true), (9, false)] {
             let (l, mut saturation) = (limits(), Saturation::default());
             let mut good = true;
@@ -233,7 +233,7 @@ mod tests {
             }
             assert_eq!(good, allowed, "one tick of {period}");
         }
-        // Ten ticks in succession, then a pause.
+        // Ten consecutive ticks at the limit, followed by a pause.
         let (l, mut saturation) = (limits(), Saturation::default());
         for k in 0..1_000 {
             let torque = if k % 100 < 10 { INF } else { 0.0 };
@@ -249,14 +249,14 @@ mod tests {
             assert!(saturation.saturated);
         }
         assert_eq!(saturation.limit(f64::NAN, &l, 10, true), (0.0, false));
-        // Ticks at the limit while braking are not counted later.
+        // Ticks at the limit during braking are also not counted later.
         for _ in 0..10 {
             assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, false));
         }
         assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, true));
     }
 
-    /// The torque is at its upper (`true`) or lower limit in the ticks with these numbers.
+    /// Numbers of the ticks in which the torque is at its upper limit (`true`) or at its lower limit (`false`).
     #[test]
     fn j66_a_torque_that_was_at_both_limits_twice_each_within_200_ms_is_unstable() {
         let seen = |hits: &[(u32, bool)]| {
@@ -284,7 +284,7 @@ mod tests {
         }
     }
 
-    /// A value that has passed the check of J-36 is not an error in motion, even if rounding has changed it by the highest amount.
+    /// A value that has passed the check of J-36 is not an error in motion, even if the largest rounding error is added to the value.
     #[test]
     fn j36_j43_what_rounding_may_add_is_no_error() {
         let l = limits();

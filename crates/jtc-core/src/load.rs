@@ -1,4 +1,5 @@
-//! The load that a joint carries and that the model lacks. The load is learned from the integral of the position controller.
+//! Load that a joint carries and that the model does not contain. The controller learns the load from the integral of the position
+//! controller.
 use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::limits::JointConfig;
@@ -7,12 +8,12 @@ use crate::limits::JointConfig;
 const PERIOD: f64 = crate::JOINTS as f64;
 /// Time constant of the low-pass filter, s.
 const TIME_S: f64 = 1.0;
-/// Highest load, as a share of the torque limit.
+/// Highest load of a joint, as a share of the torque limit.
 const HIGHEST: f64 = 0.3;
-/// Difference of integral and load, as a share of the torque limit. Above it the difference is attributed to a contact, and the load does
-/// not change.
+/// Difference of integral and load, as a share of the torque limit. A larger difference is attributed to a contact, and the load does not
+/// change.
 const APART: f64 = 0.1;
-/// Change of the integral, as a share of the torque limit, up to which the joint is considered held steadily.
+/// Largest change of the integral, as a share of the torque limit, at which the joint is still considered held steadily.
 const STEADY: f64 = 0.03;
 /// Time of steady holding after which the integral is taken as the load, s.
 const STEADY_S: f64 = 10.0;
@@ -24,7 +25,7 @@ pub(crate) struct Load {
     torque: f32,
     /// The joint has settled since it was enabled, or since its load was cleared.
     known: bool,
-    /// Integral at the beginning of steady holding, N·m, and number of observations since.
+    /// Integral at the beginning of steady holding, N·m, and number of observations since that time.
     steady: f32,
     observations: u16,
 }
@@ -32,7 +33,7 @@ pub(crate) struct Load {
 bit_codec!(Load { torque, known, steady, observations });
 
 impl Load {
-    /// Clears the load, so that the joint must find it again.
+    /// Clears the load, so that the joint must find the load again.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
@@ -47,7 +48,7 @@ impl Load {
         self.torque.into()
     }
 
-    /// Returns the part of a torque (N·m) that is accepted as a load without being observed.
+    /// Returns the part of a torque (N·m) that is accepted as a load without observation.
     pub(crate) fn bounded(torque: f64, limits: &JointConfig) -> f64 {
         let highest = HIGHEST * limits.torque_max;
         torque.max(-highest).min(highest)
@@ -58,13 +59,13 @@ impl Load {
         self.known
     }
 
-    /// Sets a load that was found in another way, N·m: a load that was lowered has this torque now.
+    /// Sets the load to the torque (N·m) that was found while the joint lowered the load.
     pub(crate) fn set(&mut self, torque: f64) {
         *self = Self { torque: torque as f32, known: true, ..Self::default() };
     }
 
-    /// Observes the torque of the `integral` (N·m). `settled`: the joint has settled since it was enabled. Call this once in [`PERIOD`]
-    /// ticks.
+    /// Observes the torque of the `integral` (N·m). `settled` means that the joint has settled since it was enabled. Call this once in
+    /// [`PERIOD`] ticks.
     pub(crate) fn observe(&mut self, integral: f64, settled: bool, limits: &JointConfig) {
         if !settled {
             self.forget();
@@ -119,12 +120,12 @@ mod tests {
     fn j66_the_load_follows_the_integral_within_a_second_and_no_contact() {
         let mut load = Load::default();
         observe(&mut load, 10.0, 0.1);
-        // A difference within a tenth of the limit: the load reaches 63 % of it in a second.
+        // If the difference is within a tenth of the limit, the load reaches 63 % of the difference in a second.
         observe(&mut load, 20.0, 1.0);
         assert!((load.torque(0.0) - 16.3).abs() < 0.1, "{}", load.torque(0.0));
         observe(&mut load, 16.3, 5.0);
         let known = load.torque(0.0);
-        // A larger difference is a contact, until it has been steady for ten seconds.
+        // A larger difference is considered a contact until the difference has been steady for ten seconds.
         observe(&mut load, 40.0, 9.9);
         assert_eq!(load.torque(0.0), known);
         observe(&mut load, 40.0, 0.2);

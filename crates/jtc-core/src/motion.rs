@@ -1,4 +1,4 @@
-//! The motion of the arm (J-40 to J-44): set values, the control law, its limits.
+//! Motion of the arm (J-40 to J-44): set values, the control law, and the limits of the control law.
 //!
 //! Each part has its own state and runs one step per tick. [`Motion`] connects the parts, and applies a change of the controller's state to
 //! all of them.
@@ -53,8 +53,8 @@ pub(crate) struct Motion {
 bit_codec!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
-    /// Turns the torque off: no joint is held, and no torque is stored. Each part is reset in place, so that it is not built on the stack
-    /// and copied.
+    /// Turns the torque off, so that no joint is held and no torque is stored. Each part is reset in place, because a new part would be
+    /// built on the stack and copied.
     pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
         set.release(nodes);
@@ -65,7 +65,8 @@ impl Motion {
         *hold_back = HoldBack::default();
     }
 
-    /// Makes joints yield from the next tick on (J-68), and other joints lower their loads (J-70). The inertia is taken from the ramp.
+    /// Makes joints yield from the next tick on (J-68), and other joints lower their loads (J-70). The inertia of each joint comes from the
+    /// last ramp.
     pub(crate) fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {
@@ -84,20 +85,22 @@ impl Motion {
         self.limiter.forget_turns();
     }
 
-    /// Returns `true` if all joints have settled since they were enabled, and none yields.
+    /// Returns `true` if all joints have settled since they were enabled and no joint yields.
     pub(crate) fn holds(&self, config: &Config) -> bool {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
-    /// Returns, for each joint, whether it is at its torque limit, and whether its position error is above half of the maximum.
+    /// Returns two values for each joint: `true` if the joint is at its torque limit, and `true` if its position error is above half of the
+    /// maximum.
     pub(crate) fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let (due, q) = (self.set.due(config), nodes.positions());
         let lags = |j: usize| (due[j] - q[j]).abs() > 0.5 * config.joints[j].position_error_max;
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
-    /// Returns `true` if the arm is held at rest and its loads are known. In a held stop a `contact` may press on the arm; its pressure is
-    /// not waited for. After [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the loads are not waited for either.
+    /// Returns `true` if the arm is held at rest and its loads are known. In a held stop a `contact` may press on the arm, and the
+    /// controller does not wait for the end of this pressure. After [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the controller
+    /// does not wait for the loads either.
     pub(crate) fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
         let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
@@ -105,7 +108,7 @@ impl Motion {
             && (overdue || self.law.knows_loads(&self.set.holding, config, contact))
     }
 
-    /// Runs one tick of Teaching. Keeps the inertia for a ramp up to date, because Teaching may end in the middle of a motion.
+    /// Runs one tick of Teaching. Updates the inertia for a ramp, because Teaching may end during a motion.
     pub(crate) fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         if self.law.taught.as_ref().is_some_and(Taught::is_turn_of_ramp) {
             self.ramp.begin(nodes, config, dynamics);
@@ -131,7 +134,7 @@ impl Motion {
         self.law.latch(&latched);
     }
 
-    /// Runs one tick of HoldPos: the position hold or the jog.
+    /// Runs one tick of HoldPos, which is a tick of the position hold or of a jog.
     pub(crate) fn hold(&mut self, config: &Config) {
         let Self { set, law, ramp, .. } = self;
         if set.jogging() {
@@ -141,7 +144,7 @@ impl Motion {
         }
     }
 
-    /// Runs one tick on the path or of the approach. `at` holds the values for full speed at the time of the clock (J-33).
+    /// Runs one tick on the path or during the approach. `at` contains the set values for full speed at the time of the clock (J-33).
     pub(crate) fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law, clock, config);
@@ -151,8 +154,8 @@ impl Motion {
         self.set.follow(at, clock.rate, clock.slope);
     }
 
-    /// Runs one tick of the control law and of its limits. Returns the torques to command and the findings of the limits.
-    // A single function does the work of every tick: calls inside it would copy the torques back and forth.
+    /// Runs one tick of the control law and of the limits. Returns the torques to command and the findings of the limits.
+    // A single function does the work of every tick, because calls of inner functions would copy the torques repeatedly.
     #[inline(never)]
     pub(crate) fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
         let positions = inputs.nodes.positions();

@@ -1,5 +1,4 @@
-//! The seven nodes on the joint bus: their reports, their bring-up (J-20), their errors (J-14, J-16), and the frame that each tick sends
-//! (J-12).
+//! State of the seven nodes on the joint bus: reports, bring-up (J-20), errors (J-14, J-16), and the frame that each tick sends (J-12).
 use jtc_bus::{Answer, JointReport, NodeState, Scale, warning};
 use jtc_wire::{StopKind, can_flag};
 
@@ -28,11 +27,11 @@ const GRIPPER_FLAG: u32 = can_flag::no_answer(GRIPPER);
 /// Highest number of frames that one tick reads.
 pub(crate) const FRAMES_MAX: usize = 32;
 
-/// State of all nodes, and of the frames that are sent to them.
+/// State of all nodes, and of the frames that the controller sends to the nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct Nodes {
     nodes: [Node; NODES],
-    /// Measured positions (rad) and velocities (rad/s) of the joints; 0 until they are valid.
+    /// Measured positions (rad) and velocities (rad/s) of the joints. All values are 0 until they are valid.
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
     gripper: bool,
@@ -41,24 +40,24 @@ pub(crate) struct Nodes {
     gripper_lost: bool,
     /// Ticks for which every joint has been slow enough to be enabled (J-16).
     still_ms: u16,
-    /// Ticks left in which the drives rest after torque was taken away.
+    /// Number of ticks in which the drives must still rest after the torque was removed.
     rest_ms: u16,
     /// Torque was requested in the last tick.
     powered: bool,
     /// Measured state of the gripper.
     pub pump: bool,
     pub pressure: [bool; 2],
-    /// Frames that were ignored (J-15).
+    /// Number of ignored frames (J-15).
     pub ignored: u32,
-    /// Consecutive Moves without acknowledgement.
+    /// Number of consecutive Moves without acknowledgement.
     unacknowledged: u8,
     sent_move: bool,
-    /// Moves since the last frame that replaced a Move.
+    /// Number of Moves since the last frame that replaced a Move.
     moves: u8,
     configured_last: bool,
-    /// Checks whether the positions and speeds of the drives agree (J-35).
+    /// Check that compares the positions and speeds of the drives (J-35).
     speed_check: SpeedCheck,
-    /// Joints, as a mask, whose encoders were found to disagree in this tick (J-35).
+    /// Mask of the joints whose encoders were found to disagree in this tick (J-35).
     misfits: u8,
 }
 
@@ -84,7 +83,7 @@ bit_codec!(Nodes {
 });
 
 impl Nodes {
-    /// Creates the nodes. Each of them must be reset once (J-20).
+    /// Creates the nodes. Each node must be reset once (J-20).
     pub(crate) fn new(config: &Config) -> Self {
         let mut node = Node::default();
         node.restart(config);
@@ -111,7 +110,7 @@ impl Nodes {
         }
     }
 
-    /// Every joint enabled, at these positions (rad) and velocities (rad/s).
+    /// Returns nodes with every joint enabled at these positions (rad) and velocities (rad/s).
     #[cfg(test)]
     pub(crate) fn enabled_at(position: [f64; JOINTS], velocity: [f64; JOINTS]) -> Self {
         let mut nodes = Self::new(&Config::avena());
@@ -126,7 +125,7 @@ impl Nodes {
         nodes
     }
 
-    /// Like [`Self::enabled_at`], but the joint with this index is ready and not enabled.
+    /// Returns nodes like [`Self::enabled_at`], but the joint with this index is ready and not enabled.
     #[cfg(test)]
     pub(crate) fn with_torque_off(mut self, joint: usize) -> Self {
         self.nodes[joint].report.state = NodeState::READY;
@@ -156,60 +155,61 @@ impl Nodes {
         self.gripper_node().is_some_and(|node| node.silent < config.missed_moves_max)
     }
 
-    /// Returns `true` if the gripper is enabled and, by the configuration, keeps its part when the arm loses its torque.
+    /// Returns `true` if the gripper is enabled and, according to the configuration, keeps holding its part when the arm loses its torque.
     pub(crate) fn gripper_keeps_part(&self, config: &Config) -> bool {
         !config.pump_off_on_error
             && self.gripper_node().is_some_and(|node| node.report.state == NodeState::ENABLED)
     }
 
-    /// Returns `true` if the gripper left OperationEnable or lost its configuration in this tick. A pump that was commanded before does not
-    /// start again by itself (J-23).
+    /// Returns `true` if the gripper left OperationEnable or lost its configuration in this tick. A pump that was commanded earlier does
+    /// not start again by itself (J-23).
     pub(crate) fn gripper_lost(&self) -> bool {
         self.gripper_lost
     }
 
-    /// Returns the CAN flags of a gripper that does not answer. These flags are shown, but are not an error (J-14, J-23).
+    /// Returns the CAN flags of a gripper that does not answer. The status shows these flags, but the flags are not an error (J-14, J-23).
     pub(crate) fn gripper_flags(&self, config: &Config) -> u32 {
         if self.gripper && !self.gripper_answers(config) { GRIPPER_FLAG } else { 0 }
     }
 
     pub(crate) fn node(&self, n: usize) -> &Node {
-        // The index comes from this crate. If it were out of range, node 0 would be returned instead of a panic.
+        // The index comes from this crate. If the index were out of range, node 0 would be returned instead of a panic.
         self.nodes.get(n).unwrap_or(&self.nodes[0])
     }
 
-    /// Returns the measured positions, rad, predicted while answers are missing (J-63). Positions that are not valid yet are 0.
+    /// Returns the measured positions, rad. While answers are missing, the positions are predicted (J-63). Positions that are not valid yet
+    /// are 0.
     pub(crate) fn positions(&self) -> &[f64; JOINTS] {
         &self.position
     }
 
-    /// Returns the positions if those of all joints are valid.
+    /// Returns the positions if the positions of all joints are valid.
     pub(crate) fn known_positions(&self) -> Option<&[f64; JOINTS]> {
         (!self.fallen_back()).then_some(&self.position)
     }
 
-    /// Returns the joints, as a mask, whose encoders were found to disagree in this tick (J-35).
+    /// Returns a mask of the joints whose encoders were found to disagree in this tick (J-35).
     pub(crate) fn misfits(&self) -> u8 {
         self.misfits
     }
 
-    /// Returns the disagreement of the two encoders of a joint that was found since its drive was configured, with the size of a jump (rad)
-    /// or the factor of a speed (J-35).
+    /// Returns the disagreement of the two encoders of a joint that was found since its drive was configured (J-35). The value is the size
+    /// of a jump (rad) or the factor of a speed.
     pub(crate) fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
         self.node(joint).measured.misfit()
     }
 
-    /// Returns the joints, as a mask, whose encoders disagree. Such a joint stays in the mask until its drive is configured again (J-35).
+    /// Returns a mask of the joints whose encoders disagree. A joint stays in this mask until its drive is configured again (J-35).
     pub(crate) fn untrusted(&self) -> u8 {
         (0..JOINTS).fold(0, |mask, j| mask | u8::from(self.misfit(j).is_some()) << j)
     }
 
-    /// Returns the measured velocities, rad/s, like [`Self::positions`].
+    /// Returns the measured or predicted velocities, rad/s, like [`Self::positions`].
     pub(crate) fn velocities(&self) -> &[f64; JOINTS] {
         &self.velocity
     }
 
-    /// Processes the frames that the bus has received since the last tick. `commanded`: the set values of the last ticks.
+    /// Processes the frames that the bus has received since the last tick. `commanded` contains the set values of the last ticks.
     pub(crate) fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
         // Masks of nodes. If a configuration is accepted in this tick, the answer to the next Move comes in a later tick.
         let (mut answered, mut configured_before) = (0u8, 0u8);
@@ -247,7 +247,8 @@ impl Nodes {
                         node.refused = !accepted;
                     }
                 }
-                // Depending on the drive, the byte is the state before or after the change. Therefore only Move answers set the state.
+                // Depending on the drive, the byte of this answer is the state before or after the change. Therefore only Move answers set
+                // the state.
                 Ok(Answer::State { .. }) => {}
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
@@ -294,7 +295,7 @@ impl Nodes {
         node.seen = true;
         if node.starting() {
             if !before.is_starting() || report.state == NodeState::START {
-                // The node has fallen back, so its configuration is lost and must be accepted again.
+                // The node has fallen back to Start or Init, so its configuration is lost and must be accepted again.
                 node.lose_configuration();
             }
             if report.state != NodeState::START_TO_INIT {
@@ -306,8 +307,8 @@ impl Nodes {
         }
     }
 
-    /// Sets the `commanded` velocities (rad/s) of joints whose set values were restarted as the new reference. A restart of the set values
-    /// is not a change of the motion (J-63).
+    /// Uses the `commanded` velocities (rad/s) as the new reference for joints whose set values were restarted. A restart of the set values
+    /// does not change the motion (J-63).
     pub(crate) fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
         for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
             if *found {
@@ -355,12 +356,13 @@ impl Nodes {
         usable
     }
 
-    /// Returns `true` if the arm is at rest or slow, and its drives have rested, so that joints may be enabled (J-16).
+    /// Returns `true` if joints may be enabled, because the arm is at rest or slow and the drives have rested (J-16).
     fn may_enable(&self, config: &Config) -> bool {
         self.still_ms >= config.enable_still_ms && self.rest_ms == 0
     }
 
-    /// Returns the node init word. Bit n is set while node n is not initialised, or if it is the gripper and does not answer.
+    /// Returns the node init word. Bit n is set while node n is not initialised. The bit of the gripper is also set if the gripper does not
+    /// answer.
     pub(crate) fn init_word(&self, config: &Config) -> u8 {
         let mut word = 0;
         for (n, node) in self.all().iter().enumerate() {
@@ -378,7 +380,8 @@ impl Nodes {
         self.joints().iter().any(Node::fallen_back)
     }
 
-    /// Returns `true` when Init is done: every node is initialised and reports ReadyToOperate. A gripper that keeps its part stays enabled.
+    /// Returns `true` when Init is completed, so that every node is initialised and reports ReadyToOperate. A gripper that keeps holding
+    /// its part stays enabled.
     pub(crate) fn all_ready(&self, config: &Config) -> bool {
         let ready = |node: &Node| node.report.state == NodeState::READY;
         self.init_word(config) == 0
@@ -386,9 +389,9 @@ impl Nodes {
             && (self.gripper_keeps_part(config) || self.gripper_node().is_none_or(ready))
     }
 
-    /// Executes ClearCurrentErrors for the nodes in `mask`. Nodes with an error to clear are commanded to Init until they follow. An error
-    /// that is only in the word of occurred errors is cleared only while the torque is off, because it is not a reason to drop the arm.
-    /// Returns `true` if any node has an error to clear.
+    /// Executes ClearCurrentErrors for the nodes in `mask`. Nodes with an error to clear are commanded to Init until the nodes follow. An
+    /// error that is only in the word of occurred errors is cleared only while the torque is off, because such an error is not a reason to
+    /// drop the arm. Returns `true` if any node has an error to clear.
     pub(crate) fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
         let mut any = false;
@@ -412,8 +415,8 @@ impl Nodes {
 }
 
 impl Nodes {
-    /// Applies new settings, in a state without torque. Returns `true` if these settings are sent to the nodes, which are then configured
-    /// again.
+    /// Applies new settings, in a state without torque. Returns `true` if the changed settings must be sent to the nodes, which are then
+    /// configured again.
     pub(crate) fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
         self.gripper = config.gripper;
         self.some_absent = config.absent.contains(&true);
@@ -429,7 +432,7 @@ impl Nodes {
                 node.restart(config);
             }
         }
-        // With another scale the speeds may agree.
+        // If the velocity scale has changed, positions and speeds may agree again.
         let bits = |config: &Config| {
             let Config { joint_config_bits, gripper_config_bits, gripper, velocity_full_scale, .. } = *config;
             (joint_config_bits, gripper_config_bits, gripper, velocity_full_scale)

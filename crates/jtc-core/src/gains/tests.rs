@@ -1,4 +1,4 @@
-//! Tests of the inertia that gains need, and of gains on trial.
+//! Tests of the inertia that gains need, and of the trial of new gains.
 use proptest::prelude::*;
 
 use super::*;
@@ -33,7 +33,7 @@ fn j71_the_poses_are_within_the_limits_and_apart() {
     }
 }
 
-/// Values that docs/protocol-jtc.md gives for the default arm.
+/// Values for the default arm that docs/protocol-jtc.md contains.
 #[test]
 fn j71_the_default_arm_feels_what_is_said() {
     let felt = least_felt_inertia(&Parameters::avena().model, &Config::avena());
@@ -41,7 +41,7 @@ fn j71_the_default_arm_feels_what_is_said() {
 }
 
 proptest! {
-    /// In a pose that is not among the computed ones, a joint feels little less inertia.
+    /// In a pose for which the inertia was not computed, a joint feels only slightly less inertia.
     #[test]
     fn j71_a_joint_feels_little_less_in_other_poses(shares in prop::array::uniform6(0.0..1.0f64)) {
         let (model, config) = (Parameters::avena().model, Config::avena());
@@ -87,7 +87,7 @@ fn j71_a_drive_without_a_rotor_has_that_of_the_known_drives() {
 fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
     let limits = Config::avena().joints[1];
     let gains = PidGains { kp: 1_000.0, ki: 100.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
-    // The position error may hold a quarter of 0.09 rad times 1 000 N·m/rad.
+    // A position error of at most a quarter of 0.09 rad may hold the arm, at 1 000 N·m/rad.
     for (gains, i, holds) in [
         (gains, 100.0, true),
         (gains, 122.0, true),
@@ -133,7 +133,8 @@ proptest! {
         prop_assert_eq!(last, third);
     }
 
-    /// Softer gains need less inertia than the gains before them. Their damping is at least twice the amount that the delay of Kp uses up.
+    /// Softer gains need less inertia than the previous gains. The damping of softer gains is at least twice the damping that the delay of
+    /// Kp consumes.
     #[test]
     fn j66_softer_gains_are_stable_where_the_others_were_borne(kp in 1.0..50_000.0f64, kd in 0.0..500.0f64, delay in 0..8u8) {
         let own = PidGains { kp, ki: 1000.0, kd, ..given()[0] };
@@ -145,7 +146,7 @@ proptest! {
     }
 }
 
-/// Returns the gains of an arm that fails after `ms`. `unstable`: the loop of joint 2 is unstable.
+/// Returns the gains of an arm whose new gains fail after `ms`. `unstable` means that the loop of joint 2 is unstable.
 fn after(ms: u16, unstable: bool) -> Option<(StopKind, [PidGains; JOINTS])> {
     let mut trial = Trial::default();
     trial.begin(&scaled(0.5), &given());
@@ -171,7 +172,7 @@ fn j66_j71_gains_that_fail_are_taken_back() {
     assert_eq!((softer[0], softer[2]), (given()[0], given()[2]), "the others keep theirs");
 }
 
-/// Gains on trial have not held the arm yet. Therefore the gains that held it before are restored.
+/// Gains on trial have not held the arm yet. Therefore the earlier gains that held the arm are restored.
 #[test]
 fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     for (ms, back) in [(100, 0.5), (2_000, 1.2)] {
@@ -184,7 +185,7 @@ fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     }
 }
 
-/// A host sends the gains again that held the arm before: they need no trial.
+/// If a host sends gains that have already held the arm, these gains do not need a trial.
 #[test]
 fn j71_gains_that_held_are_not_on_trial() {
     let mut trial = Trial::default();
@@ -197,7 +198,7 @@ fn j71_gains_that_held_are_not_on_trial() {
     assert_eq!(trial.end(), Some(scaled(1.2)));
 }
 
-/// Only time in which all joints are held is part of the trial.
+/// Only the time in which all joints are held counts for the trial.
 #[test]
 fn j71_a_trial_waits_for_joints_that_are_not_held() {
     let mut trial = Trial::default();
@@ -208,7 +209,7 @@ fn j71_a_trial_waits_for_joints_that_are_not_held() {
     assert!(!trial.is_on());
 }
 
-/// Joints that fail get the gains before at once; the other joints blend into them.
+/// Joints that fail get the previous gains at once. The gains of the other joints are blended into the previous gains.
 #[test]
 fn j71_gains_come_back_at_once_where_they_failed() {
     let mut trial = Trial::default();

@@ -4,16 +4,16 @@ use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
 use crate::TrajectoryState;
 use crate::bit_codec::bit_codec;
 
-/// State of the urgent commands of a line, until it is the turn of their frames.
+/// State of the urgent commands of a line until their frames are processed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Priority {
-    /// Stops and Pauses that were accepted and have no record yet.
+    /// Numbers of Stops and Pauses that were accepted and have no response record yet.
     pub(super) stops: u8,
     pub(super) pauses: u8,
     /// The Stops and Pauses have cancelled an Execute.
     pub(super) cancelled: bool,
-    /// A Stop has arrived on either line, accepted or not, so an upload that was begun before it is dropped (J-30). The flag is cleared by
-    /// the first event that was received after the Stop; the record of an earlier Stop does not clear it.
+    /// A Stop has arrived on either line, accepted or not, so an upload that began before this Stop is dropped (J-30). The first event that
+    /// was received after the Stop clears the flag. The record of an earlier Stop does not clear the flag.
     pub(super) stopped: bool,
 }
 
@@ -26,8 +26,9 @@ impl Priority {
         *accepted = accepted.saturating_add(count);
     }
 
-    /// Returns the data status of an execution command that an urgent command has overtaken. A Stop or a Pause is reported as accepted in
-    /// two cases: it was accepted, or it has cancelled an Execute and the `trajectory` is in the commanded state.
+    /// Returns the data status of an execution command that an urgent command has overtaken. A Stop or a Pause that was accepted is
+    /// reported as accepted. A Stop or a Pause is also reported as accepted if an Execute was cancelled and the `trajectory` is in the
+    /// commanded state.
     pub(crate) fn overtaken(
         &mut self,
         exec: ExecCommand,

@@ -1,7 +1,7 @@
-//! Frames that are too long for one tick: progress of such a frame, and outcome of one slice (J-06).
+//! Progress of a frame that is too long for one tick, and outcome of one slice of the frame (J-06).
 use jtc_wire::DataStatus;
 
-/// Progress of a long frame. Each tick executes a slice of such a frame.
+/// Progress of a long frame. Each tick executes one slice of the frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum SliceProgress {
     #[default]

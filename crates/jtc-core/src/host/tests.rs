@@ -1,4 +1,4 @@
-//! Effects of single commands of the host, and the part of a tick that they take (J-04, J-21, J-23, J-36).
+//! Tests of the effect of single host commands, and of the part of a tick that each command uses (J-04, J-21, J-23, J-36).
 extern crate std;
 use std::vec::Vec;
 
@@ -21,7 +21,7 @@ fn holding() -> Bench {
     controller
 }
 
-/// Returns the number of three such frames that are done in one tick.
+/// Sends three of these frames and returns the number of frames that one tick completes.
 fn done_of_three(controller: &mut Bench, frame_type: FrameType, body: &[u8]) -> usize {
     let bytes: Vec<u8> = [&[0; 4], body, &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
@@ -40,7 +40,7 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
         (ClearCurrentErrors, &[1, 0x7F, 0, 0], 3),
         (ResetCanDevices, &[0x40, 0, 0, 0], 1),
         (PidParamUseDefault, &[], 1),
-        // A command that the state forbids takes no time.
+        // If the state forbids a command, the command uses no time.
         (TrajSetExecStatus, &[3, 0, 0, 0], 3),
     ] {
         assert_eq!(done_of_three(&mut holding(), frame_type, body), done, "{frame_type:?} {body:?}");
@@ -54,7 +54,7 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
     assert_eq!(done_of_three(&mut error, ClearOccurredErrors, &[]), 1);
 }
 
-/// If the frame of a Stop was lost, a later Stop is not reported as accepted because of it.
+/// If the frame of a Stop was lost, a later Stop is not reported as accepted because of the lost Stop.
 #[test]
 fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
     let before = Priority { stops: 2, pauses: 1, cancelled: true, stopped: true };
@@ -109,14 +109,14 @@ fn j23_a_pump_is_switched_where_there_is_a_gripper_and_never_on_in_error() {
     }
 }
 
-/// Segment number `segment` of two, with 10 ms between points, of an arm at rest.
+/// Segment `segment` of a trajectory with two segments, for an arm at rest, with points 10 ms apart.
 fn body(segment: u8, points: usize) -> Vec<u8> {
     let mut body = [0, 1, 0, segment, 0, 2, 0, 10].to_vec();
     body.resize(body.len() + 36 * points, 0);
     body
 }
 
-/// Loads a segment. Returns the number of ticks that the check took.
+/// Loads a segment and returns the number of ticks that the check needed.
 fn load(controller: &mut Bench, segment: u8, points: usize) -> usize {
     let body = body(segment, points);
     let (segment, mut checks) = (Segment::parse(&body).expect("a segment"), 0);
@@ -138,7 +138,7 @@ fn j36_a_segment_is_checked_with_its_last_point() {
     }
 }
 
-/// Segment 0 is checked against the friction in use. Later segments may be checked against other friction.
+/// Segment 0 is checked against the present friction. Later segments may be checked against different friction.
 #[test]
 fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     let mut controller = holding();
@@ -151,7 +151,7 @@ fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     assert_eq!(controller.trajectory, TrajectoryState::Stop);
 }
 
-/// The check of a segment is finer than the check of the velocities as a whole, which is used for friction that arrives later.
+/// The check of a segment is more exact than the check of the whole velocity range, which is used for friction that arrives later.
 #[test]
 fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
     let body = body(0, 1);
@@ -162,7 +162,7 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
         let mut controller = holding();
         (controller.parameters.friction_is_table, controller.parameters.friction_is_new) = (table, new);
         for table in &mut controller.parameters.tables {
-            // Bearings at 0 °C.
+            // The bearings are at 0 °C.
             table.temperature = core::array::from_fn(|i| i as f32);
         }
         let mut fast = TrajectoryCheck::new(&controller.config, 10, None);
@@ -175,7 +175,7 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
     }
 }
 
-/// Gravity acts sideways, so that no arm with these limits can be held.
+/// Gravity acts sideways, so that these torque limits cannot hold the arm.
 #[test]
 fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
     for (known, torque_max, taken) in [(false, 0.01, true), (true, 0.01, false), (true, 500.0, true)] {

@@ -7,7 +7,8 @@ use crate::controller::Controller;
 use crate::io::HostEvent;
 use crate::{ControllerState, TrajectoryState};
 
-/// Maximum number of ticks for checking a segment (J-36), and for copying it. Together with the record this is less than 40 ms.
+/// Highest number of ticks for checking a segment (J-36), and for copying a segment. Check, copy and response record together take less
+/// than 40 ms.
 const CHECK_TICKS: usize = 28;
 const COPY_TICKS: usize = 10;
 /// Points that are checked, and points that are copied, in one tick for a short segment.
@@ -15,16 +16,16 @@ const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Takes a segment (J-30, J-36). All points are checked before the first one is copied, so that a refused segment changes nothing.
+    /// Processes a segment (J-30, J-36). All points are checked before the first one is copied, so that a refused segment changes nothing.
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // The host repeats the segment until it is accepted, and forwards no Stop meanwhile. Therefore the segment acts as a Stop, and
-            // is refused in this tick.
+            // The host repeats the segment until the segment is accepted, and does not forward a Stop meanwhile. Therefore the segment acts
+            // as a Stop, and is refused in this tick.
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
-            // This may also happen in the middle of a segment: the change of state has cleared the trajectory.
+            // The state may also change during the processing of a segment. Such a change has cleared the trajectory.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
         // The segment was received before a Stop that has taken effect.
@@ -34,7 +35,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.store.refuse_rest();
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // This may also happen in the middle of a segment.
+        // The upload may also be dropped during the processing of a segment.
         let begun = !first || matches!(self.slice_progress, SliceProgress::PointCopy(_));
         if begun && self.store.dropped() {
             return SliceOutcome::Refused(DataStatus::NotAllowed);
@@ -47,7 +48,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Ok(()) => {
                     self.begin_check(segment);
                     match self.store.refused().filter(|_| !first) {
-                        // The first violation is sufficient, and is kept.
+                        // The first violation is sufficient and stays stored.
                         Some(violation) => self.take_refused(segment, violation, stopped),
                         None => self.check_points(segment, 0, received.plain, stopped),
                     }
@@ -56,7 +57,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Begins the check. Segment 0 begins a trajectory; other segments continue after the points received so far.
+    /// Begins the check. Segment 0 begins a new check. Later segments continue the check after the points received so far.
     fn begin_check(&mut self, segment: &Segment<'_>) {
         let tables = self.parameters.tables_in_use();
         let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
@@ -94,8 +95,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Takes a segment of a trajectory that violates J-36 from a host on a plain line, because such a host cannot handle a refused segment.
-    /// The trajectory will not be executed.
+    /// Accepts a segment of a trajectory that violates J-36, because a host on a plain line cannot handle a refused segment. The trajectory
+    /// will not be executed.
     fn take_refused(&mut self, segment: &Segment<'_>, violation: Violation, stopped: bool) -> SliceOutcome {
         let outcome = self.begin_copy(segment, true, stopped);
         self.violation = Some(violation);

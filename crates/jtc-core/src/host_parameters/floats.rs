@@ -1,4 +1,4 @@
-//! The values of the parameters in use, in the order of their frames, for reading them back (J-54).
+//! Values of the present parameters in the order of the frames, so that a host can read the parameters back (J-54).
 use jtc_dynamics::Origin;
 
 use super::{HostParameters, TABLE_FLOATS};

@@ -1,4 +1,4 @@
-//! The parameters in frames: values in the order of the wire format. A frame is refused if a value is not finite (J-06).
+//! Parameters in frames, with the values in the order of the wire format. A frame is refused if a value is not finite (J-06).
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::{DataStatus, Floats};
 
@@ -9,7 +9,7 @@ use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::parameters::{PidGains, TableOf};
 
 impl HostParameters {
-    /// Takes a model in slices, like [`set_model`](Self::set_model).
+    /// Checks and copies a model from a frame in slices, like [`set_model`](Self::set_model).
     pub(crate) fn take_model(
         &mut self,
         floats: &Floats<'_>,
@@ -23,7 +23,7 @@ impl HostParameters {
         }
     }
 
-    /// Takes gains and model of a stored arm. The gains are checked against the model when a host requests them.
+    /// Uses the gains and the model of a stored arm. The gains are checked against the model when a host requests them.
     pub(crate) fn load(
         &mut self,
         pid: &Floats<'_>,
@@ -49,7 +49,7 @@ impl HostParameters {
         self.set_polynomial(&polynomial, config)
     }
 
-    /// Takes the tables of a frame, in as many ticks as [`take_tables`](Self::take_tables) needs.
+    /// Checks and copies the tables of a frame in the number of ticks that [`take_tables`](Self::take_tables) needs.
     pub(crate) fn take_table(
         &mut self,
         floats: &Floats<'_>,
@@ -82,7 +82,7 @@ fn read_model(floats: &Floats<'_>) -> Result<ArmModel, DataStatus> {
     Ok(model)
 }
 
-/// Returns float `i`. Refuses it if it is NaN, infinite or missing (J-06).
+/// Returns float `i`. Refuses a float that is NaN, infinite or missing (J-06).
 fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
     floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
 }

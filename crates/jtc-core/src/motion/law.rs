@@ -1,4 +1,4 @@
-//! The control law for each joint in each tick: τ = τ_id + τ_pid + τ_fric (J-40 to J-44).
+//! Control law of each joint, computed in each tick: τ = τ_id + τ_pid + τ_fric (J-40 to J-44).
 use jtc_dynamics::Dynamics;
 
 use super::set_values::{Latched, SetValues};
@@ -19,24 +19,24 @@ use crate::{JOINTS, friction, gains, joint_error};
 /// such a torque.
 const CREEPS: f64 = 0.05;
 
-/// Share of the torque limit that the friction of a joint can hold. If less torque than this is missing in addition to the load found, the
-/// load is considered found.
+/// Share of the torque limit that the friction of a joint can hold. If the torque that is missing in addition to the found load is below
+/// this share, the load is considered known.
 const LITTLE: f64 = 0.04;
 
-/// Control mode: determines which parts of the control law act.
+/// Control mode, which determines the active parts of the control law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ControlMode {
     /// Gravity and PID.
     Hold,
-    /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration.
+    /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration are active.
     Follow,
     /// Like `Follow`, while the arm approaches the path. The limits of the path do not apply, because the approach begins at the measured
     /// position.
     Approach,
-    /// An arm that a hand has led comes to rest and is held. Like `Hold`, with friction and inertia at the commanded velocity and
-    /// acceleration.
+    /// An arm that a hand has led comes to rest and is held. This mode is like `Hold`, with additional friction and inertia at the
+    /// commanded velocity and acceleration.
     Rest,
-    /// Gravity, and the torques that let a hand lead the arm (J-25).
+    /// Gravity and the torques for hand guiding are active (J-25).
     Teach,
 }
 
@@ -46,7 +46,7 @@ impl ControlMode {
         matches!(self, Self::Hold | Self::Rest)
     }
 
-    /// Returns `true` if the commanded velocity and acceleration act.
+    /// Returns `true` if the commanded velocity and acceleration affect the torque.
     pub(crate) fn commands_motion(self) -> bool {
         self.moves() || self == Self::Rest
     }
@@ -57,7 +57,7 @@ impl ControlMode {
     }
 }
 
-/// Longest time in which the integral gives back the torque that it had found for a payload after that payload was configured, ms.
+/// Longest time after the configuration of a payload in which the integral releases the torque that it had found for this payload, ms.
 const UNWINDS_MS: u16 = 3_000;
 
 /// Inputs of a tick of the control law.
@@ -76,7 +76,7 @@ pub(crate) struct ControlParameters<'a> {
     pub pid: &'a [PidGains; JOINTS],
     pub polynomial: &'a [[f64; 6]; JOINTS],
     pub table: Option<&'a [TableOf<f32>; JOINTS]>,
-    /// The gains are on trial, so the law monitors the joints for swings (J-71).
+    /// The gains are on trial, so the control law monitors the joints for swings (J-71).
     pub on_trial: bool,
 }
 
@@ -92,11 +92,11 @@ pub(crate) struct ControlLaw {
     /// Joints that yield (J-68, J-70).
     yields: [Option<Yield>; JOINTS],
     yielded: Yielded,
-    /// Load that each joint carries and that the model lacks.
+    /// Load that each joint carries and that the model does not contain.
     loads: [Load; JOINTS],
-    /// The joint whose load is observed in this tick.
+    /// Index of the joint whose load is observed in this tick.
     observed: u8,
-    /// Time left in which the integral gives back the torque that it had found for a payload that is now configured, ms (J-60).
+    /// Remaining time in which the integral releases the torque that it had found for a payload that is now configured, ms (J-60).
     pub(super) unwinds_ms: u16,
 }
 
@@ -122,7 +122,7 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// Like [`Self::change_mode`], but no torque may step: the torque that decelerates an arm is part of the model's torque after the
+    /// Like [`Self::change_mode`], but no torque may step, because the torque that decelerates an arm is part of the model torque after the
     /// change.
     pub(crate) fn change_whole_torque(&mut self) {
         self.transfer.change_model();
@@ -130,12 +130,12 @@ impl ControlLaw {
 
     /// Prepares a change of the model while the arm is held. The transfer is bumpless: no torque may step.
     pub(crate) fn change_model(&mut self) {
-        // The integral holds torque that the last model lacked, and must give it back.
+        // The integral contains torque that was missing in the last model, and must release this torque.
         self.payload_comes();
         self.transfer.change_model();
     }
 
-    /// Changes the gains. The integral keeps as much of its torque as the new gains allow; the remainder is blended out.
+    /// Changes the gains. The integral keeps as much of its torque as the new gains allow. The remainder of the torque is blended out.
     pub(crate) fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
         for j in 0..JOINTS {
             if !self.yields(j) {
@@ -154,7 +154,7 @@ impl ControlLaw {
         (0..JOINTS).all(holds)
     }
 
-    /// Clears the loads: each joint must find its load again.
+    /// Clears the loads, so that each joint must find its load again.
     fn forget_loads(&mut self) {
         self.loads.iter_mut().for_each(Load::forget);
     }
@@ -174,15 +174,15 @@ impl ControlLaw {
                 self.pid[j].reset(0.0);
                 self.loads[j].forget();
                 self.yields[j] = None;
-                // The joint has no integral that could give back torque.
+                // The joint has no integral from which torque must be released.
                 self.unwinds_ms = 0;
             }
         }
         self.transfer.set_just_enabled(latched.just_enabled);
     }
 
-    /// Makes a joint yield, or lower its load, from the next tick on. `set`: commanded position, rad; `inertia`: inertia that the joint
-    /// moves, kg·m²; `led`: the joint comes to rest after Teaching.
+    /// Makes a joint yield, or lower its load, from the next tick on. `set` is the commanded position in rad. `inertia` is the inertia that
+    /// the joint moves, kg·m². `led` means that the joint comes to rest after Teaching.
     // Inlined, so that the compiler knows that the index is in range.
     #[inline(always)]
     pub(crate) fn begin_yield(
@@ -200,11 +200,12 @@ impl ControlLaw {
             }
             return;
         }
-        // The joint releases the commanded torque, not the computed one.
+        // The joint releases the commanded torque, not the computed torque.
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
-        // The integral of a pushed joint has not found a load. The integral of a joint that was led holds the load that Teaching carried.
+        // The integral of a pushed joint has not found a load. After hand guiding, the integral of a joint contains the load that Teaching
+        // carried.
         let load = if lowers {
             Load::bounded(load.torque(torque.pid.i), limits)
         } else if led {
@@ -231,18 +232,18 @@ impl ControlLaw {
         self.yields.iter().flatten().any(|yields| !yields.is_calm())
     }
 
-    /// Ends the reaction at the host's request. Joints that are calm are held again.
+    /// Ends the yields at the host's request. Joints that are calm are held again.
     pub(crate) fn end_yields(&mut self) {
         self.yields.iter_mut().flatten().for_each(Yield::clear);
     }
 
-    /// Moves the spring of a yielding joint along with it. Returns the position to which the spring pulls, rad; `None` if the joint does
-    /// not yield.
+    /// Moves the spring of a yielding joint along with the joint. Returns the position to which the spring pulls, rad. Returns `None` if
+    /// the joint does not yield.
     pub(crate) fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
         self.yields[joint].as_mut().map(|yields| yields.drag(position))
     }
 
-    /// Returns the torque that the joint carries and the model lacks, N·m.
+    /// Returns the torque that the joint carries and that the model does not contain, N·m.
     pub(crate) fn load(&self, joint: usize) -> f64 {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
@@ -271,10 +272,11 @@ impl ControlLaw {
     }
 
     /// Returns `true` if the load of every held joint is known, so that Teaching can carry it. In addition, the position controller must
-    /// make almost no torque. An integral that is still changing, or that gives back torque that is now in the model, has not found the
-    /// load. A person who leans on the arm will let go.
+    /// cause almost no torque. If the integral is still changing, or releases torque that is now in the model, the load is not known yet. A
+    /// person who leans on the arm may let go at any time.
     ///
-    /// If a `contact` may press on the arm, its pressure is not waited for, but a load that was known before must be known again.
+    /// If a `contact` may press on the arm, the controller does not wait for the end of the pressure. A load that was known before must
+    /// nevertheless be known again.
     pub(crate) fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
         let known = |j: usize| {
             let little = LITTLE * config.joints[j].torque_max;
@@ -289,7 +291,7 @@ impl ControlLaw {
         self.loads.iter_mut().for_each(|load| load.set(0.0));
     }
 
-    /// Begins Teaching, which carries the loads that were found (J-25), but no torque that may come from a contact.
+    /// Begins Teaching, which carries the found loads (J-25), but does not carry torque that may come from a contact.
     pub(crate) fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
         let mut loads = [0.0; JOINTS];
         for j in 0..JOINTS {
@@ -302,23 +304,23 @@ impl ControlLaw {
         forget_yields(&mut self.yields);
     }
 
-    /// Records that the payload is added to the model while the arm is held. The missing torque is not a load until the integral has given
-    /// back the torque that it had found for the payload (J-60).
+    /// Records that the payload is added to the model while the arm is held. The missing torque does not count as a load until the integral
+    /// has released the torque that it had found for the payload (J-60).
     pub(crate) fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
         self.forget_loads();
     }
 
-    /// Reduces the mass that Teaching had found by `mass` (kg). The payload was configured in Teaching, and the model carries it from this
-    /// tick on (J-60).
+    /// Reduces the mass that Teaching had found by `mass` (kg). The payload was configured in Teaching, and from this tick on the model
+    /// contains the payload (J-60).
     pub(crate) fn give_way_to_payload(&mut self, mass: f64) {
         if let Some(taught) = &mut self.taught {
             taught.give_way(mass);
         }
     }
 
-    /// Evaluates the answers of the joints in each tick of Teaching. Returns the speeds that follow from their positions, rad/s. `late`:
-    /// delay of this tick, ms.
+    /// Evaluates the answers of the joints in each tick of Teaching. Returns the speeds computed from the joint positions, rad/s. `late` is
+    /// the delay of this tick in ms.
     pub(crate) fn hear_led_joints(&mut self, nodes: &Nodes, late: u16) -> [f32; JOINTS] {
         let (q, mut speeds) = (nodes.positions(), [0.0; JOINTS]);
         let Some(taught) = &mut self.taught else { return speeds };
@@ -340,14 +342,14 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Shifts the position controllers by the sag of the set positions, rad. A sag is not a motion.
+    /// Shifts the position controllers by the sag of the set positions, rad. A sag of a set position does not count as a motion.
     pub(crate) fn sag(&mut self, sag: &[f64; JOINTS]) {
         for (pid, way) in self.pid.iter_mut().zip(sag) {
             pid.shift(*way);
         }
     }
 
-    /// Runs one tick: computes the torque before any limit. Also returns the joint errors that were found (friction table).
+    /// Runs one tick, which computes the torque before any limit. Returns the joint errors that the friction table causes.
     #[inline(always)]
     pub(crate) fn step(
         &mut self,
@@ -360,15 +362,15 @@ impl ControlLaw {
         self.yielded.step();
         let before = self.transfer.begin(&self.torque);
         if before.is_some() && mode != ControlMode::Teach {
-            // These parts of the torque exist only in Teaching.
+            // The load and brake torques exist only in Teaching.
             self.torque.iter_mut().for_each(|torque| (torque.load, torque.brake) = (0.0, 0.0));
         }
         let q = nodes.positions();
         let v = nodes.velocities();
         // J-62: a measurement is compared with the set position that was due at its time.
         let due = set.due(config);
-        // J-40: uses the measured position, and the commanded velocity and acceleration in Operate (zero elsewhere). The torque of the
-        // model acts now, so the commanded motion since the measurement is added to the measured position.
+        // J-40: uses the measured position, and the commanded velocity and acceleration in Operate (zero elsewhere). The model torque acts
+        // at the present time, so the commanded motion since the measurement is added to the measured position.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let any_yields = self.any_yields();
         let lowering = if any_yields {
@@ -426,23 +428,23 @@ impl ControlLaw {
         errors
     }
 
-    /// Observes the load of one joint. The joints take turns.
+    /// Observes the load of one joint. The next tick observes the next joint.
     fn observe_load(&mut self, set: &SetValues, config: &Config) {
         let j = usize::from(self.observed) % JOINTS;
         self.observed = (j as u8 + 1) % JOINTS as u8;
         let speed = set.point.velocity[j].abs();
         let creeps = speed > 0.0 && speed < CREEPS;
-        // While the integral gives back torque that is now in the model, it does not show a load.
+        // While the integral releases torque that is now in the model, the integral does not show a load.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
-            // An integral that has not reached the torque that it must hold has not found the load.
+            // Until the integral has reached the holding torque, the load is not known.
             let found = load.is_known() || (pid.p + pid.d).abs() <= LITTLE * limits.torque_max;
             load.observe(pid.i, found && set.settled(j), limits);
         }
     }
 
-    /// Computes the torque that Teaching adds to the torque of the model (J-25). Parts that change slowly are computed in turns; in such a
-    /// tick the other parts do not change. Returns `true` if all of the torque was computed.
+    /// Computes the torque that Teaching adds to the torque of the model (J-25). Slowly changing parts are computed in separate ticks, in
+    /// which the other parts do not change. Returns `true` if the whole torque was computed.
     #[inline(never)]
     fn teach(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) -> bool {
         let (q, v) = (nodes.positions(), nodes.velocities());
@@ -484,7 +486,7 @@ impl ControlLaw {
         true
     }
 
-    /// Limits the brakes of Teaching to the torque that the other parts leave, so that brakes cause no overload.
+    /// Limits the braking torques of Teaching to the remaining torque within the limits, so that braking does not cause an overload.
     #[inline(never)]
     fn bound_brakes(&mut self, nodes: &Nodes, config: &Config) {
         for (j, torque) in self.torque.iter_mut().enumerate() {
@@ -496,7 +498,7 @@ impl ControlLaw {
     }
 }
 
-/// Ends all yields in place. Assigning an array of `None` would create and copy it, including the space for unused values.
+/// Ends all yields in place. Assigning an array of `None` would create and copy the array, including the space for unused values.
 fn forget_yields(yields: &mut [Option<Yield>; JOINTS]) {
     for yields in yields {
         *yields = None;

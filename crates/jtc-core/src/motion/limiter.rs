@@ -1,4 +1,4 @@
-//! The limits of the control law, each tick, for each joint (J-43).
+//! Applies the limits of the control law to each joint in each tick (J-43).
 use super::law::{ControlLaw, ControlMode, LawInputs};
 use super::set_values::SetValues;
 use crate::bit_codec::bit_codec;
@@ -7,26 +7,27 @@ use crate::{JOINTS, joint_error};
 
 /// Speed in rad/s above which a saturated torque along the motion is not considered part of a catch.
 pub(super) const DRIVEN: f64 = 0.05;
-/// Share of its set velocity below which a joint that comes to rest after Teaching is considered to be stopped by an obstacle.
+/// Share of the set velocity of a joint that comes to rest after Teaching. If the joint is slower, an obstacle is assumed to stop it.
 const LAGS: f64 = 0.7;
-/// Share of the velocity limit from which on the feedback torque may be twice as high, because friction and inertia of the model may be
-/// wrong. If a fast motion meets an obstacle, its torque exceeds the doubled share a few milliseconds later.
+/// Share of the velocity limit at and above which the feedback torque may be twice as high, because friction and inertia of the model may
+/// be wrong. If a fast motion meets an obstacle, its torque exceeds the doubled share a few milliseconds later.
 const FAST: f64 = 0.2;
-/// Number of ticks among the last 100. A joint is considered pushed (J-66) if its feedback torque was above its share in more ticks.
+/// Highest number of ticks, among the last 100, in which the feedback torque of a joint may exceed its share. After more ticks, the joint
+/// is considered pushed (J-66).
 const PUSHED_MS: u16 = 20;
 /// Excess of a joint's speed over the commanded speed, as a share of its velocity limit, and distance that this excess has added, rad. A
-/// joint that exceeds both is considered pushed, even with weak gains: a light joint reaches its over-speed before the torque of such gains
-/// shows the push.
+/// joint that exceeds both limits is considered pushed, even with weak gains. With weak gains, a light joint reaches its over-speed before
+/// the feedback torque shows the push.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 
-/// Counters for each joint: torque at its limit, and feedback torque above its share.
+/// Counters of each joint for ticks with torque at the limit, and for ticks with feedback torque above the share.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
     pushed: [Recent; JOINTS],
     turns: [Turns; JOINTS],
-    /// Number of ticks of this limiter, which starts anew whenever the torque is turned off.
+    /// Number of ticks of this limiter. The number restarts at 0 when the torque is turned off.
     tick: u32,
 }
 
@@ -35,7 +36,7 @@ bit_codec!(Limiter { saturation, pushed, turns, tick });
 /// Findings of a tick for one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Found {
-    /// Set values that exceed their limits, as joint errors. The torque bit means that the torque is NaN.
+    /// Set values that exceed their limits, as joint errors. The torque bit is set if the torque is NaN.
     pub errors: u16,
     /// The computed torque was above its limit for too long (J-43).
     pub overloaded: bool,
@@ -45,7 +46,7 @@ pub(crate) struct Found {
     pub strained: bool,
     /// The joint has settled since it was enabled.
     pub settled: bool,
-    /// The torque jumps from limit to limit, or the swing grows: the position controller is unstable.
+    /// The position controller is unstable, because the torque jumps from limit to limit or a swing grows.
     pub unstable: bool,
 }
 
@@ -56,24 +57,24 @@ impl Found {
     }
 }
 
-/// Result of the limiter, per joint.
+/// Result of the limiter for all joints.
 #[derive(Default)]
 pub(crate) struct Limited {
     /// Torque to command, N·m.
     pub torque: [f64; JOINTS],
     /// Findings of this tick; `None` if no reaction is needed.
     pub found: Option<[Found; JOINTS]>,
-    /// Sag of the set positions of joints whose loads are being caught, rad; `None` if no set position has sagged.
+    /// Sag of the set positions of joints whose loads are being caught, rad. `None` if no set position has sagged.
     pub sag: Option<[f64; JOINTS]>,
 }
 
 impl Limiter {
-    /// Returns the joints whose last torque was above the limit. Their integrals do not change (J-41).
+    /// Returns `true` for each joint whose last torque was above the limit. The integral of such a joint does not change (J-41).
     pub(super) fn saturated(&self) -> [bool; JOINTS] {
         core::array::from_fn(|j| self.saturation[j].saturated)
     }
 
-    /// Clears the counts of a joint.
+    /// Clears the counters of a joint.
     #[inline(always)]
     pub(super) fn forget(&mut self, joint: usize) {
         self.saturation[joint].forget();
@@ -86,9 +87,9 @@ impl Limiter {
         self.turns = Default::default();
     }
 
-    /// Runs one tick: limits the torque that the `law` has computed, and checks torque and set values. While the arm brakes with all
-    /// available torque, an overload is not reported; if a motion is commanded, position error and acceleration are not reported either
-    /// (J-33). For a joint that yields, only a torque of NaN is reported, because its torque is bounded by construction.
+    /// Runs one tick, which limits the torque of the `law` and checks the torque and the set values. While the arm brakes with all
+    /// available torque, an overload is not reported. If a motion is also commanded, position error and acceleration are not reported
+    /// either (J-33). For a joint that yields, only a torque of NaN is reported, because the torque is bounded by construction.
     pub(super) fn step(
         &mut self,
         inputs: &LawInputs<'_>,
@@ -98,11 +99,11 @@ impl Limiter {
         limited: &mut Limited,
     ) {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
-        // This applies only while set values move: an arm at rest yields to a push (J-66).
+        // The exceptions apply only while set values move, because an arm at rest yields to a push (J-66).
         let excused = if braking && mode.moves() {
             joint_error::POSITION_ERROR | joint_error::ACCELERATION
         } else if held_back || mode == ControlMode::Rest {
-            // Path time that slows down adds its own acceleration. An arm that a hand has led may have any acceleration.
+            // If path time slows down, this adds an acceleration to the set values. An arm that a hand has led may have any acceleration.
             joint_error::ACCELERATION
         } else {
             0
@@ -124,7 +125,7 @@ impl Limiter {
             if parameters.on_trial && stands {
                 unstable |= set.catch[j].watch(v[j]);
             }
-            // A torque that accelerates a joint instead of stopping it is neither a catch nor a deceleration.
+            // A torque that accelerates a joint instead of stopping it does not belong to a catch or a deceleration.
             let driven = || computed.signum() * v[j] > DRIVEN;
             let stopping = (catching || set.deceleration[j].is_some()) && !driven();
             let excuses = braking || stopping || yields;
@@ -138,7 +139,7 @@ impl Limiter {
             // A fast motion may use more feedback torque.
             let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
-            // Feedback torque that brakes a moving joint is not a push. Feedback torque on a joint at rest is one.
+            // Feedback torque that brakes a moving joint does not count as a push. Feedback torque on a joint at rest counts as a push.
             let brakes = || stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
             // If an arm that a hand has led hits a person before it is at rest, the joint lags its set values.
             let lags = || {
@@ -152,7 +153,7 @@ impl Limiter {
                 let faster = velocity - due;
                 faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
-            // The distance is checked first, because it hardly ever exceeds its limit.
+            // The distance is checked first, because the distance rarely exceeds its limit.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);

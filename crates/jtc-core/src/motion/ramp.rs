@@ -1,4 +1,4 @@
-//! Bounds of a ramp of path time (J-33): the slopes that keep the arm within its acceleration and torque limits.
+//! Computes the bounds of a ramp of path time (J-33): the slopes at which the arm stays within its acceleration and torque limits.
 use jtc_dynamics::Dynamics;
 
 use super::law::ControlLaw;
@@ -14,13 +14,13 @@ use crate::{DT, JOINTS};
 /// for the position controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
-/// Share of the remaining torque that a stop may use after a hand has led the arm. The position controller makes this torque, and it
-/// overshoots.
+/// Share of the remaining torque that a stop may use after a hand has led the arm. The position controller causes this torque, and the
+/// torque overshoots.
 const STOP_TORQUE: f64 = 0.5;
 /// Least share of the torque limit that a stop uses, even if hardly any torque remains.
 const LEAST_LEFT: f64 = 0.1;
 
-/// The inertia of the arm at the start of a ramp.
+/// Inertia of the arm at the start of a ramp.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathRamp {
     /// Mass matrix, including the rotors.
@@ -30,7 +30,7 @@ pub(crate) struct PathRamp {
 bit_codec!(PathRamp { inertia });
 
 impl PathRamp {
-    /// Begins a ramp of path time. Its bounds depend on the inertia of the arm.
+    /// Begins a ramp of path time. The bounds of the ramp depend on the inertia of the arm.
     pub(crate) fn begin(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         self.inertia = dynamics.mass_matrix(nodes.positions());
         for j in 0..JOINTS {
@@ -48,8 +48,8 @@ impl PathRamp {
         self.inertia[j][k]
     }
 
-    /// Returns the shortest time of a smooth stop of all joints from these velocities (rad/s), ms. The stop uses [`STOP_TORQUE`] of the
-    /// torque that the last torques of the `law` leave within the limits.
+    /// Returns the shortest time of a smooth stop of all joints from these velocities (rad/s), ms. The stop uses the share [`STOP_TORQUE`]
+    /// of the torque that remains within the limits after the last torques of the `law`.
     pub(crate) fn shortest_stop_ms(
         &self,
         law: &ControlLaw,
@@ -67,7 +67,8 @@ impl PathRamp {
         longest
     }
 
-    /// Runs one tick of a clock that changes to another rate, along a ramp that the arm can follow. For `at` and `law` see `slope_bounds`.
+    /// Runs one tick of a clock that changes to another rate, along a ramp that the arm can follow. `slope_bounds` describes `at` and
+    /// `law`.
     pub(crate) fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         if !clock.ramping() {
             clock.slope = 0.0;
@@ -88,8 +89,8 @@ impl PathRamp {
     }
 
     /// Returns the slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The remaining torque of
-    /// each joint is computed from the last torque of the `law`, with all its parts, so a joint that already lags has less. Joints that
-    /// yield do not move along the path, and the rate of path time does not change their torque.
+    /// each joint is computed from the last torque of the `law`, including all parts, so less torque remains for a joint that already lags.
+    /// Joints that yield do not move along the path, and the rate of path time does not change the torque of these joints.
     fn slope_bounds(
         &self,
         at: &SetPoint,
@@ -115,7 +116,7 @@ impl PathRamp {
             let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
-            // No rate of path time helps a joint that does not move along the path.
+            // A change of path time does not relieve a joint that does not move along the path.
             narrow(
                 &mut full,
                 if moves(at.velocity[j]) { (low, high) } else { (low.min(0.0), high.max(0.0)) },
@@ -146,7 +147,7 @@ mod tests {
     use crate::Parameters;
     use crate::motion::JointTorque;
 
-    /// Velocities of joints that are at rest, that are slow enough to be considered at rest, and that move.
+    /// Velocities of joints at rest, of joints that are slow enough to be considered at rest, and of moving joints.
     fn velocities() -> impl Strategy<Value = [f64; JOINTS]> {
         prop::array::uniform6(prop_oneof![Just(0.0), Just(0.02), Just(-0.02), -1.5..1.5f64])
     }
@@ -156,8 +157,8 @@ mod tests {
     }
 
     proptest! {
-        /// A slope within the bounds keeps the acceleration and torque limits; a slope outside does not. A joint at rest that exceeds a
-        /// limit does not prevent path time from continuing at its present rate.
+        /// A slope within the bounds keeps the acceleration and torque limits. A slope outside the bounds violates a limit. A joint at rest
+        /// that exceeds a limit does not prevent path time from continuing at its present rate.
         #[test]
         fn j33_the_bounds_of_a_slope_are_where_the_arm_reaches_its_limits(
             velocity in velocities(),

@@ -1,6 +1,6 @@
-//! Torque margin for a motion from the held position. This margin determines how soon the arm can reach the first point of a path (J-34),
-//! and the acceleration and speed of a jog (J-58). Gravity and the load found are taken into account at both ends of the motion, friction
-//! at its top speed.
+//! Computes the torque margin for a motion from the held position. This margin determines how soon the arm can reach the first point of a
+//! path (J-34), and the acceleration and speed of a jog (J-58). Gravity and the found load are taken into account at both ends of the
+//! motion. Friction is taken into account at the top speed.
 use jtc_dynamics::sqrt;
 
 use super::Motion;
@@ -9,23 +9,23 @@ use crate::{JOINTS, jog};
 
 /// Highest share of a torque limit that an approach uses. The feedback of a fast approach needs up to a fifth of the limit.
 const APPROACH_TORQUE: f64 = 0.8;
-/// Highest share of a torque limit that a jog uses. The rest is for the feedback, and for the return from a position with a higher holding
-/// torque.
+/// Highest share of a torque limit that a jog uses. The remaining share is for the feedback, and for the return from a position with a
+/// higher holding torque.
 const JOG_TORQUE: f64 = 0.92;
-/// Share of the remaining torque that a jog uses. An approach uses it if holding the arm already needs nearly all of the limit.
+/// Share of the remaining torque that a jog uses. An approach uses this share if holding the arm already needs nearly the whole torque
+/// limit.
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
 const LONGER_MS: f64 = 2_000.0;
-/// Top speed of a minimum-jerk polynomial, in distances per duration, and its highest acceleration, in distances per square of the
-/// duration.
+/// Top speed of a minimum-jerk polynomial as a multiple of distance/duration, and highest acceleration as a multiple of distance/duration².
 const TOP_SPEED: f64 = 1.875;
 const TOP_ACCELERATION: f64 = 5.774;
 
 /// Time in which a jogged joint can come to rest with its share of the remaining torque, s.
 const REST_S: f64 = 0.3;
-/// Speed of a slow jog, rad/s. If friction leaves no torque at the requested speed, it may leave some at this speed.
+/// Speed of a slow jog, rad/s. If friction leaves no torque at the requested speed, some torque may remain at this speed.
 const CREEP: f64 = 0.02;
-/// Speed from which on a joint slides and the full friction of the model acts, rad/s.
+/// Speed at and above which a joint slides and the full friction of the model acts, rad/s.
 const SLIDES: f64 = 0.1;
 /// Highest speed that is considered zero, rad/s.
 const NO_SPEED: f64 = 1e-3;
@@ -39,7 +39,7 @@ const LEAST_ACCELERATION: f64 = 0.02;
 /// Limits of a jog that follow from the remaining torque.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JogRoom {
-    /// Velocities, rad/s: the requested velocities, or a share of them.
+    /// Velocities, rad/s, which are the requested velocities or a share of the requested velocities.
     pub velocity: [f64; JOINTS],
     /// Highest accelerations, rad/s².
     pub acceleration: [f64; JOINTS],
@@ -47,8 +47,8 @@ pub(crate) struct JogRoom {
 
 impl Motion {
     /// Returns the time for the approach from the held position to `to` (rad), ms. The approach takes the time of a ramp, or longer if the
-    /// velocity, acceleration or torque limits require it. Returns `None` if the torque limits require over 2 s more than the other limits.
-    /// Uses the inertia of a ramp that begins here.
+    /// velocity, acceleration or torque limits require more time. Returns `None` if the torque limits require over 2 s more than the other
+    /// limits. Uses the inertia of a ramp that begins at the held position.
     pub(crate) fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
         let config = inputs.config;
         let from = &self.set.point.position;
@@ -59,7 +59,7 @@ impl Motion {
             shortest = shortest.max(1_000.0 * sqrt(TOP_ACCELERATION * way.abs() / limits.acceleration_max));
         }
         let standing = [from, to].map(|q| self.standing(q, inputs));
-        // Returns the time that is long enough if the friction is that of an approach of `ms` milliseconds.
+        // Returns a sufficient time for the approach, with the friction of an approach of `ms` milliseconds.
         let enough = |ms: f64| {
             let friction = compensation(inputs, &way.map(|way| 1_000.0 * TOP_SPEED * way / ms)).0;
             let times = (0..JOINTS).map(|j| {
@@ -88,7 +88,7 @@ impl Motion {
     }
 
     /// Returns the velocities and accelerations that the limits of torque and tool speed allow for a jog at the `wanted` velocities
-    /// (rad/s). Returns `None` if a torque limit allows no motion. Uses the inertia of a ramp that begins here.
+    /// (rad/s). Returns `None` if a torque limit allows no motion. Uses the inertia of a ramp that begins at the held position.
     pub(crate) fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
         let config = inputs.config;
         let wanted = &if config.tool_speed_max > 0.0 { self.slowed(wanted, inputs) } else { *wanted };
@@ -115,9 +115,9 @@ impl Motion {
         Some(JogRoom { velocity, acceleration: core::array::from_fn(|j| share * hardest(j)) })
     }
 
-    /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The contributions of all joints to the speed of the flange
-    /// are added up without their signs, because joints whose motions cancel out do not accelerate in the same way. Joints that become
-    /// faster share the speed that the other joints leave; the other joints become slower or keep their speed.
+    /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The absolute contributions of all joints to the flange
+    /// speed are added, because joints whose motions cancel out may accelerate differently. Joints that become faster share the flange
+    /// speed that remains. The other joints become slower or keep their speed.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
         // Distance of the flange from the axis of each joint, m.
@@ -135,8 +135,8 @@ impl Motion {
             let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
             v.abs().max(after.abs())
         });
-        // Joints that must not become faster use up their present speed. If less remains for the other joints, more joints may belong to
-        // this group.
+        // The present speed of joints that must not become faster is subtracted. If less speed remains for the other joints, more joints
+        // may belong to this group.
         let mut rising = share;
         for _ in 0..JOINTS {
             let (mut slower, mut faster) = (0.0, 0.0);
@@ -156,8 +156,7 @@ impl Motion {
         })
     }
 
-    /// Returns the share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of the remaining
-    /// torque.
+    /// Returns the share of the `wanted` velocities (rad/s) from which the joints can come to rest with a share of the remaining torque.
     fn jog_speed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> f64 {
         let needed = |j: usize| {
             (0..JOINTS).map(|k| self.ramp.coupling(j, k).abs() * wanted[k].abs()).sum::<f64>() / REST_S
@@ -165,8 +164,8 @@ impl Motion {
         self.least_share(wanted, needed, inputs)
     }
 
-    /// Returns the share (0..1) of the torque `needed` by each joint (N·m) that fits into [`SHARE_OF_REST`] of the torque that a jog at
-    /// `velocity` (rad/s) leaves.
+    /// Returns the share (0..1) of the torque `needed` by each joint (N·m) that is available. The available torque is the share
+    /// [`SHARE_OF_REST`] of the torque that remains during a jog at `velocity` (rad/s).
     fn least_share(
         &self,
         velocity: &[f64; JOINTS],
@@ -180,9 +179,9 @@ impl Motion {
         })
     }
 
-    /// Returns the torque that a jog at `velocity` (rad/s) leaves within each torque limit, N·m, at the present position and at the
-    /// position at which it comes to rest. Friction is subtracted for both directions, because a joint that was lowered must be raised
-    /// again.
+    /// Returns the torque that remains within each torque limit during a jog at `velocity` (rad/s), N·m. The present position and the
+    /// position at the end of the jog are both taken into account. Friction is subtracted for both directions, because a joint that was
+    /// lowered must be raised again.
     fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let config = inputs.config;
         let here = &self.set.point.position;
@@ -200,7 +199,7 @@ impl Motion {
             let [held, held_there] = standing.map(|torque| torque[j]);
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
-            // A joint that moves towards a lower holding torque may move as long as any torque is available for it.
+            // A joint that moves towards a lower holding torque may move as long as any torque is available.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;
@@ -209,7 +208,7 @@ impl Motion {
     }
 
     /// Returns the torques that hold the arm at `q` (rad): gravity plus the load found, or plus the integral if that sum is larger. While
-    /// the integrals give back the torque of a payload that is now in the model, returns gravity alone.
+    /// the integrals release the torque of a payload that is now in the model, returns gravity alone.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
         if self.law.unwinds_ms > 0 {
@@ -223,7 +222,7 @@ impl Motion {
     }
 }
 
-/// Returns the highest torque of a joint at the ends of a motion, N·m.
+/// Returns the highest torque of a joint at the two ends of a motion, N·m.
 fn highest(torques: &[[f64; JOINTS]; 2], j: usize) -> f64 {
     torques.iter().fold(0.0, |most: f64, torque| most.max(torque[j].abs()))
 }

@@ -11,17 +11,17 @@ use crate::nodes::Nodes;
 use crate::path::PathClock;
 use crate::{DT, JOINTS};
 
-/// Commanded motion of the arm, including joints that have not come to rest yet. HoldPos steps it by [`hold`](Self::hold), Operate by
-/// [`approach`](Self::approach) and [`follow`](Self::follow).
+/// Commanded motion of the arm, including joints that have not come to rest yet. In HoldPos, [`hold`](Self::hold) steps the motion. In
+/// Operate, [`approach`](Self::approach) and [`follow`](Self::follow) step the motion.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SetValues {
-    /// The set values of this tick.
+    /// Set values of this tick.
     pub point: SetPoint,
     /// Set values of the last ticks (J-62).
     pub commanded: Commanded,
     /// The joint is enabled and its set position is latched.
     pub(super) holding: [bool; JOINTS],
-    /// The joint is marked as absent (J-53), so it need not be held.
+    /// The joint is marked as absent (J-53), so the controller does not need to hold it.
     absent: [bool; JOINTS],
     /// Joints whose set values have been restarted from the measured motion since the last tick.
     found_moving: [bool; JOINTS],
@@ -29,7 +29,7 @@ pub(crate) struct SetValues {
     pub(super) catch: [Catch; JOINTS],
     /// Joints that decelerate to rest.
     pub(super) deceleration: [Option<Deceleration>; JOINTS],
-    /// The joints decelerate because a hand has led them.
+    /// The joints decelerate after a hand has led the arm.
     led: bool,
     /// The arm is jogged (J-58).
     jog: Option<Jog>,
@@ -38,7 +38,7 @@ pub(crate) struct SetValues {
 bit_codec!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog });
 
 impl SetValues {
-    /// Releases all joints: no joint is held, and the set position equals the measured one.
+    /// Releases all joints. No joint is held, and the set position equals the measured position.
     pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog } = self;
         *point = SetPoint::still(*nodes.positions());
@@ -50,11 +50,11 @@ impl SetValues {
         *jog = None;
     }
 
-    /// Restarts the set values at rest at `position`, for any motion that follows.
+    /// Restarts the set values at rest at `position`, so that any motion can follow.
     pub(crate) fn begin_at(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
         self.commanded.rest(position);
-        // J-63: joints do not stop because their set values restart, even less a joint that had not followed them.
+        // J-63: the restart of the set values does not stop a joint, in particular a joint that had not followed its set values.
         self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
         self.led = false;
@@ -67,19 +67,19 @@ impl SetValues {
         self.commanded.rest(nodes.positions());
     }
 
-    /// Begins the next tick. Returns the joints whose set values were restarted in the last tick. The restart did not change their motion:
-    /// the set values continued the measured motion.
+    /// Begins the next tick. Returns the joints whose set values were restarted in the last tick. The restart did not change the motion of
+    /// these joints, because the new set values began with the measured motion.
     pub(crate) fn next_tick(&mut self) -> [bool; JOINTS] {
         self.commanded.next_tick();
         core::mem::take(&mut self.found_moving)
     }
 
-    /// Returns the positions (rad) that are due in the measurement of this tick (J-62).
+    /// Returns the commanded positions (rad) for the time of the measurement of this tick (J-62).
     pub(crate) fn due(&self, config: &Config) -> &[f64; JOINTS] {
         self.commanded.position(config.delay_ticks)
     }
 
-    /// Sets the joint velocities of the jog, rad/s, and its highest accelerations, rad/s².
+    /// Sets the joint velocities (rad/s) and the highest joint accelerations (rad/s²) of the jog.
     pub(crate) fn jog(&mut self, wanted: &[f64; JOINTS], acceleration: &[f64; JOINTS], config: &Config) {
         let jog = self.jog.get_or_insert_with(Jog::begin);
         jog.command(wanted, acceleration, &self.point.position, config);
@@ -90,7 +90,7 @@ impl SetValues {
         self.jog.as_mut().is_some_and(Jog::ends)
     }
 
-    /// Runs one tick of a jog. `ramp` advances its clock for the commanded set values.
+    /// Runs one tick of a jog. `ramp` advances the clock of the jog for the commanded set values.
     pub(crate) fn jog_on(&mut self, config: &Config, ramp: impl FnOnce(&SetPoint, &mut PathClock)) {
         let Some(jog) = &mut self.jog else { return };
         jog.step(&mut self.point, config, ramp);
@@ -116,7 +116,7 @@ impl SetValues {
         self.jog.as_ref().is_some_and(Jog::goes_on)
     }
 
-    /// Returns `true` until a jogged arm has come to rest.
+    /// Returns `true` from the start of a jog until the arm has come to rest.
     pub(crate) fn jogging(&self) -> bool {
         self.jog.is_some()
     }
@@ -127,13 +127,13 @@ impl SetValues {
     }
 
     /// Begins to hold the arm at its measured position. An arm that moves because a hand has led it first comes to rest within `length_ms`.
-    /// Such an arm is caught like a falling load.
+    /// A moving arm is caught like a falling load.
     pub(crate) fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);
         let moving = velocity.iter().any(|&v| moves(v));
         for j in 0..JOINTS {
-            // Joints that are enabled later begin separately.
+            // Each joint that is enabled later begins separately.
             self.deceleration[j] = None;
             if moving && self.holding[j] {
                 let led = Deceleration::led(from[j], velocity[j], length_ms, &config.joints[j]);
@@ -146,7 +146,7 @@ impl SetValues {
         }
     }
 
-    /// Returns `true` when the joints that a hand has led have come to rest. From then on, a joint that swings may need to be caught like a
+    /// Returns `true` when the joints that a hand has led have come to rest. After that, a joint that swings may need to be caught like a
     /// load.
     pub(crate) fn led_to_rest(&mut self, config: &Config) -> bool {
         self.led = self.deceleration.iter().any(Option::is_some);
@@ -171,7 +171,7 @@ impl SetValues {
         self.found_moving[j] = true;
     }
 
-    /// Returns the joints that move, according to their set values or their measurements.
+    /// Returns `true` for each joint that moves according to its set value or its measurement.
     pub(crate) fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
         core::array::from_fn(|j| moves(self.point.velocity[j]) || moves(nodes.velocities()[j]))
     }
@@ -182,8 +182,8 @@ impl SetValues {
         self.holding = [true; JOINTS];
     }
 
-    /// Moves the set position of a yielding joint to the position to which its spring pulls, rad. This change of the set values is not a
-    /// motion.
+    /// Moves the set position of a yielding joint to the position to which its spring pulls, rad. This change of the set values does not
+    /// count as a motion.
     pub(crate) fn lead(&mut self, j: usize, position: f64) {
         (self.point.position[j], self.point.velocity[j], self.point.acceleration[j]) = (position, 0.0, 0.0);
         self.commanded.begin(j, position, 0.0, 0);
@@ -191,7 +191,7 @@ impl SetValues {
         self.found_moving[j] = true;
     }
 
-    /// Returns `true` if the joint has come to rest, within its torque limit, at any time since it was enabled.
+    /// Returns `true` if the joint has come to rest within its torque limit at least once since it was enabled.
     pub(crate) fn settled(&self, joint: usize) -> bool {
         self.catch[joint].settled()
     }
@@ -204,9 +204,9 @@ impl SetValues {
             && !self.catch.iter().any(Catch::busy)
     }
 
-    /// Latches the set position of joints that have just been enabled, and brings those of them to rest that move. The set values of joints
-    /// that are not enabled follow the measurements, without torque. Returns the joints that were held before, and those that have just
-    /// been enabled.
+    /// Latches the set positions of joints that have just been enabled, and brings moving joints among these to rest. The set values of
+    /// joints that are not enabled follow the measurements without torque. Returns the joints that were already held, and the joints that
+    /// have just been enabled.
     pub(crate) fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
         let (measured, velocity) = (nodes.positions(), nodes.velocities());
         let enabled = core::array::from_fn(|j| nodes.node(j).enabled());
@@ -228,7 +228,7 @@ impl SetValues {
                     self.decelerate(j, falling, config);
                 }
             } else if another {
-                // The load of this joint moves when the load of another joint moves.
+                // If the load of another joint moves, the load of this joint moves as well.
                 self.catch[j] = Catch::begin(config);
             }
         }
@@ -250,8 +250,8 @@ impl SetValues {
         }
     }
 
-    /// Runs one tick on the path or of the approach. The full-speed values `at` are scaled by the rate of path time and its slope (1/s)
-    /// (J-33).
+    /// Runs one tick on the path or during the approach. The full-speed values `at` are scaled with the rate of path time and the slope
+    /// (1/s) of the rate (J-33).
     pub(crate) fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
         self.point.position = at.position;
         for j in 0..JOINTS {
@@ -260,8 +260,8 @@ impl SetValues {
         }
     }
 
-    /// Moves the set position of a joint whose load is being caught towards the joint, by as much as the torque exceeds the limit
-    /// (`excess`, N·m) at a position error of `error` (rad). Returns the step, rad.
+    /// Moves the set position of a joint whose load is being caught towards the measured position. The step depends on the torque above the
+    /// limit (`excess`, N·m) and on the position error (`error`, rad). Returns the step, rad.
     pub(crate) fn sag(&mut self, j: usize, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         let step = self.catch[j].sag(excess, kp, error, limits);
         self.point.position[j] += step;
@@ -273,8 +273,8 @@ impl SetValues {
     }
 }
 
-/// Returns the set values of the approach from a held position to a point, at the fraction `u` (0..1) of `length_ms`: a minimum-jerk
-/// (fifth-order) polynomial.
+/// Returns the set values of the approach from a held position to a point at the fraction `u` (0..1) of `length_ms`. The approach is a
+/// minimum-jerk (fifth-order) polynomial.
 pub(crate) fn approach(from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) -> SetPoint {
     let (rest, length) = (1.0 - u, length_ms * DT);
     let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
@@ -291,7 +291,7 @@ pub(crate) fn approach(from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_
 /// Result of [`SetValues::latch`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Latched {
-    /// Joints that were held before and still are.
+    /// Joints that were already held and are still held.
     pub held: [bool; JOINTS],
     /// Joints that were latched in this tick.
     pub just_enabled: [bool; JOINTS],

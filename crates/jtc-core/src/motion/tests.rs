@@ -1,11 +1,11 @@
-//! Set values, position hold, and coming to rest (J-40 to J-44).
+//! Tests of the set values, of the position hold, and of joints that come to rest (J-40 to J-44).
 use super::*;
 use crate::DT;
 use crate::catch::Catch;
 use crate::deceleration::Deceleration;
 use crate::interpolation::SetPoint;
 
-/// An arm that holds these joints.
+/// Returns the motion of an arm that holds these joints.
 fn holding(joints: [bool; JOINTS]) -> Motion {
     let mut motion = Motion::default();
     motion.set.holding = joints;
@@ -29,7 +29,8 @@ fn j34_on_the_approach_velocity_and_acceleration_are_the_derivatives_of_the_posi
     assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
-/// If a ramp to rest were begun here, the torque limits would not apply while the arm is at rest, and no motion could begin.
+/// The arm must be held at once. During a ramp to rest, the torque limits would not apply although the arm is at rest, and no motion could
+/// begin.
 #[test]
 fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());
@@ -55,7 +56,7 @@ fn j33_on_a_ramp_of_path_time_velocity_and_acceleration_are_those_of_the_scaled_
     let at = SetPoint { position: [0.5; JOINTS], velocity: [1.2; JOINTS], acceleration: [-3.0; JOINTS] };
     let mut motion = Motion::default();
     motion.set.follow(&at, 0.5, -4.0);
-    // q(s(t)): q'·ṡ, and q''·ṡ² + q'·s̈.
+    // For q(s(t)), the velocity is q'·ṡ and the acceleration is q''·ṡ² + q'·s̈.
     assert_eq!((motion.set.point.position, motion.set.point.velocity), (at.position, [0.6; JOINTS]));
     assert!(motion.set.point.acceleration.iter().all(|a| (a - (-0.75 - 4.8)).abs() < 1e-12));
 }
@@ -107,7 +108,7 @@ fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     }
 }
 
-/// Joint 4 is found at this velocity (rad/s), enabled or not, while the arm holds the other joints.
+/// Returns the motion after joint 4 was measured at this velocity (rad/s), enabled or not, while the arm holds the other joints.
 fn latched(held: bool, enabled: bool, velocity: f64) -> Motion {
     let (config, at, off) = (Config::avena(), [0.3; JOINTS], 3);
     let mut velocities = [0.0; JOINTS];
@@ -127,10 +128,11 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
     for (held, enabled, velocity, follows, catches, falls) in [
         (true, true, 0.0, false, false, false),
         (true, true, 0.5, false, false, false),
-        // Just enabled: the joint is latched at its measured position. Its load moves the loads of the other joints.
+        // The joint was just enabled, so it is latched at its measured position. The load of this joint moves the loads of the other
+        // joints.
         (false, true, 0.0, true, true, false),
         (false, true, 0.5, true, true, true),
-        // Not enabled, or not any more: the set values follow the joint.
+        // If the joint is not enabled, or is not enabled any more, the set values follow the joint.
         (false, false, 0.0, true, false, false),
         (false, false, 0.5, true, false, false),
         (true, false, 0.5, true, false, false),
@@ -152,7 +154,7 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
 #[test]
 fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
-        // A single moving joint is sufficient: all joints decelerate.
+        // If a single joint moves, all joints decelerate.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
         let mut motion = holding([true, true, true, false, true, true]);
         motion.set.hold_measured(&nodes, 200.0, &Config::avena());
@@ -191,7 +193,7 @@ fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     motion.set.begin_at(&[0.1; JOINTS]);
     motion.release(&nodes);
     assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
-    // J-62: the joint has no position error either.
+    // J-62: the position error of the joint is also zero.
     assert_eq!(motion.set.due(&Config::avena()), &[0.3; JOINTS]);
     assert_eq!((motion.set.holding, motion.law.torque), Default::default());
     assert!(!motion.set.catch[1].busy());

@@ -1,4 +1,4 @@
-//! The parts of the torque of one joint.
+//! Parts of the torque of one joint.
 use crate::bit_codec::bit_codec;
 use crate::pid::PidTorque;
 
@@ -21,7 +21,7 @@ bit_codec!(JointTorque { model, pid, friction, load, brake, blend });
 impl JointTorque {
     /// Returns the sum of all parts except the model.
     pub(crate) fn correction(&self) -> f64 {
-        // Two partial sums have a shorter latency than one.
+        // Two partial sums have a shorter latency than one long sum.
         (self.pid.sum() + self.friction) + (self.load + self.brake + self.blend)
     }
 

@@ -1,4 +1,4 @@
-//! Bumpless transfer: torque steps at a change of state, of the model or at enabling are blended out (J-25, J-44).
+//! Bumpless transfer, which blends out the torque steps at a change of state, at a change of the model, and at enabling (J-25, J-44).
 use super::torque::JointTorque;
 use crate::JOINTS;
 use crate::bit_codec::{BitCodec, BitSink, BitSource, bit_codec};
@@ -9,7 +9,7 @@ use crate::nodes::Nodes;
 /// Time in which the torque of a joint that begins to yield falls, ms.
 const FALL_MS: u16 = 10;
 
-/// Part of the last torque that the next torque must continue without a step.
+/// Parts of the last torque that the next torque must continue without a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
     /// All parts except the model.
@@ -30,7 +30,7 @@ impl Continued {
 /// Last torque, if the next torque must continue it.
 pub(super) type Before = Option<(Continued, [f64; JOINTS])>;
 
-/// Steps that are being blended out.
+/// Torque steps that are being blended out.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Transfer {
     /// Step that is blended out, N·m, and the time since its start.
@@ -40,9 +40,9 @@ pub(super) struct Transfer {
     falls: [bool; JOINTS],
     /// Time left until all steps are blended out, ms.
     left_ms: u16,
-    /// Joints that yield from this tick on. Their torque falls within [`FALL_MS`].
+    /// Joints that yield from this tick on. The torque of these joints falls within [`FALL_MS`].
     yields: [bool; JOINTS],
-    /// Joints that were latched in this tick. Their torque begins at the torque of the model.
+    /// Joints that were latched in this tick. The torque of these joints begins at the torque of the model.
     just_enabled: [bool; JOINTS],
     /// Part of the last torque that the next torque must continue.
     next: Option<Continued>,
@@ -61,17 +61,17 @@ impl BitCodec for Continued {
 }
 
 impl Transfer {
-    /// Prepares a change of the control mode: only the torque of the model may step.
+    /// Prepares a change of the control mode, at which only the torque of the model may step.
     pub(super) fn change_mode(&mut self) {
         self.next = Some(Continued::Correction);
     }
 
-    /// Prepares a change of the model: no torque may step.
+    /// Prepares a change of the model, at which no torque may step.
     pub(super) fn change_model(&mut self) {
         self.next = Some(Continued::Everything);
     }
 
-    /// Prepares the yield of a joint from the next tick on: only the torque of the model may step, and excess torque falls within
+    /// Prepares the yield of a joint from the next tick on. Only the torque of the model may step, and excess torque falls within
     /// [`FALL_MS`] (J-68).
     #[inline(always)]
     pub(super) fn begin_yield(&mut self, joint: usize) {
@@ -148,7 +148,7 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Returns the blended torque in each tick after a change of state in which the last torque was `last`.
+    /// Returns the blended torque in each tick after a change of state. `last` was the torque before this change.
     fn blended(transfer: &mut Transfer, last: f64) -> [f64; JOINTS] {
         let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);
@@ -157,8 +157,8 @@ mod tests {
         torque.map(|torque| torque.blend)
     }
 
-    /// The torque of a joint that begins to yield falls at once. The torque of the other joints is blended as at any change. No torque
-    /// steps.
+    /// The torque of a joint that begins to yield falls at once. The torque of the other joints is blended as for any change of state. No
+    /// torque steps.
     #[test]
     fn j44_j68_the_torque_of_a_joint_that_begins_to_yield_falls_within_10_ms() {
         let mut transfer = Transfer::default();

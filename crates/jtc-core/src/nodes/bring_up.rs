@@ -1,18 +1,18 @@
-//! The frame of each tick: Move, or a frame that brings up a node (J-12, J-20).
+//! Selects the frame of each tick: a Move, or a frame for the bring-up of a node (J-12, J-20).
 use jtc_bus::{Frame, NodeState, Request, Target};
 
 use super::{GRIPPER, Goal, Node, Nodes};
 use crate::config::Config;
 use crate::{JOINTS, NODES};
 
-/// Ticks between two frames that replace a Move (J-12: at most one tick of four).
+/// Number of Moves between two frames that replace a Move (J-12: at most one tick of four).
 const MOVES_BETWEEN: u8 = 3;
 /// Like [`MOVES_BETWEEN`], while torque is on and only the gripper needs such a frame.
 const MOVES_ASIDE: u8 = 19;
 
 impl Nodes {
-    /// Creates the frame of this tick (J-12). `must_move`: this frame must be a Move, because it is the first one after an error or after
-    /// the torque was taken away.
+    /// Creates the frame of this tick (J-12). `must_move` means that this frame must be a Move, because it is the first frame after an
+    /// error or after the removal of the torque.
     pub(crate) fn frame(
         &mut self,
         config: &Config,
@@ -33,7 +33,7 @@ impl Nodes {
 
     fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
         if goal == Goal::Enabled && self.all().iter().all(Node::wants_nothing_enabled) {
-            // Nearly every tick with torque returns here.
+            // Nearly every tick with torque returns at this point.
             return None;
         }
         let present = self.present();
@@ -58,7 +58,7 @@ impl Nodes {
             // A frame for the gripper alone is sent rarely, so that nearly every tick sends the torque of the arm (J-23).
             return None;
         }
-        // Enabled nodes refuse a configuration. These nodes must be disabled, so they come first.
+        // Enabled nodes refuse a configuration. Therefore the controller first disables such nodes.
         let to_disable = self
             .nodes
             .iter()
@@ -80,7 +80,7 @@ impl Nodes {
     fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
         let mut target = [Target::NoChange; NODES];
         for (node, target) in self.joints().iter().zip(&mut target) {
-            // J-16: a falling arm is not enabled, because that would stop it with a jolt.
+            // J-16: a falling arm is not enabled, because enabling would stop the arm with a jolt.
             let request = node.request(goal);
             let held_back = request == Target::Enable && !self.may_enable(config);
             *target = if held_back { Target::NoChange } else { request };

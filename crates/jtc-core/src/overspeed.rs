@@ -1,24 +1,24 @@
-//! Measured over-speed of a joint under torque (J-35), which no check of commanded values can detect.
+//! Detects the measured over-speed of a joint with torque (J-35), which checks of commanded values cannot detect.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::nodes::Nodes;
 use crate::{JOINTS, joint_error};
 
-/// Time for which each joint has been above its threshold.
+/// Time for which the speed of each joint has been above its threshold.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct OverSpeed {
-    /// Consecutive measurements above the threshold, per joint.
+    /// Number of consecutive measurements above the threshold for each joint.
     ticks: [u16; JOINTS],
 }
 
 bit_codec!(OverSpeed { ticks });
 
 impl OverSpeed {
-    /// Returns the joint errors of this tick: joints whose measured speed has been above [`Config::overspeed_factor`] times their limit for
-    /// [`Config::overspeed_ms`]. Only measurements that came in this tick are evaluated: a missing or unusable answer neither adds to the
-    /// time nor ends it. Joints that are not enabled have no torque that could be taken away.
+    /// Returns the joint errors of this tick. A joint has an error if its measured speed has been above [`Config::overspeed_factor`] times
+    /// its limit for [`Config::overspeed_ms`]. Only measurements that came in this tick are evaluated, so a missing or unusable answer does
+    /// not change the time. Joints that are not enabled are ignored, because these joints have no torque that could be removed.
     pub(crate) fn watch(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
-        // Uses the velocity in the joint's answer, not a predicted one. NaN is above the threshold.
+        // Uses the velocity in the answer of the joint, not a predicted velocity. NaN counts as above the threshold.
         let within = |j: usize| {
             let threshold = config.overspeed_factor * config.joints[j].velocity_max;
             nodes.node(j).report.velocity.abs() <= threshold
@@ -78,7 +78,7 @@ mod tests {
         }
     }
 
-    /// If no time is allowed, an over-speed is an error at once, but a slow joint has no error.
+    /// If the allowed time is zero, an over-speed is an error at once, but a slow joint has no error.
     #[test]
     fn j35_no_time_at_all_is_a_setting_too() {
         let config = Config { overspeed_ms: 0, ..Config::avena() };

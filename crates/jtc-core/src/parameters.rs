@@ -1,4 +1,4 @@
-//! Parameters that the host sends in addition to commands: model, gains and friction.
+//! Parameters (model, gains and friction) that the host sends in addition to commands.
 use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
@@ -18,7 +18,7 @@ pub struct PidGains {
     pub int_max: f64,
 }
 
-/// Friction table of one joint: rows are velocities.
+/// Friction table of one joint, in which each row belongs to a velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableOf<T> {
     /// Velocities, rad/s, strictly increasing.
@@ -33,13 +33,13 @@ pub struct TableOf<T> {
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum Friction {
-    /// Coefficients c0..c5 of each joint, ascending. With c4 = 0 the torque does not depend on the temperature.
+    /// Coefficients c0..c5 of each joint, in ascending order. With c4 = 0 the torque does not depend on the temperature.
     Polynomial([[f64; 6]; JOINTS]),
-    /// A table for each joint.
+    /// One friction table for each joint.
     Table([TableOf<f32>; JOINTS]),
 }
 
-/// Parameters from the host, or the defaults (section 7).
+/// Parameters from the host, or the default parameters (section 7).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters {
     /// Kinematics and masses.

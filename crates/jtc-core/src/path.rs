@@ -1,11 +1,11 @@
-//! Time along the path: pause, stop and resume without leaving the path (J-33). A trajectory is a path with a time parameterisation
-//! (Bobrow, Dubowsky and Gibson 1985; Pham and Pham 2018). This module changes only the rate.
+//! Controls the time along the path, so that pause, stop and resume do not leave the path (J-33). A trajectory is a path with a time
+//! parameterisation (Bobrow, Dubowsky and Gibson 1985; Pham and Pham 2018). This module changes only the rate of path time.
 //!
-//! The *rate* is path time in seconds per second; the change of the rate is the *slope* (1/s). A resume takes as long as the limits
-//! require. A pause or a stop ends within a configured time. Each begins along an S-shaped ramp with a margin to the limits. If that would
-//! take too long, it uses all available torque. Then the slope is what the arm can achieve at its torque limits, which are computed
-//! including the feedback torque, so that the set values never run ahead of an arm that cannot follow (time scaling under torque limits,
-//! Dahl and Nielsen 1990).
+//! The *rate* is path time in seconds per second. The change of the rate is the *slope* (1/s). A resume takes as long as the limits
+//! require. A pause or a stop ends within a configured time. A pause or a stop begins along an S-shaped ramp with a margin to the limits.
+//! If this ramp would take too long, the pause or stop uses all available torque. In this case the slope is the slope that the arm can
+//! achieve at its torque limits, including the feedback torque. So the set values do not advance faster than the arm can follow (time
+//! scaling under torque limits, Dahl and Nielsen 1990).
 use jtc_dynamics::sqrt;
 
 use crate::DT;
@@ -22,9 +22,9 @@ pub(crate) struct PathClock {
     pub slope: f64,
     /// The target rate: 0, or the speed override (J-57).
     target: f64,
-    /// Ticks since standstill was requested.
+    /// Number of ticks since standstill was requested.
     halting_ms: f64,
-    /// The S-shaped ramp with its margins is too slow for the time that a stop may take.
+    /// The S-shaped ramp with its margins is too slow for the permitted time of a stop.
     hurried: bool,
 }
 
@@ -42,15 +42,15 @@ pub(crate) struct SlopeBounds {
     pub full: Bounds,
 }
 
-/// A slope in the wrong direction (a pause during a resume) is removed this many times faster than a ramp is rounded. A hurried stop
+/// Factor by which a slope in the wrong direction (a pause during a resume) is removed faster than a ramp is rounded. A hurried stop
 /// changes its slope equally fast.
 const REVERSAL: f64 = 8.0;
 /// Change per tick of the slope of a path that is held back, as a fraction of the difference to the target slope.
 const SETTLES: f64 = 0.1;
-/// Share of the configured time within which a stop must end. The rest of the time is for the part of the path that is still ahead.
+/// Share of the configured time within which a stop must end. The remaining time is for the part of the path that is still ahead.
 const PUNCTUAL: f64 = 0.6;
 
-/// The S-shaped ramp from 0 to 1 (parabola, line, parabola, each a third of its length).
+/// S-shaped ramp from 0 to 1. The ramp consists of a parabola, a line and a parabola, each with a third of its length.
 struct Ramp {
     /// Highest slope, 1/s.
     steepest: f64,
@@ -64,12 +64,13 @@ impl Ramp {
         Self { steepest: 1.5 / length, round: 4.5 / (length * length) * DT }
     }
 
-    /// Returns the highest slope that can still be reduced to zero within the remaining change of the rate, `distance`.
+    /// Returns the highest slope that can still be reduced to zero within `distance`, the remaining change of the rate.
     fn flatten(&self, distance: f64) -> f64 {
         self.round * (sqrt(0.25 + 2.0 * distance / (self.round * DT)) - 0.5)
     }
 
-    /// Returns the slope that follows `now`, towards a rate that is `distance` away. Both are positive in the direction of the change.
+    /// Returns the next slope after `now`, for a rate that must still change by `distance`. `now` and `distance` are positive in the
+    /// direction of the change.
     fn next(&self, now: f64, distance: f64) -> f64 {
         let step = if now < 0.0 { REVERSAL * self.round } else { self.round };
         self.flatten(distance).min(self.steepest).min(now + step)
@@ -88,7 +89,8 @@ impl PathClock {
         self.slope = 0.0;
     }
 
-    /// Changes the target rate. A standstill that is the target stays the target. Returns `true` if path time begins to change its rate.
+    /// Changes the target rate. If standstill is the target, standstill stays the target. Returns `true` if path time begins to change its
+    /// rate.
     pub(crate) fn set_pace(&mut self, pace: f64) -> bool {
         let changes = self.target != 0.0 && self.target != pace;
         if changes {
@@ -97,7 +99,7 @@ impl PathClock {
         changes
     }
 
-    /// Begins to slow down to standstill. The time for this runs from the first call.
+    /// Begins to slow down to standstill. The permitted time starts at the first call.
     pub(crate) fn halt(&mut self) {
         if self.target != 0.0 {
             (self.target, self.halting_ms, self.hurried) = (0.0, 0.0, false);
@@ -144,9 +146,9 @@ impl PathClock {
         self.time = (self.time + self.rate).min(end);
     }
 
-    /// Changes the rate towards the target rate along an S-shaped ramp of `ramp_ms`, or more slowly if the slope would leave `bounds`. If
-    /// the target changes during a ramp, the slope changes as fast as it may, without a step. Meanwhile the rate continues to change, but
-    /// never beyond the previous target.
+    /// Changes the rate towards the target rate along an S-shaped ramp of `ramp_ms`. The change is slower if the slope would otherwise
+    /// leave `bounds`. If the target changes during a ramp, the slope changes as fast as permitted, without a step. Meanwhile the rate
+    /// continues to change, but never beyond the previous target.
     pub(crate) fn change_pace(&mut self, ramp_ms: f64, bounds: Bounds) {
         let ahead = self.target - self.rate;
         let sign = if ahead < 0.0 { -1.0 } else { 1.0 };
@@ -155,8 +157,8 @@ impl PathClock {
         let (low, high) = if sign < 0.0 { (-bounds.1, -bounds.0) } else { bounds };
         let ramp = Ramp::of(ramp_ms);
         let wanted = ramp.next(now, distance);
-        // If the bounds leave no slope, the rate is kept for now. Bounds that allow only the other direction do not reverse the change of
-        // the rate.
+        // If the bounds do not allow any slope, the rate stays constant in this tick. Bounds that allow only the opposite direction do not
+        // reverse the change of the rate.
         let (within, high) = if low <= high {
             (wanted.min(high).max(low.min(wanted)).max(wanted.min(0.0)), high.max(0.0))
         } else {
@@ -172,7 +174,7 @@ impl PathClock {
         }
     }
 
-    /// Keeps the present rate, or slows down if the slope would leave `bounds` otherwise. The rate is also kept if the bounds of several
+    /// Keeps the present rate, or slows down if the slope would otherwise leave `bounds`. The rate is also kept if the bounds of several
     /// joints contradict each other, or if only a faster path would relieve a joint.
     pub(crate) fn hold_back(&mut self, (low, high): Bounds) {
         let wanted = if low <= high { high.min(0.0) } else { 0.0 };
@@ -183,8 +185,8 @@ impl PathClock {
     }
 
     /// Slows down to standstill, in at most `stop_ms` if the torque limits allow it. The clock follows an S-shaped ramp of `ramp_ms` while
-    /// that is possible within `bounds.easy`. If that would take too long, it uses `bounds.full`. Then the rate may also rise again, if all
-    /// available torque cannot prevent the arm from gaining speed.
+    /// that is possible within `bounds.easy`. If this would take too long, the clock uses `bounds.full`. In this case the rate may also
+    /// rise again, if the available torque cannot prevent the arm from gaining speed.
     pub(crate) fn slow_down(&mut self, ramp_ms: f64, stop_ms: f64, bounds: &SlopeBounds) {
         // In this function slopes are decelerations: positive towards standstill.
         let (distance, now) = (self.rate, -self.slope);
@@ -193,7 +195,7 @@ impl PathClock {
         let (low, high) = (-bounds.easy.1, -bounds.easy.0);
         let eased = if low <= high { wanted.min(high).max(low.min(wanted)) } else { 0.0 };
 
-        // The deceleration that is needed to end in time, rounded at the end.
+        // Deceleration that is needed to end in time, with a rounded end.
         let left_s = 0.001 * (PUNCTUAL * stop_ms - self.halting_ms);
         let due = if left_s > DT { distance / left_s } else { distance / DT };
         let due = due.min(ramp.flatten(distance)).min(now.max(0.0) + REVERSAL * ramp.round);

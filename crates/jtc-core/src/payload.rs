@@ -1,5 +1,5 @@
-//! Blends a new payload into the model (J-60). For half a second the control law computes with an arm between the last payload and the next
-//! one, so that the change makes no step of the torque.
+//! Blends a new payload into the model (J-60). For half a second, the control law uses an arm between the last payload and the next
+//! payload, so that the change does not cause a torque step.
 use jtc_dynamics::{Dynamics, LinkInertias};
 
 use crate::JOINTS;
@@ -13,7 +13,7 @@ pub(crate) const BLEND_MS: u16 = 500;
 pub(crate) struct PayloadBlend {
     from: LinkInertias,
     to: LinkInertias,
-    /// Mass that has not been added yet, kg; negative if mass is removed.
+    /// Mass that has not been added yet, kg. The value is negative if mass is removed.
     mass: f64,
     left_ms: u16,
 }
@@ -23,7 +23,7 @@ pub(crate) struct PayloadBlend {
 pub(crate) struct BlendState {
     left_ms: u16,
     mass: f64,
-    /// Parameters of the arm at the beginning of the blend; `None` if the blend has ended.
+    /// Parameters of the arm at the beginning of the blend. `None` if the blend has ended.
     from: Option<[[f64; 7]; JOINTS]>,
 }
 
@@ -39,7 +39,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Continues from that state, with the dynamics of the arm with its whole payload.
+    /// Continues from this state. `dynamics` are the dynamics of the arm with its whole payload.
     pub(crate) fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
         *self = Self::none(dynamics);
         if let Some(from) = &state.from {
@@ -60,14 +60,14 @@ impl PayloadBlend {
         Self { from: now, to: now, mass: 0.0, left_ms: 0 }
     }
 
-    /// Begins a blend from the arm `now`, which may be in a blend itself, to the arm with the `next` payload. `heavier`: mass of the next
-    /// payload minus mass of the last one, kg.
+    /// Begins a blend from the arm `now` to the arm with the `next` payload. `now` may be in an earlier blend. `heavier` is the mass of the
+    /// next payload minus the mass of the last payload, kg.
     pub(crate) fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
         let mass = self.mass + heavier;
         *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
     }
 
-    /// Clears the blend, because the model was rebuilt with the whole payload in it.
+    /// Clears the blend, because the rebuilt model contains the whole payload.
     pub(crate) fn forget(&mut self) {
         (self.left_ms, self.mass) = (0, 0.0);
     }
@@ -77,7 +77,7 @@ impl PayloadBlend {
         self.mass / f64::from(self.left_ms.max(1))
     }
 
-    /// Returns the time left, ms.
+    /// Returns the remaining time of the blend, ms.
     pub(crate) fn left_ms(&self) -> u16 {
         self.left_ms
     }
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
     use crate::{Config, Parameters};
 
-    /// This is also true if another payload follows during the blend.
+    /// The added mass is also correct if another payload follows during the blend.
     #[test]
     fn j60_as_much_mass_comes_as_is_given() {
         let mut dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);

@@ -3,17 +3,17 @@ use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::parameters::PidGains;
 
-/// Ticks over which the derivative is taken.
+/// Number of ticks over which the derivative is computed.
 const WINDOW: usize = 5;
-/// Inverse of the length of the window, 1/s.
+/// Inverse of the length of the derivative window, 1/s.
 const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
 /// Position error at rest, in encoder steps, above which the integral acts again. A joint that slips settles within this distance.
 const RELEASE_STEPS: f64 = 4.0;
-/// Error of positions that the bus rounds, in encoder steps.
+/// Rounding error of the positions on the bus, in encoder steps.
 const ROUNDING: f64 = 0.01;
 
-/// The state of the controller.
+/// State of the PID controller.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pid {
     /// Integral of the error, rad·s.
@@ -24,10 +24,10 @@ pub(crate) struct Pid {
     settled: bool,
 }
 
-/// The three parts of the torque, N·m.
+/// Three parts of the torque, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PidTorque {
-    /// Torque of the error, Kp·e.
+    /// Torque of the position error, Kp·e.
     pub p: f64,
     /// Torque of the integral, Ki·∫e.
     pub i: f64,
@@ -51,14 +51,14 @@ impl Pid {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
-    /// Like [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral. This is the bumpless transfer from a state that
-    /// had found this torque. An integral without gain or at its bounds takes over less.
+    /// Resets the state like [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral. This gives a bumpless transfer
+    /// from a state that had found this torque. If the integral has no gain or reaches its bounds, it contains less torque.
     pub(crate) fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         self.keep(gains, torque);
     }
 
-    /// Sets the integral to a `torque` (N·m), as far as these gains can hold it.
+    /// Sets the integral to a `torque` (N·m), as far as these gains allow this torque.
     pub(crate) fn keep(&mut self, gains: &PidGains, torque: f64) {
         let integral = torque / gains.ki;
         self.integral =
@@ -70,12 +70,12 @@ impl Pid {
         self.errors = self.errors.map(|error| error + way);
     }
 
-    /// Runs one tick with the position error (rad). `saturated`: the torque is at its limit, so the integral does not change.
-    /// `encoder_step` (rad): resolution of the encoder if the joint is commanded at rest; `None` in motion.
+    /// Runs one tick with the position error (rad). `saturated` means that the torque is at its limit, so the integral does not change.
+    /// `encoder_step` (rad) is the resolution of the encoder if the joint is commanded at rest, and `None` in motion.
     ///
-    /// At rest, the integral stops changing when the error is within one step, until the error exceeds [`RELEASE_STEPS`]. An integral that
-    /// continued below the resolution of the encoder would make a joint with stiction break away again and again (hunting). An integral
-    /// that restarted at each change of the last bit would have the same effect.
+    /// At rest, the integral stops changing when the error is within one step, until the error exceeds [`RELEASE_STEPS`]. If the integral
+    /// changed below the encoder resolution, a joint with stiction would break away again and again (hunting). If the integral restarted at
+    /// each change of the last bit, hunting would occur as well.
     pub(crate) fn step(
         &mut self,
         gains: &PidGains,
@@ -118,12 +118,12 @@ mod tests {
         pid.reset(0.0);
         let slope = 0.3;
         let mut d = 0.0;
-        // More ticks than the window has: errors older than five ticks have no effect.
+        // The test runs more ticks than the window contains, because errors older than five ticks have no effect.
         for k in 1..=12 {
             d = pid.step(&GAINS, slope * f64::from(k) * DT, false, None).d;
         }
         assert!((d - GAINS.kd * slope).abs() < 1e-12);
-        // The effect of a step is spread over five ticks. In each of them the torque is at most Kd·step/(5 ms).
+        // The effect of a step is spread over five ticks. In each of the five ticks, the torque is at most Kd·step/(5 ms).
         pid.reset(0.0);
         let first = pid.step(&GAINS, 0.01, false, None).d;
         assert!((first - GAINS.kd * 0.01 / 0.005).abs() < 1e-12);
@@ -151,7 +151,7 @@ mod tests {
             }
             pid.integral - before
         };
-        // In motion every error changes the integral; at rest only errors above the resolution of the encoder do.
+        // In motion, every error changes the integral. At rest, only errors above the encoder resolution change the integral.
         assert!(run(&mut pid, 0.5, false) > 0.0);
         assert!(run(&mut pid, 2.0, true) > 0.0);
         assert_eq!(run(&mut pid, 1.0, true), 0.0);
@@ -191,7 +191,7 @@ mod tests {
         assert_eq!((taken(GAINS, 24.0), taken(GAINS, -24.0)), (10.0 * 0.003, 10.0 * -0.002));
         let none = PidGains { ki: 0.0, ..wide };
         assert_eq!((taken(none, 24.0), taken(none, 0.0)), (0.0, 0.0));
-        // Gains that come later hold no torque either.
+        // Later gains do not hold any torque either.
         for torque in [24.0, -24.0, 0.0] {
             let mut pid = Pid::default();
             pid.take_over(&none, torque);
@@ -199,7 +199,7 @@ mod tests {
         }
     }
 
-    /// Other gains hold the same torque, as far as their integral can. The derivative is not affected.
+    /// Other gains hold the same torque, as far as the integral bounds allow it. The derivative is not affected.
     #[test]
     fn j71_the_integral_keeps_its_torque_under_other_gains() {
         let mut pid = Pid::default();

@@ -1,4 +1,4 @@
-//! Reactions of the controller to findings about a joint while it can still act, instead of taking the torque away (J-66).
+//! Reactions of the controller to findings about a joint while the controller can still act, instead of a removal of the torque (J-66).
 //!
 //! | finding | reaction |
 //! |---|---|
@@ -13,8 +13,8 @@
 //! | any other overloaded joint, at rest, or still moving at the end of the time for a stop | the joint lowers its load |
 //! | a set value outside a limit of the path | the arm stops on its path, or its jog ends |
 //!
-//! The first row that applies to a joint is used. All reactions except the release and holding back end in a held stop (J-69): the arm is
-//! held, the cause is shown, and nothing moves until the host clears it.
+//! The first row that applies to a joint is used. All reactions except releasing the arm and holding back path time end in a held stop
+//! (J-69). In a held stop, the arm is held, the cause is shown, and the arm does not move until the host clears the stop.
 use jtc_wire::{RawPoint, StopCause, StopKind};
 
 use crate::controller::Controller;
@@ -22,7 +22,7 @@ use crate::motion::{ControlMode, Found};
 use crate::parameters::PidGains;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
-/// Limits of the path.
+/// Joint errors that show a violated limit of the path.
 const PATH: u16 =
     joint_error::POSITION | joint_error::VELOCITY | joint_error::ACCELERATION | joint_error::FRICTION_TABLE;
 
@@ -35,12 +35,12 @@ enum Reaction {
     Yield,
     /// The joint lowers its load.
     Lower,
-    /// The arm stops, if it is commanded to move.
+    /// The arm stops if a motion is commanded.
     Stop,
 }
 
-/// Returns the reaction to the findings of a joint, its cause, and the joint errors of that cause. `again`: the joint was unstable a moment
-/// ago.
+/// Returns the reaction to the findings of a joint, the cause of the reaction, and the joint errors of this cause. `again` means that the
+/// joint was already unstable shortly before.
 fn reaction(
     found: &Found,
     mode: ControlMode,
@@ -60,7 +60,7 @@ fn reaction(
     } else if overloaded && !settled {
         Some((Reaction::Lower, StopKind::Overload, torque))
     } else if (pushed && !releases) || (overloaded && strained) {
-        // A push appears in the torque of the joint, or only in its speed.
+        // A push appears in the feedback torque of the joint, or only in the joint speed.
         Some((Reaction::Yield, if strained { StopKind::Push } else { StopKind::Shove }, torque))
     } else if errors & joint_error::POSITION_ERROR != 0 {
         Some((Reaction::Yield, StopKind::PositionError, joint_error::POSITION_ERROR))
@@ -78,9 +78,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
         let (mut release, mut causes, mut first) = ([0; JOINTS], [0; JOINTS], None);
         let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
-        // Joints (a bit each) that fail with their gains, and those of them whose loops are unstable (J-71).
+        // Masks of the joints that fail with their gains, and of the failed joints with unstable loops (J-71).
         let (mut failed, mut unstable) = (0u8, 0u8);
-        // A loop over the index lets the compiler see that it is in range.
+        // With a loop over the index, the compiler can see that the index is in range.
         for j in 0..JOINTS {
             let again = self.parameters.trial.again(j);
             // The torque of a joint that yields is bounded by construction.
@@ -116,7 +116,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.hold_stop(&causes, kind);
         }
         if yields != lowers {
-            // If a stop has just begun, the inertia is already computed. A tick has time for one mass matrix.
+            // If a stop has just begun, the inertia is already computed. One tick has time for the computation of one mass matrix.
             if self.braking_ms == before {
                 self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
             }
@@ -125,14 +125,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         release
     }
 
-    /// Uses gains that the controller has chosen: the gains before a trial that failed, or softer ones (J-66, J-71).
+    /// Uses gains that the controller has chosen. These are the gains before a failed trial, or softer gains (J-66, J-71).
     fn use_other_gains(&mut self, gains: &[PidGains; JOINTS]) {
         self.parameters.pid = *gains;
         self.motion.change_gains(gains);
         self.extensions.forget_hash();
     }
 
-    /// Ends a trial when the arm is not held any more. Gains on trial have not held the arm, so it is not enabled again with them.
+    /// Ends a trial when the arm is not held any more. Gains on trial have not held the arm long enough, so the arm is not enabled again
+    /// with these gains.
     pub(crate) fn end_trial(&mut self) {
         let Some(gains) = self.parameters.trial.end() else { return };
         self.parameters.pid = gains;
@@ -210,7 +211,7 @@ mod tests {
             let taught = reaction(&found, ControlMode::Teach, false, false);
             assert_eq!(taught, expected.filter(|(reaction, ..)| *reaction == Release), "{found:?}");
             assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
-            // With the reaction of the manual, the torque alone releases the arm, and is not considered a push before that.
+            // With the reaction in the manual, an overload of the torque releases the arm, and is not considered a push before the release.
             let released = reaction(&found, mode, true, false);
             if found.overloaded {
                 assert_eq!(released, Some((Release, Overload, torque)), "{found:?}");

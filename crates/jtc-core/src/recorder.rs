@@ -1,13 +1,14 @@
-//! The flight recorder (J-56): the last seconds before an error, tick by tick, in memory that survives a reset.
+//! Flight recorder (J-56), which stores the last seconds before an error, tick by tick, in memory that survives a reset.
 //!
-//! The recorder stores the *inputs* of each tick, usually in eight words, and for each tick a check of the *outputs*. Every [`SNAPSHOT_MS`]
-//! it stores a *snapshot* of the state of the controller. A [`Replay`] of the log through the controller reproduces everything that it
-//! computed: commanded and measured motion, the parts of the torques, states, errors. The arm and the points of the trajectory are
-//! identified by their hashes.
+//! The recorder stores the *inputs* of each tick, usually in eight words, and a check value of the *outputs* of each tick. Every
+//! [`SNAPSHOT_MS`], the recorder stores a *snapshot* of the controller state. A [`Replay`] of the log through the controller reproduces all
+//! computed values: commanded and measured motion, the parts of the torques, states, and errors. The arm and the points of the trajectory
+//! are identified by their hashes.
 //!
-//! A log *stops* [`AFTER_ERROR_MS`] after the first error and is kept until it is cleared. [`Recorder::record`] executes the commands that
-//! clear and read the log. The log is also kept if the device was reset because of a failure. A log in which the controller never had
-//! torque is replaced by a new one when torque comes on, so that an error at the start of a day does not take the place of a relevant one.
+//! A log *stops* [`AFTER_ERROR_MS`] after the first error and stays in memory until a command clears the log. [`Recorder::record`] executes
+//! the commands that clear and read the log. The log is also kept if the device was reset because of a failure. A log in which the
+//! controller never had torque is replaced by a new log when the torque is switched on. So an error at the start of a day does not replace
+//! a relevant error.
 mod block;
 mod inputs;
 mod memory;
@@ -34,44 +35,44 @@ pub use recorded::{RecordedEvent, RecordedInputs, RecordedKind};
 pub use replay::{Log, Outcome, Record, Replay, Step, Unsure};
 pub use snapshot::{Origin, Snapshot};
 
-/// Words of a block.
+/// Number of words in a block.
 pub const BLOCK_WORDS: usize = 256;
-/// A block of the recorder's memory.
+/// Block of the recorder's memory.
 pub type Block = [u32; BLOCK_WORDS];
-/// Bytes of a block.
+/// Number of bytes in a block.
 pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 
-/// Ticks from one snapshot to the next.
+/// Number of ticks from one snapshot to the next.
 pub const SNAPSHOT_MS: u16 = 500;
-/// Ticks that are recorded after the first error (J-56).
+/// Number of ticks that are recorded after the first error (J-56).
 pub const AFTER_ERROR_MS: u16 = 300;
-/// Ticks from one snapshot to the next, if an input between them cannot be repeated by a replay.
+/// Number of ticks from one snapshot to the next, if a replay cannot repeat an input between the two snapshots.
 const EARLY_SNAPSHOT_MS: u16 = 250;
-/// Ticks for which recording pauses after a page was requested, so that the block that is being read is not overwritten.
+/// Number of ticks for which recording pauses after the request for a page, so that the block that is being read is not overwritten.
 const HELD_MS: u16 = 2_000;
 
 /// The recorder. `P` is a piece of its memory: blocks that keep their contents during a reset and are not cached.
 ///
-/// The board creates one at its start, for any content of the memory, and calls [`record`](Self::record) after every tick.
+/// The board creates a recorder at its start, for any content of the memory, and calls [`record`](Self::record) after every tick.
 pub struct Recorder<P, const N: usize> {
     writer: Writer<P, N>,
     reference: Reference,
-    /// Check of the outputs since the last snapshot.
+    /// Check value of the outputs since the last snapshot.
     chain: u32,
     since_snapshot: u16,
     /// A replay cannot repeat an input since the last snapshot, so a snapshot is due earlier.
     uncertain: bool,
     /// An error was latched in the last tick.
     was_in_error: bool,
-    /// Ticks left until the log stops.
+    /// Number of ticks until the log stops.
     stops_in: Option<u16>,
-    /// Ticks left for which recording pauses.
+    /// Number of ticks for which recording still pauses.
     held: u16,
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
-    /// Creates a recorder with this memory. A log in the memory is kept if it had stopped, or if the device was reset because it `failed`.
-    /// Otherwise a new log begins.
+    /// Creates a recorder with this memory. A log in the memory is kept if the log had stopped, or if the device was reset because it
+    /// `failed`. Otherwise a new log begins.
     pub fn new(pieces: [P; N], failed: bool) -> Self {
         let mut writer = Writer::new(pieces);
         if writer.state == LogState::Recording {
@@ -115,7 +116,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     }
 
     /// Records a tick that the controller has just executed, and executes the requests of hosts to the recorder. The board calls this after
-    /// every tick. A call takes some hundred instructions; every [`SNAPSHOT_MS`] it takes some ten thousand.
+    /// every tick. A call takes some hundred instructions. Every [`SNAPSHOT_MS`], a call takes some ten thousand instructions.
     #[inline(never)]
     pub fn record<M>(&mut self, controller: &mut Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs)
     where
@@ -156,7 +157,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.writer.set_powered();
         }
         if self.held > 0 {
-            // A new error ends the pause, so that it is recorded.
+            // A new error ends the pause, so that the error is recorded.
             self.held = if new_error { 0 } else { self.held - 1 };
             if self.held > 0 {
                 return;
@@ -164,7 +165,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.writer.begin();
             self.snapshot(controller);
         } else if self.writer.is_empty() {
-            // The hash of the arm is known some ticks after the start.
+            // The hash of the arm is available some ticks after the start.
             if controller.extensions.hash.is_none() && !new_error {
                 return;
             }
@@ -194,7 +195,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         self.uncertain |= !self.reference.write(inputs, outputs.host_done, check, &mut self.writer);
         self.since_snapshot += 1;
         let due = if self.uncertain { EARLY_SNAPSHOT_MS } else { SNAPSHOT_MS };
-        // While the arm changes, its hash is not known. This does not last long, unless a host sends parameters again and again.
+        // While the parameters of the arm change, the hash of the arm is not available. This time is short, unless a host sends parameters
+        // again and again.
         let named = controller.extensions.hash.is_some() || self.since_snapshot >= 2 * SNAPSHOT_MS;
         if self.since_snapshot >= due && named {
             self.snapshot(controller);
@@ -253,7 +255,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     }
 }
 
-/// Adds the outputs of a tick to the check of the ticks before it.
+/// Adds the outputs of a tick to the check value of the earlier ticks.
 fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outputs) -> u32 {
     let mix = |hash: u32, word: u32| (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1);
     let states = u32::from(errors) << 16
@@ -264,7 +266,7 @@ fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outpu
     let Some(frame) = &outputs.bus else { return hash };
     let hash = mix(hash, frame.id.into());
     match frame.data().first_chunk::<16>() {
-        // For a Move, all of its torques and the pump are added.
+        // For a Move, all torques and the state of the pump are added.
         Some(bytes) => {
             bytes.as_chunks::<4>().0.iter().fold(hash, |hash, word| mix(hash, u32::from_le_bytes(*word)))
         }
@@ -272,7 +274,8 @@ fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outpu
     }
 }
 
-/// Returns the part of the check that is recorded. A part is sufficient, because each check covers all ticks before it.
+/// Returns the part of the check value that is recorded. A part is sufficient, because each check value covers all earlier ticks since the
+/// snapshot.
 fn check(chain: u32) -> u16 {
     (chain >> 16) as u16
 }

@@ -1,13 +1,13 @@
 //! Measured position and velocity of a joint, and their prediction while its answers are missing (J-35, J-63).
 //!
-//! Terms: an answer is *usable* if the joint can have reached its position since the last usable answer. In a tick without a usable answer
-//! the *prediction* is used: the last usable answer, extrapolated at the rate at which the joint moved, plus the change of the commanded
-//! velocity since. The first usable answer after missing ones differs from the prediction by an *offset*. The offset fades, so that neither
-//! the loss nor the return makes a step of the position or of the derivative of its error. A *late* answer ([`Lateness`]) belongs to the
-//! time at which it was due: it is compared with the prediction for that time, and the prediction continues from it. A late answer that is
-//! close to its prediction is used directly, like an answer in time. If an offset faded in each tick, it would act as a filter in the
-//! position loop and make the loop swing. The offset is not part of the prediction: the prediction depends only on answers and commands, so
-//! that the position loop stays closed even if many answers are lost.
+//! An answer is *usable* if the joint can have reached the answered position since the last usable answer. In a tick without a usable
+//! answer, the *prediction* is used. The prediction is the last usable answer, extrapolated with the rate of the joint, plus the change of
+//! the commanded velocity since that answer. The first usable answer after missing answers differs from the prediction by an *offset*. The
+//! offset fades, so that missing and returning answers do not cause a step of the position or of the derivative of the position error. A
+//! *late* answer ([`Lateness`]) belongs to the time at which it was due. The late answer is compared with the prediction for that time, and
+//! the prediction continues from this answer. A late answer that is close to its prediction is used directly, like an answer in time. With
+//! an offset that fades in each tick, the position loop would contain a filter and would swing. The offset is not part of the prediction:
+//! the prediction depends only on answers and commands, so that the position loop stays closed even if many answers are lost.
 mod history;
 mod jump;
 mod lateness;
@@ -25,31 +25,31 @@ pub(super) use jump::Ways;
 use jump::{Jumps, Seen};
 use lateness::Lateness;
 
-/// Speed that no joint can have, in velocity limits. An answer that is further from the prediction than a joint at this speed could be is
-/// not usable (J-35).
+/// Impossible speed of a joint, as a multiple of its velocity limit. If an answer is further from the prediction than a joint could move at
+/// this speed, the answer is not usable (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
-/// Distance from the prediction, as a share of the implausible distance, above which an answer is not used for the rate. If an encoder has
-/// jumped, the joint has not moved.
+/// Distance from the prediction, as a share of the implausible distance, above which an answer is not used for the rate. After a jump of
+/// its encoder, a joint has not moved.
 const UNEXPECTED: f64 = 0.1;
 /// Largest difference between a late answer and its prediction for which the answer is used directly, in steps of the encoder. Positions
-/// and their predicted rate have this resolution.
+/// and predicted rates have this resolution.
 const IN_ITS_PLACE: f64 = 2.0;
 /// Coarsest encoder step to which [`IN_ITS_PLACE`] is applied, rad. An answer that is used directly may cause a step of this size.
 const COARSEST: f64 = 1e-4;
-/// Distance from the prediction, as a share of the implausible distance, within which an answer must be after the jump of its encoder was
-/// subtracted.
+/// Highest distance from the prediction, as a share of the implausible distance, after the jump of the encoder was subtracted from an
+/// answer.
 const NEAR: f64 = 0.5;
 /// Highest difference between the predicted rate and the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
-/// Highest ratio of two deviations from the due velocity: the deviation of the last 5 ms over the deviation of the reported mean of 10 ms.
-/// With a constant acceleration the ratio is 2.
+/// Highest ratio of two deviations from the due velocity. The first is the deviation of the velocity over the last 5 ms, the second is the
+/// deviation of the reported mean over 10 ms. With a constant acceleration the ratio is 2.
 const YOUNGER: f64 = 2.5;
-/// Highest rate of a prediction, in velocity limits.
+/// Highest rate of a prediction, as a multiple of the velocity limit.
 const FASTEST: f64 = 1.2;
-/// Double pole of a fading offset, times the configured time. A fifth of the offset remains after that time, a fiftieth after twice that
-/// time.
+/// Double pole of a fading offset, times the configured time. After the configured time a fifth of the offset remains, and after twice this
+/// time a fiftieth.
 const FADING: f64 = 3.0;
-/// Value below which an offset ends, rad or rad/s.
+/// Value below which an offset is set to zero, rad or rad/s.
 const FADED: f64 = 1e-9;
 
 /// Position and velocity of a joint.
@@ -61,10 +61,10 @@ pub(crate) struct Reading {
     pub velocity: f64,
 }
 
-/// The measurements of a joint in a tick.
+/// Measurements of one joint in one tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
-    /// Answer of the joint, if it has arrived.
+    /// Answer of the joint, if an answer has arrived.
     pub answer: Option<Reading>,
     /// A Move requested an answer in this tick.
     pub expected: bool,
@@ -84,18 +84,18 @@ pub(crate) struct Tick {
     pub joint: usize,
 }
 
-/// Result of a tick.
+/// Result of one tick for one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// The answer is usable.
     Used,
     /// The answer is not usable, or is missing.
     Predicted,
-    /// The answer is usable, and it confirms that the encoder has jumped (J-35).
+    /// The answer is usable and confirms that the encoder has jumped (J-35).
     Jumped,
 }
 
-/// An answer that is far from its expected position.
+/// Answer that is far from its expected position.
 struct Unexpected {
     answer: Reading,
     /// Prediction minus answer, rad.
@@ -110,14 +110,14 @@ struct Unexpected {
     joint: usize,
 }
 
-/// A late answer, and the motion that was commanded since it was due.
+/// Late answer, and the motion that was commanded since the answer was due.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
     /// Lateness, ms.
     pub ms: u32,
     /// Velocity that was commanded when the answer was due, rad/s.
     pub commanded: f64,
-    /// Distance that was commanded since then, rad.
+    /// Distance that was commanded since the answer was due, rad.
     pub commanded_way: f64,
 }
 
@@ -126,37 +126,37 @@ pub(crate) struct Late {
 pub(crate) struct Measurement {
     /// Position and velocity that the control law uses.
     used: Reading,
-    /// There has been a usable answer.
+    /// At least one usable answer has arrived.
     known: bool,
-    /// Time, ms. The clock wraps around after 49 days, which does not affect differences.
+    /// Time, ms. The clock wraps around after 49 days, which does not affect time differences.
     clock_ms: u32,
-    /// The last usable answer. Its position is extrapolated to the present tick.
+    /// Last usable answer, with a position that is extrapolated to the present tick.
     answer: Reading,
     /// Time to which the last usable answer belongs, ms.
     answered_ms: u32,
-    /// Velocity that was commanded at that time, rad/s.
+    /// Velocity that was commanded at the time of the last usable answer, rad/s.
     commanded: f64,
-    /// Rate of the answered positions at that time, rad/s.
+    /// Rate of the answered positions at the time of the last usable answer, rad/s.
     rate: f64,
-    /// The rate, limited to the neighbourhood of the reported velocity, rad/s. A prediction uses this rate.
+    /// Rate that a prediction uses, rad/s. This rate is limited to the neighbourhood of the reported velocity.
     carried: f64,
-    /// The last usable answers.
+    /// Last usable answers of the joint.
     history: History,
     /// Lateness of the answers.
     lateness: Lateness,
     /// Jumps of the encoder.
     jumps: Jumps,
-    /// An answer has been missing since the last usable one.
+    /// An answer has been missing since the last usable answer.
     missing: bool,
-    /// Part of prediction minus answer that has not faded yet.
+    /// Part of the difference between prediction and answer that has not faded yet.
     position_offset: Fading,
     velocity_offset: Fading,
     /// At least one of the offsets has not faded yet.
     fading: bool,
 }
 
-/// An offset that fades without a step of its value or slope: a critically damped filter of second order. The offset continues to fade when
-/// another difference is added to it. If it restarted instead, it would never fade while every other answer is lost.
+/// Offset that fades without a step of its value or slope, like a critically damped filter of second order. The offset continues to fade
+/// when another difference is added to it. If the fading restarted instead, the offset would never fade while every second answer is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fading {
     /// Remaining offset, rad or rad/s.
@@ -191,7 +191,7 @@ impl Fading {
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
         let x = pole * ms;
-        // 1/eˣ from its series, which is stable for any length of the tick.
+        // 1/eˣ is computed from its series, which is stable for any length of the tick.
         let decay = 1.0 / (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)));
         let both = self.slope + pole * self.left;
         (self.left, self.slope) = ((self.left + both * ms) * decay, (self.slope - pole * both * ms) * decay);
@@ -200,14 +200,14 @@ impl Fading {
         }
     }
 
-    /// Reduces the offset by `by` if the signs are opposite, at most to zero.
+    /// Reduces the offset by `by` if the signs are opposite. The offset does not change beyond zero.
     fn take_back(&mut self, by: f64) {
         let left = self.left + by;
         self.left = if self.left > 0.0 { left.max(0.0).min(self.left) } else { left.min(0.0).max(self.left) };
     }
 }
 
-/// Returns the distance from its prediction within which a late answer is used directly, rad.
+/// Returns the highest distance between a late answer and its prediction at which the answer is used directly, rad.
 fn place(config: &Config) -> f64 {
     config.encoder_step.min(COARSEST) * IN_ITS_PLACE
 }
@@ -227,7 +227,7 @@ impl Late {
         }
     }
 
-    /// Returns the distance that the joint has moved since the answer was due, rad, if its rate was `carried` (rad/s) then.
+    /// Returns the distance that the joint has moved since the answer was due, rad, if the rate at that time was `carried` (rad/s).
     fn way(&self, carried: f64) -> f64 {
         self.commanded_way + (carried - self.commanded) * (f64::from(self.ms) * DT)
     }
@@ -239,17 +239,17 @@ impl Measurement {
         self.used
     }
 
-    /// Returns the speed of the joint, rad/s: its reported velocity or the rate of its positions, whichever is higher. Reported velocities
-    /// alone are not trusted, because their full scale depends on the drive (J-11).
+    /// Returns the speed of the joint, rad/s. The speed is the reported velocity or the rate of the positions, whichever is higher.
+    /// Reported velocities alone are not trusted, because the full scale of the velocity depends on the drive (J-11).
     pub(super) fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
-    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported velocity. Its difference from the `due` velocity
-    /// (rad/s) is limited to [`YOUNGER`] times the difference of the reported velocity. If the differences have opposite signs, an encoder
-    /// has jumped and the joint has not moved: then the `due` velocity is returned.
+    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported velocity. The difference from the `due` velocity
+    /// (rad/s) is limited to [`YOUNGER`] times the difference between the reported and the `due` velocity. If the two differences have
+    /// opposite signs, an encoder has jumped and the joint has not moved. In this case the `due` velocity is returned.
     pub(super) fn young_velocity(&self, due: f64) -> f64 {
-        // The remainder of a fading offset is subtracted, because it is even older.
+        // The remainder of a fading offset is subtracted, because the offset is even older.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
         let most = YOUNGER * reported.abs();
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
@@ -260,8 +260,8 @@ impl Measurement {
         self.jumps.taken_off()
     }
 
-    /// Returns the disagreement of the two encoders that was found since the drive was configured: a jump and its size (rad), or the factor
-    /// of a speed.
+    /// Returns the disagreement of the two encoders that was found since the drive was configured. The value is the size of a jump (rad) or
+    /// the factor of a speed.
     pub(super) fn misfit(&self) -> Option<(StopKind, f64)> {
         self.jumps.found()
     }
@@ -271,7 +271,7 @@ impl Measurement {
         self.jumps.find_factor(factor);
     }
 
-    /// Returns the two distances of the answer in this tick. Returns `None` without an answer, or if they are not known.
+    /// Returns the two distances of the answer in this tick. Returns `None` if no answer exists, or if the distances are not known.
     pub(super) fn ways(&self, config: &Config) -> Option<Ways> {
         let window_ms = config.drive_speed_window_ms;
         let from = self.history.before(self.clock_ms, window_ms).filter(|_| window_ms > 0)?;
@@ -279,7 +279,7 @@ impl Measurement {
         Ways::of(&Reading { position, ..self.answer }, from, config)
     }
 
-    /// Makes the next answer be used without a correction.
+    /// Discards the prediction, so that the next answer is used without a correction.
     pub(super) fn forget(&mut self) {
         self.known = false;
     }
@@ -289,8 +289,8 @@ impl Measurement {
         self.commanded = commanded;
     }
 
-    /// Runs one tick. The jump of the encoder has already been subtracted from the answer. `past`: motion that was commanded since the
-    /// given number of ticks ago.
+    /// Runs one tick. The jump of the encoder has already been subtracted from the answer. `past` returns the commanded motion since a
+    /// number of ticks ago.
     pub(super) fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
@@ -300,7 +300,7 @@ impl Measurement {
             self.velocity_offset.step(tick.elapsed_ms, config);
             self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
-        // Nearly always every answer is in time. The code for late answers is compiled separately.
+        // Answers are rarely late. The code for late answers is compiled separately.
         if self.lateness.stands(tick.answers) {
             self.take(tick, None, config)
         } else {
@@ -308,19 +308,20 @@ impl Measurement {
         }
     }
 
-    /// Runs the rest of a tick whose answer may be late. `tick` is passed by value: a `tick` in memory would slow down every tick.
+    /// Runs the remainder of a tick whose answer may be late. `tick` is passed by value, because a `tick` in memory would slow down every
+    /// tick.
     #[cold]
     #[inline(never)]
     fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let counted = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
-        // The answer is younger than the last one. A repeated frame is also taken as evidence, so the count may be wrong.
+        // The answer is younger than the last answer. The count may be wrong, because a repeated frame also counts as evidence.
         let since = self.clock_ms.wrapping_sub(self.answered_ms).saturating_sub(1);
         let ticks = if self.known { counted.min(since.min(u8::MAX.into()) as u8) } else { counted };
         let late = self.late(ticks, &tick, past, config);
         self.take(&tick, late, config)
     }
 
-    /// Uses the answer of a tick if it is usable. Inlined, because half of the code is not needed without a late answer.
+    /// Uses the answer of a tick if it is usable. The function is inlined, because half of the code is not needed without a late answer.
     #[inline(always)]
     fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
@@ -358,7 +359,7 @@ impl Measurement {
             self.answer = Reading { position: answer.position + since(self.carried), ..answer };
             self.answered_ms = at_ms;
             self.commanded = late.map_or(tick.commanded, |late| late.commanded);
-            // While answers may be late, the lateness of this answer may differ from the lateness of the answers before.
+            // While answers may be late, the lateness of this answer may differ from the lateness of earlier answers.
             if known && (self.missing || late.is_some()) {
                 let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
@@ -392,7 +393,7 @@ impl Measurement {
             let twist = torque_max / config.gear_stiffness;
             self.jumps.look(&answer, self.answer.velocity, at_ms, twist, &self.history, config)
         };
-        // After the jump was subtracted, the position must be near the predicted one. Otherwise its speed is wrong as well.
+        // After the jump is subtracted, the position must be near the predicted position. Otherwise the reported speed is wrong as well.
         let near = |way: f64| (off + way).abs() <= NEAR * reach;
         let without = |way: f64| Some(Reading { position: answer.position - way, ..answer });
         match seen {
@@ -408,8 +409,9 @@ impl Measurement {
         }
     }
 
-    /// Bridges the difference between the answer of this tick and `predicted`, so that it does not become a step. An answer in its place
-    /// makes no step. Such an answer reduces the remainder of earlier differences as far as it can, because they would add up otherwise.
+    /// Bridges the difference between the answer of this tick and `predicted`, so that the difference does not become a step. An answer
+    /// close to its prediction does not make a step. Such an answer reduces the remainder of earlier differences, because the differences
+    /// would otherwise add up.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;
@@ -424,7 +426,7 @@ impl Measurement {
         }
     }
 
-    /// Returns the motion that was commanded since the answer of this tick was due, which was the counted `ticks` ago.
+    /// Returns the motion that was commanded since the answer of this tick was due. The counted lateness of the answer is `ticks`.
     fn late(&mut self, ticks: u8, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Option<Late> {
         let answer = tick.answer?;
         let counted = past(ticks);
@@ -435,7 +437,7 @@ impl Measurement {
         if !self.known || in_its_place(&counted) {
             return Some(counted);
         }
-        // A fast joint shows at once that an answer was lost: the next answers have positions that correspond to less lateness.
+        // If a joint is fast, a lost answer is detected at once, because the positions in the next answers correspond to less lateness.
         let Some(later) = (0..ticks).rev().find(|&ticks| in_its_place(&past(ticks))) else {
             return Some(counted);
         };
@@ -443,16 +445,16 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// Computes the rate between the youngest answer that is old enough, and this answer. The rate is computed from answers only. A rate
-    /// computed from predictions would confirm itself, whatever the joint does, while every other answer is lost. `as_predicted`: the
-    /// answer was close to its prediction. Inlined for the ticks without a late answer.
+    /// Computes the rate between the youngest answer that is old enough, and this answer. The rate is computed only from answers. While
+    /// every second answer is lost, a rate computed from predictions would confirm itself for any motion of the joint. `as_predicted` means
+    /// that the answer was close to its prediction. The function is inlined for the ticks without a late answer.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;
         let answered = Answered { position, at_ms };
         let rate = self.history.take(&answered, as_predicted);
         self.rate = rate.map_or(0.0, |rate| rate.rad_s);
-        // If the encoder of the joint has jumped, the velocity that the drive reports is used alone.
+        // If the encoder of the joint has jumped, only the velocity that the drive reports is used.
         let carried = match rate {
             Some(rate) if as_predicted && rate.as_predicted => rate.rad_s,
             _ => velocity,

@@ -1,21 +1,21 @@
-//! State of a node: its last report, the progress of its bring-up, and the state that the controller requests (J-16, J-20).
+//! State of a node: the last report, the progress of the bring-up, and the state that the controller requests (J-16, J-20).
 use jtc_bus::{JointReport, NodeState, Target, warning};
 
 use super::measure::Measurement;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 
-/// Ticks after a reset in which late answers of the node are ignored.
+/// Number of ticks after a reset in which late answers of the node are ignored.
 const DEAF_AFTER_RESET: u8 = 20;
 
-/// State into which the controller brings the nodes.
+/// State that the controller requests from the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Goal {
-    /// Configured and ready to operate: Init.
+    /// The nodes are configured and ready to operate (Init).
     Ready,
-    /// Operation enabled: HoldPos, Operate, Teaching.
+    /// The operation of the nodes is enabled (HoldPos, Operate, Teaching).
     Enabled,
-    /// Not enabled, otherwise unchanged: Error.
+    /// The nodes are not enabled, but otherwise unchanged (Error).
     Down,
 }
 
@@ -27,24 +27,24 @@ pub(crate) struct Node {
     pub(super) seen: bool,
     /// The node has accepted its configuration.
     pub(super) configured: bool,
-    /// The node has answered a Move after that, so position and velocity are valid.
+    /// The node has answered a Move after it accepted its configuration, so position and velocity are valid.
     pub(super) valid: bool,
     /// The node has refused its configuration in its present state.
     pub(super) refused: bool,
-    /// Consecutive Moves that the node has not answered.
+    /// Number of consecutive Moves that the node has not answered.
     pub(super) silent: u8,
-    /// Consecutive Moves without a usable answer.
+    /// Number of consecutive Moves without a usable answer.
     pub(super) missed: u8,
-    /// Measured position and velocity, once they are valid.
+    /// Measured position and velocity, as soon as both values are valid.
     pub(super) measured: Measurement,
-    /// Ticks left in which silence of the node is not an error yet.
+    /// Number of ticks in which a missing answer of the node is not an error yet.
     pub(super) boot_left: u32,
     pub(super) deaf_left: u8,
-    /// The node is commanded to Init to clear its errors, until it is in Init (J-21).
+    /// The node is commanded to Init to clear its errors, until the node is in Init (J-21).
     pub(super) clear: bool,
     /// A reset frame must be sent.
     pub(super) reset: bool,
-    /// The node reported OperationEnable while that state was requested.
+    /// The node reported OperationEnable while OperationEnable was requested.
     pub(super) enabled: bool,
     pub(super) enable_wait: u32,
     /// A usable answer has come since the last tick, so the measurement is not a prediction.
@@ -55,7 +55,7 @@ pub(crate) struct Node {
     pub(super) unasked: Option<NodeState>,
     /// Number of answers since the last tick. All except the last one were late.
     pub(super) answers: u8,
-    /// The node misbehaved in this tick: it left OperationEnable, did not enable in time, or reported implausible positions.
+    /// The node misbehaved in this tick, because it left OperationEnable, was not enabled in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }
 
@@ -97,7 +97,7 @@ impl Node {
         self.absent
     }
 
-    /// Returns the reported state. For an absent joint this is Start, unless its drive still reports.
+    /// Returns the reported state. For an absent joint, the state is Start, unless the drive of the joint still reports a state.
     pub(crate) fn state(&self) -> NodeState {
         if self.absent { self.unasked.unwrap_or(NodeState::START) } else { self.report.state }
     }
@@ -117,7 +117,7 @@ impl Node {
 
     /// Returns `true` if the node reports an error. A gripper has no warnings.
     pub(crate) fn faulty(&self) -> bool {
-        // Drives also set this warning before they are configured, for any level of the line.
+        // Drives also set this warning before they are configured, at any level of the safety line.
         let safety_line = self.valid && self.report.warnings & warning::SAFETY_LINE != 0;
         self.in_fault() || (self.seen && safety_line)
     }
@@ -128,13 +128,13 @@ impl Node {
         self.seen && (r.state.is_fault() || (r.errors | r.mc_current) != 0)
     }
 
-    /// Restarts the node. All information about it is discarded.
+    /// Restarts the node and discards all information about the node.
     pub(crate) fn restart(&mut self, config: &Config) {
         *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
     }
 
-    /// Sets the node of an absent joint in every tick (J-53): configured, ready and silent. So the controller requests nothing from the
-    /// node, and does not wait for it. A drive that answers is an error, because either the drive or the setting is wrong.
+    /// Sets the node of an absent joint to configured, ready and silent in every tick (J-53). So the controller does not request a state
+    /// from the node, and does not wait for the node. A drive that answers is an error, because either the drive or the setting is wrong.
     pub(crate) fn stand_in(&mut self) {
         let unasked = self.unasked;
         *self = Self {
@@ -149,7 +149,7 @@ impl Node {
         self.report.state = NodeState::READY;
     }
 
-    /// Discards the configuration, which must be accepted again. Until then position and velocity are not valid.
+    /// Discards the configuration, which must be accepted again. Until the configuration is accepted, position and velocity are not valid.
     pub(crate) fn lose_configuration(&mut self) {
         (self.configured, self.valid, self.refused) = (false, false, false);
         self.measured = Measurement::default();
@@ -187,8 +187,8 @@ impl Node {
         }
     }
 
-    /// Returns `true` if the node is configured and enabled, and must be neither cleared nor reset. For [`Goal::Enabled`] no change is then
-    /// requested from it.
+    /// Returns `true` if the node is configured and enabled, and must be neither cleared nor reset. For [`Goal::Enabled`], the controller
+    /// then does not request a change from the node.
     pub(crate) fn wants_nothing_enabled(&self) -> bool {
         self.seen & self.configured & !self.reset & !self.clear & (self.report.state == NodeState::ENABLED)
     }
@@ -205,7 +205,7 @@ impl Node {
 mod tests {
     use super::*;
 
-    /// The short check has the same result as the long one.
+    /// The short check and the long check have the same result.
     #[test]
     fn j12_j16_an_enabled_node_wants_nothing() {
         for bits in 0..16u8 {

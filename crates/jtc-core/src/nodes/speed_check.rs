@@ -1,7 +1,7 @@
 //! Checks whether the positions and the speed that a drive reports agree (J-35).
 //!
-//! Positions and speed come from two encoders, so each shows a fault of the other. A wrong full scale makes all speeds wrong by a factor.
-//! An encoder that slips moves while the motor does not; an encoder that has stopped is at rest while the motor moves.
+//! Positions and speed come from two encoders, so each encoder shows a fault of the other encoder. A wrong full scale makes all speeds
+//! wrong by a factor. A slipping encoder moves while the motor is at rest. An encoder that has stopped is at rest while the motor moves.
 use super::measure::Ways;
 use super::node::Node;
 use crate::JOINTS;
@@ -9,11 +9,12 @@ use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::limits::JointConfig;
 
-/// Ticks between two checks of the same joint. Each tick checks a single joint.
+/// Number of ticks between two checks of the same joint. Each tick checks at most one joint.
 const PERIOD: u8 = 10;
-/// Consecutive checks of a joint that must show a difference in the same direction.
+/// Number of consecutive checks of a joint that must show a difference in the same direction.
 const LOOKS: u8 = 5;
-/// Multiple of the largest twist of the gear that the differences must exceed in total. A hand or a wall may twist the gear by less.
+/// Multiple of the largest gear twist that the sum of the differences must exceed. A hand or a wall may twist the gear by less than this
+/// amount.
 const TWISTS: f64 = 2.0;
 /// Ratio of the two distances above which the encoder with the shorter distance is considered at rest.
 const STANDS: f32 = 10.0;
@@ -22,9 +23,9 @@ const STANDS: f32 = 10.0;
 #[derive(Clone, Copy, Debug, Default)]
 struct Differs {
     looks: u8,
-    /// Distance of the positions in the windows of these checks, rad.
+    /// Sum of the position changes in the windows of the last checks, rad.
     measured: f32,
-    /// Distance that corresponds to the speed, rad.
+    /// Sum of the distances that correspond to the reported speeds, rad.
     reported: f32,
 }
 
@@ -42,8 +43,8 @@ bit_codec!(Differs { looks, measured, reported });
 bit_codec!(SpeedCheck { turn, differs, torque });
 
 impl SpeedCheck {
-    /// Runs one tick. Returns the joint, as a mask, whose speed has another scale. If only one encoder of a joint moves, its node is marked
-    /// as misbehaved.
+    /// Runs one tick. Returns a mask with the joint whose speed has another scale than configured. If only one encoder of a joint moves,
+    /// the node of the joint is marked as misbehaved.
     #[inline(always)]
     pub(super) fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
         let turn = self.turn;
@@ -68,7 +69,8 @@ impl SpeedCheck {
 }
 
 impl Differs {
-    /// Adds a difference. Returns `true` if it shows that the speed has another scale. `before`: torque at the last check, N·m.
+    /// Adds a difference. Returns `true` if the differences show that the speed has another scale. `before` is the torque at the last
+    /// check, N·m.
     #[cold]
     fn differ(
         &mut self,

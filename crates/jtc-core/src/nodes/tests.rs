@@ -1,4 +1,4 @@
-//! Effect of one tick on a node in each state (J-14, J-16, J-20, J-21, J-23).
+//! Tests of the effect of one tick on a node in each state (J-14, J-16, J-20, J-21, J-23).
 use jtc_bus::{Frame, GripperReport, Request, Target};
 
 use super::*;
@@ -91,7 +91,7 @@ fn j16_a_joint_that_leaves_operation_enable_or_does_not_reach_it_misbehaves() {
     assert_eq!(watched(false, NodeState::ENABLED, 7, still, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::ENABLED, 0, 0, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::READY, 0, 0, Goal::Enabled), (true, false, 0));
-    // This case is an error by J-20.
+    // According to J-20, this case is an error.
     assert_eq!(watched(true, NodeState::INIT, 0, 0, Goal::Enabled), (false, false, 0));
     for goal in [Goal::Ready, Goal::Down] {
         assert_eq!(watched(true, NodeState::READY, 7, still, goal), (false, false, 0), "it was asked to");

@@ -1,4 +1,4 @@
-//! Path time: each tick of a ramp, and the duration of ramps (J-33).
+//! Tests of path time: each tick of a ramp, and the duration of ramps (J-33).
 extern crate std;
 use super::*;
 use proptest::prelude::*;
@@ -55,7 +55,7 @@ fn j33_a_ramp_takes_its_length() {
 
 #[test]
 fn j33_margins_give_way_before_a_stop_comes_late() {
-    // The margins leave no slope or too little, and the torque limits leave enough.
+    // The margins allow no slope or only a small slope, but the torque limits allow a sufficient slope.
     for easy in [(0.0, 0.0), (1.0, -1.0), (0.5, 1.0), (-0.3, FREE.1)] {
         for most in [2.6, 4.0, 10.0, f64::INFINITY] {
             let ticks = stop(|_, _| SlopeBounds { easy, full: (-most, most) });
@@ -105,24 +105,25 @@ fn j33_time_for_a_stop_runs_from_the_first_one() {
     }
 }
 
-/// Each tick of a stop along ramps of 200 ms. The slope changes by at most 0.1125 1/s in a tick, or eight times as much in a hurried stop.
+/// Tests each tick of a stop along ramps of 200 ms. The slope changes by at most 0.1125 1/s in a tick, or eight times as much in a hurried
+/// stop.
 #[test]
 fn j33_each_tick_of_a_stop() {
     let (rounded, hurried) = (4.5 / 0.04 * DT, 8.0 * (4.5 / 0.04 * DT));
     let on_time = 0.001 * (PUNCTUAL * 500.0);
     for (rate, slope, easy, full, expected) in [
         (1.0, 0.0, FREE, FREE, -rounded),
-        // Margins that allow one slope only, larger than the ramp needs; margins that contradict each other; margins that allow no slope.
+        // Bounds with margins that allow only one slope, which is larger than needed, or contradict each other, or allow no slope.
         (1.0, 0.0, (-1.0, -1.0), FREE, -rounded),
         (1.0, 0.0, (1.0, -1.0), FREE, -hurried),
         (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
-        // Within its margins and just in time, so the stop is not hurried.
+        // The stop is within its margins and just in time, so the stop is not hurried.
         (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
-        // At full speed path time does not become faster, for any motion of the arm.
+        // At full speed, path time does not become faster for any motion of the arm.
         (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
-        // The last step: path time is at rest and does not slow down any further.
+        // In the last step, path time is at rest and does not slow down any further.
         (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),
-        // The remaining rate is considered zero, although the limits leave no slope.
+        // The remaining rate is considered zero, although the limits do not allow any slope.
         (1e-10, -5.0, (0.0, 0.0), (0.0, 0.0), 0.0),
     ] {
         let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
@@ -191,7 +192,7 @@ fn j33_each_tick_of_a_resume() {
     for (rate, slope, bounds, expected) in [
         (0.0, 0.0, FREE, rounded),
         (0.5, -1.0, FREE, -1.0 + 8.0 * rounded),
-        // Bounds that allow one slope only, contradict each other, or allow only the other direction.
+        // The bounds allow only one slope, contradict each other, or allow only the opposite direction.
         (0.5, 5.0, (2.0, 2.0), 2.0),
         (0.5, 5.0, (2.0, 1.0), 0.0),
         (0.5, 5.0, (-2.0, -1.0), 0.0),
@@ -209,7 +210,7 @@ fn j33_each_tick_of_a_resume() {
 /// When a tick covers the remaining change of the rate, path time is at full speed and its slope is zero.
 #[test]
 fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
-    // A remaining change that no rounding affects, and the slope that is just sufficient for it.
+    // A remaining change that is not affected by rounding, and the slope that is just sufficient for this change.
     let rest = 1.0 / 16_384.0;
     let enough = rest / DT;
     assert_eq!(enough * DT, rest);
@@ -217,7 +218,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
         (rest, enough, true),
         (rest, 0.99 * enough, false),
         (rest, FREE.1, true),
-        // The remaining change is too small to be held back by a bound.
+        // The remaining change is so small that the bounds do not hold it back.
         (0.9e-9, 0.0, true),
         (1.1e-9, 0.0, false),
     ] {
@@ -231,7 +232,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
 fn j33_the_rest_of_the_way_flattens_the_slope_out() {
     let ramp = Ramp::of(200.0);
     for ticks in [1.0, 2.0, 7.0, 40.0] {
-        // The slope falls from `ticks` times the change per tick to one time; this is the sum.
+        // Sum of a slope that falls from `ticks` times the change per tick to one time the change per tick.
         let way = ramp.round * DT * ticks * (ticks + 1.0) / 2.0;
         assert!((ramp.flatten(way) - ticks * ramp.round).abs() < 1e-9, "{ticks}");
     }
@@ -260,15 +261,15 @@ fn j33_a_rate_below_a_billionth_is_standstill() {
     for (rate, stands) in [(1.01e-9, false), (1e-9, false), (0.99e-9, true)] {
         let mut clock = PathClock { rate, target: 1.0, ..PathClock::default() };
         clock.halt();
-        // The limits leave no slope for the remaining rate.
+        // The limits do not allow any slope for the remaining rate.
         clock.slow_down(200.0, 500.0, &SlopeBounds { easy: (0.0, 0.0), full: (0.0, 0.0) });
         assert_eq!(clock.standing(), stands, "{clock:?}");
     }
 }
 
 proptest! {
-    /// For any speeds at any times, path time reaches the speed by itself, within the rates that were the target so far, and its slope
-    /// never steps.
+    /// For any speeds at any times, path time reaches the requested speed by itself. The rate stays within the target rates so far, and the
+    /// slope never steps.
     #[test]
     fn j57_path_time_gets_to_every_speed_along_the_ramp(
         start in 0.05..1.0f64,
@@ -297,7 +298,7 @@ proptest! {
     }
 }
 
-/// A pause is not ended by a new speed. From a lower speed it does not take longer.
+/// A pause is not ended by a new speed. From a lower speed, the pause does not take longer.
 #[test]
 fn j57_a_speed_that_is_set_does_not_undo_a_pause() {
     let mut clock = PathClock::start(0.5);

@@ -1,10 +1,10 @@
-//! The last usable answers of a joint, and the rate of their positions.
+//! Stores the last usable answers of a joint and computes the rate of the positions.
 use crate::DT;
 use crate::bit_codec::bit_codec;
 
-/// Number of answers over which a rate is computed, and least time for it, ms.
+/// Number of answers over which a rate is computed, and shortest time over which a rate is computed, ms.
 const WINDOW: usize = 5;
-/// Number of slots in the ring: a power of two, so that an index needs no comparison.
+/// Number of slots in the ring. A power of two is used, so that an index needs no comparison.
 const SLOTS: usize = 16;
 const WINDOW_MS: u32 = 5;
 /// Inverse of the time over which the rate is computed while no answer is lost, 1/s.
@@ -20,7 +20,7 @@ pub(super) struct Answered {
 }
 
 impl Answered {
-    /// Returns the distance to a younger answer, rad; zero if both are the same answer.
+    /// Returns the distance to a younger answer, rad. The distance of an answer to itself is zero.
     fn way_to(&self, now: &Self) -> f64 {
         // The difference of such close numbers is exact.
         f64::from(now.position as f32 - self.position as f32)
@@ -32,12 +32,12 @@ impl Answered {
     }
 }
 
-/// A rate of positions.
+/// Rate of the positions of a joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rate {
     /// The rate, rad/s.
     pub rad_s: f64,
-    /// Every answer after the first one of the rate was close to its prediction.
+    /// Every answer of the rate, except the first answer, was close to its prediction.
     pub as_predicted: bool,
 }
 
@@ -50,16 +50,16 @@ struct Kept {
     at_ms: u32,
 }
 
-/// The last answers, in a ring.
+/// Ring of the last answers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct History {
     answers: [Kept; SLOTS],
-    /// Slot of the next answer. The number wraps around.
+    /// Number of the slot for the next answer. The number wraps around.
     next: u8,
-    /// Number of answers before the newest one that came without a gap, one per millisecond. This number may exceed the number of stored
+    /// Number of answers that came before the newest answer without a gap, one per millisecond. This number may exceed the number of stored
     /// answers.
     in_turn: u8,
-    /// Answers that were close to their predictions, as a mask. The newest answer is bit 0.
+    /// Mask of the answers that were close to their predictions. Bit 0 is the newest answer.
     as_predicted: u8,
 }
 
@@ -73,12 +73,13 @@ impl History {
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// Stores an answer. Returns the rate between the youngest answer that is old enough, and this one; `None` if there is no such answer.
+    /// Stores an answer. Returns the rate between the youngest stored answer that is old enough, and this answer. Returns `None` if no
+    /// stored answer is old enough.
     #[inline(always)]
     pub(super) fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
         self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
-        // Nearly always an answer comes in each millisecond, so that only the oldest one is old enough.
+        // In most cases an answer comes in each millisecond, so that only the oldest of five answers is old enough.
         let rate = if self.in_turn >= WINDOW as u8 {
             let rad_s = self.nth(WINDOW - 1).way_to(now) * PER_WINDOW;
             Some(Rate { rad_s, as_predicted: self.younger_as_predicted(WINDOW - 1) })
@@ -107,8 +108,8 @@ impl History {
         self.as_predicted & younger == younger
     }
 
-    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since then. Only the answer of
-    /// the last millisecond may be missing.
+    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since that time. Only the answer
+    /// of the last millisecond may be missing.
     pub(super) fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         let n = u32::from(ms).checked_sub(since_newest)?;
@@ -121,12 +122,12 @@ impl History {
         self.nth(0)
     }
 
-    /// Returns the position of the answer that belongs to this time, rad, if it is still stored.
+    /// Returns the position of the answer that belongs to this time, rad, if the answer is still stored.
     pub(super) fn at(&self, at_ms: u32) -> Option<f64> {
         (0..SLOTS).map(|n| self.nth(n)).find(|answer| answer.at_ms == at_ms).map(|answer| answer.position)
     }
 
-    /// Returns the answer after which `n` younger ones came.
+    /// Returns the answer after which `n` younger answers came.
     #[inline(always)]
     fn nth(&self, n: usize) -> Answered {
         let Kept { position, at_ms } = self.answers[usize::from(self.next).wrapping_sub(1 + n) % SLOTS];
@@ -146,8 +147,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..Default::default() })]
 
-        /// The rate equals the rate from a list of all answers. Each entry of the list has the milliseconds since the answer before, mostly
-        /// one, the position, and `true` if the answer was close to its prediction.
+        /// The rate equals the rate from a list of all answers. Each entry of the list contains the milliseconds since the previous answer
+        /// (mostly 1), the position, and `true` if the answer was close to its prediction.
         #[test]
         fn j63_the_rate_is_from_the_youngest_kept_answer_that_is_old_enough(
             answers in prop::collection::vec((prop_oneof![6 => Just(1u32), 1 => 0..9u32], -3.0..3.0, prop::bool::weighted(0.9)), 1..40),

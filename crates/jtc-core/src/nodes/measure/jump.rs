@@ -1,9 +1,9 @@
-//! Encoders that jump (J-35).
+//! Detects encoders that jump (J-35).
 //!
-//! A drive has two encoders: its position comes from the encoder of the joint, its speed from the encoder of the motor. The speed is the
-//! mean over a window, so it shows how far the position must move within that window. If a position moves further within one answer and
-//! stays there, the joint has not moved, but its encoder has jumped. The jump is subtracted from all further answers, so that the arm does
-//! not move.
+//! A drive has two encoders. The position comes from the encoder of the joint, and the speed comes from the encoder of the motor. The speed
+//! is the mean over a window, so the expected change of the position within this window can be computed. If the position changes by more
+//! than expected between two answers and stays at its new value, the encoder has jumped and the joint has not moved. The jump is subtracted
+//! from all further answers, so that the arm does not move.
 use jtc_wire::StopKind;
 
 use super::Reading;
@@ -12,24 +12,24 @@ use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 
-/// Number of answers in which a difference must be constant before it is a jump.
+/// Number of answers in which a difference must be constant before the difference counts as a jump.
 const CONSTANT: u8 = 5;
-/// Highest number of consecutive answers that may be treated as a possible jump, even if its size changes.
+/// Highest number of consecutive answers that may be treated as a possible jump, even if the size of the jump changes.
 const LOOKS: u8 = 15;
-/// Highest number of changes of a jump's size. If the size changes more often, the difference comes from a twisted gear.
+/// Highest number of changes of a jump's size. If the size changes more often, the difference is attributed to a twisted gear.
 const CHANGES: u8 = 2;
 /// Longest time between two consecutive answers for which a jump between them can be found, ms.
 const WITHIN_MS: u32 = 3;
-/// Steps of the encoder that are tolerated.
+/// Number of encoder steps that are tolerated.
 const STEPS: f64 = 3.0;
-/// Difference that is always tolerated, rad, even if [`STEPS`] configured steps of the encoder are less.
+/// Difference that is always tolerated, rad, even if [`STEPS`] configured encoder steps are smaller.
 const LEAST: f64 = 2e-5;
 /// Share of the distance that is tolerated.
 const SHARE: f64 = 0.1;
-/// Multiple of the tolerance that a jump must exceed. If the clock of a drive drifts against the controller's, some answers contain a
-/// reading that is one drive tick older. Two such slips are not a jump.
+/// Multiple of the tolerance that a jump must exceed. If the clock of a drive drifts against the clock of the controller, some answers
+/// contain a reading that is one drive tick older. Two of these slips do not count as a jump.
 const SLIPS: f64 = 2.0;
-/// Share of the full scale from which on a reported speed is not usable.
+/// Share of the full scale above which a reported speed is not usable.
 const SATURATED: f64 = 0.98;
 
 /// State of the jumps of an encoder.
@@ -39,14 +39,14 @@ pub(super) struct Jumps {
     taken_off: f64,
     /// Difference of the two encoders before the possible jump, rad.
     before: f32,
-    /// Size of the possible jump, rad. After a finding: the size of the jump, or the ratio of the change of the positions to the reported
-    /// speed.
+    /// Size of the possible jump, rad. After a fault was found, this is the size of the jump, or the ratio of the position rate to the
+    /// reported speed.
     value: f32,
     /// Number of answers with the possible jump.
     answers: u8,
     /// Number of consecutive answers that were treated as a possible jump.
     looks: u8,
-    /// Number of changes of the size in this time.
+    /// Number of changes of the size of the possible jump.
     changes: u8,
     /// Fault that was found since the drive was configured.
     found: Option<StopKind>,
@@ -57,15 +57,15 @@ bit_codec!(Jumps { taken_off, before, value, answers, looks, changes, found });
 /// Meaning of an unexpected answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Seen {
-    /// A motion, or it cannot be decided.
+    /// The answer shows a motion, or cannot be classified.
     Motion,
-    /// Possibly a jump by this distance, rad. Until this is decided, the answer is treated as a jump.
+    /// The answer possibly shows a jump by this distance, rad. Until this is decided, the answer is treated as a jump.
     Perhaps(f64),
-    /// A jump by this distance, rad.
+    /// The answer shows a jump by this distance, rad.
     Jump(f64),
 }
 
-/// Distance of a joint within the window of its drive's speed: measured, and computed from the speed.
+/// Two distances of a joint within the window of its drive's speed: the measured distance, and the distance computed from the speed.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nodes) struct Ways {
     /// Distance between the answered positions, rad.
@@ -75,8 +75,8 @@ pub(in crate::nodes) struct Ways {
 }
 
 impl Ways {
-    /// Returns the two distances for an answer and the position (rad) one window before it. Returns `None` if the speed is close to its
-    /// full scale.
+    /// Returns the two distances for an answer and the position (rad) one window earlier. Returns `None` if the speed is close to its full
+    /// scale.
     pub(super) fn of(answer: &Reading, from: f64, config: &Config) -> Option<Self> {
         if answer.velocity.abs() > SATURATED * config.velocity_full_scale {
             return None;
@@ -102,12 +102,12 @@ impl Jumps {
         self.taken_off
     }
 
-    /// Returns the fault that was found since the drive was configured, with the size of a jump (rad) or the factor of a speed.
+    /// Returns the fault that was found since the drive was configured. The value is the size of a jump (rad) or the factor of a speed.
     pub(super) fn found(&self) -> Option<(StopKind, f64)> {
         self.found.map(|kind| (kind, self.value.into()))
     }
 
-    /// Returns `true` while it is not decided whether a possible jump is a jump.
+    /// Returns `true` while a possible jump is neither confirmed nor rejected.
     #[inline(always)]
     pub(super) fn watching(&self) -> bool {
         self.answers > 0
@@ -131,8 +131,9 @@ impl Jumps {
         self.found = Some(StopKind::SpeedScale);
     }
 
-    /// Evaluates an unexpected answer at `at_ms`. `velocity`: velocity that the answer before it reported, rad/s. `twist`: largest twist of
-    /// the gear, rad. A joint that is struck can move away from its motor within some answers, and stay there, but by less than this twist.
+    /// Evaluates an unexpected answer at `at_ms`. `velocity` is the velocity in the previous answer, rad/s. `twist` is the largest twist of
+    /// the gear, rad. If an object strikes a joint, the joint can move away from its motor within some answers and stay there, but by less
+    /// than this twist.
     pub(super) fn look(
         &mut self,
         answer: &Reading,
@@ -170,7 +171,7 @@ impl Jumps {
         }
         let size = now.unexplained() - f64::from(self.before);
         if watched == 0 || (size - f64::from(self.value)).abs() > tolerance {
-            // The possible jump has begun with this answer, or its size has changed.
+            // The possible jump has begun with this answer, or the size of the jump has changed.
             (self.value, same) = (size as f32, 0);
             self.changes += u8::from(watched > 0);
             let twisted = self.changes > CHANGES || (self.changes > 0 && size.abs() <= twist);

@@ -1,11 +1,12 @@
-//! Lateness of the answers of a joint (J-63).
+//! Determines the lateness of the answers of a joint (J-63).
 //!
-//! An answer does not identify the Move that it answers, but the answers of a node keep their order. So the lateness of the newest answer
-//! is the number of Moves that were sent after its own Move: the *outstanding* Moves. A missing answer may be late or lost. Both look the
-//! same until two answers come in one tick: the first of them was late. For a second after such *evidence*, unanswered Moves are counted as
-//! outstanding, at most as many as have come in together. Without evidence they are counted as lost. Evidence may be wrong, because a frame
-//! that the bus repeats comes twice. A lost answer is found in the long run, because the count does not return to zero: the lowest count of
-//! a window is subtracted.
+//! An answer does not identify its Move, but the answers of a node keep their order. So the lateness of the newest answer is the number of
+//! Moves that were sent after the Move of this answer. These are the *outstanding* Moves. A missing answer may be late or lost. A late
+//! answer cannot be distinguished from a lost answer until two answers come in one tick, because the first of the two answers was late. For
+//! a second after this *evidence*, unanswered Moves are counted as outstanding. The number of outstanding Moves is at most the highest
+//! number of late answers in one tick. Without evidence, unanswered Moves are counted as lost. Evidence may be wrong, because a frame that
+//! the bus repeats comes twice. A lost answer is detected later, because the count does not return to zero. The lowest count of a window is
+//! therefore subtracted.
 use crate::bit_codec::bit_codec;
 
 /// Time for which evidence is valid, ms.
@@ -18,30 +19,30 @@ const MOST: u8 = 7;
 /// Unanswered Moves of a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Lateness {
-    /// Time left for which the last evidence is valid, ms.
+    /// Remaining time for which the last evidence is valid, ms.
     left_ms: u16,
-    /// Moves whose answers may still come.
+    /// Number of Moves whose answers may still come.
     outstanding: u8,
-    /// Upper bound of `outstanding`: the highest number of answers in one tick, minus one, while evidence is valid.
+    /// Upper bound of `outstanding`. While evidence is valid, this is the highest number of answers in one tick, minus one.
     most: u8,
-    /// Lowest `outstanding` in this window, and number of ticks in the window so far.
+    /// Lowest value of `outstanding` in this window, and number of ticks in the window so far.
     fewest: u8,
     window: u8,
-    /// Recent ticks in which a Move was sent, as a mask. The newest tick is bit 0.
+    /// Mask of the recent ticks in which a Move was sent. Bit 0 is the newest tick.
     moves: u8,
 }
 
 bit_codec!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 
 impl Lateness {
-    /// Returns `true` if no answer is considered late and the `answers` of a tick, at most one, are not evidence. [`Self::count`] need not
-    /// be called for this tick.
+    /// Returns `true` if no answer is considered late and the tick has at most one answer, so that `answers` is not evidence. In this case
+    /// [`Self::count`] does not need to be called for the tick.
     pub(super) fn stands(&self, answers: u8) -> bool {
         self.left_ms == 0 && answers <= 1
     }
 
-    /// Counts one tick, `elapsed_ms` after the last one, with this number of `answers`. `asked`: a Move was sent for it. Returns the
-    /// lateness of the newest answer, ticks.
+    /// Counts one tick, `elapsed_ms` after the last tick, with this number of `answers`. `asked` means that a Move for this tick was sent
+    /// and acknowledged. Returns the lateness of the newest answer, ticks.
     pub(super) fn count(&mut self, asked: bool, answers: u8, elapsed_ms: u32) -> u8 {
         if self.left_ms == 0 {
             *self = Self { moves: u8::MAX, ..Self::default() };
@@ -51,10 +52,10 @@ impl Lateness {
             self.most = self.most.max(answers - 1).min(MOST);
         }
         self.left_ms = self.left_ms.saturating_sub(elapsed_ms.min(LASTS_MS.into()) as u16);
-        // The Move was sent in the previous tick, whose time is not limited.
+        // The Move was sent in the previous tick, which may have been any time ago.
         let moves = self.moves << 1 | u8::from(asked);
         self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
-        // If there are more answers than outstanding Moves, some of them had been counted as lost.
+        // If more answers come than Moves are outstanding, some of these answers were counted as lost before.
         let outstanding = (self.outstanding + u8::from(asked)).saturating_sub(answers);
         self.outstanding = outstanding.min(self.most);
         self.fewest = self.fewest.min(self.outstanding);
@@ -66,14 +67,14 @@ impl Lateness {
         self.age()
     }
 
-    /// Corrects the count: the newest answer was only `late` ticks late, because some of the outstanding answers were lost.
+    /// Corrects the count if the newest answer was only `late` ticks late, because some of the outstanding answers were lost.
     pub(super) fn lost(&mut self, late: u8) {
         let behind = self.moves & !u8::MAX.checked_shl(late.into()).unwrap_or(0);
         self.outstanding = self.outstanding.min(behind.count_ones() as u8);
         self.fewest = self.fewest.min(self.outstanding);
     }
 
-    /// Returns the age in ticks of the newest Move that has been answered: all outstanding Moves were sent after it.
+    /// Returns the age in ticks of the newest answered Move. All outstanding Moves were sent after this Move.
     fn age(&self) -> u8 {
         let (mut behind, mut age) = (self.outstanding, 0);
         while age < MOST && (behind > 0 || self.moves >> age & 1 == 0) {
@@ -93,10 +94,10 @@ mod tests {
 
     use super::*;
 
-    /// One tick: `true` if a Move was sent, `true` if its answer is lost, and the lateness of the answer.
+    /// Data of one tick: `true` if a Move was sent, `true` if its answer is lost, and the lateness of the answer.
     type Sent = (bool, bool, u8);
 
-    /// Returns for each tick the counted lateness, and the real lateness of the newest answer, if any.
+    /// Returns two values for each tick: the counted lateness, and the real lateness of the newest answer, if an answer came.
     fn counted(sent: &[Sent]) -> Vec<(u8, Option<u8>)> {
         let mut lateness = Lateness::default();
         let (mut due, mut last) = (Vec::new(), 0);
@@ -116,8 +117,8 @@ mod tests {
         all
     }
 
-    /// Begins with a burst that shows the highest lateness; after that, any lateness may occur. In every 24th tick all outstanding answers
-    /// have come. Some Moves are not sent, and `lost` of 100 answers are lost in these `ticks`.
+    /// Returns a sequence that begins with a burst, which shows the highest lateness. After that, any lateness may occur. In every 24th
+    /// tick, no answer is outstanding. Some Moves are not sent, and `lost` of 100 answers are lost in these `ticks`.
     fn sent(most: u8, lost: u32, ticks: usize) -> impl Strategy<Value = Vec<Sent>> {
         let any = (prop::bool::weighted(0.9), 0..100u32, 0..=most);
         prop::collection::vec(any, ticks).prop_map(move |any| {
@@ -144,7 +145,8 @@ mod tests {
         /// If some answers were lost, every count is correct again after the windows of the loss.
         #[test]
         fn j63_what_was_lost_is_taken_off(
-            // If the highest number of answers is outstanding, a lost one makes no difference. Therefore fewer are outstanding here.
+            // If the highest number of answers is outstanding, a lost answer makes no difference. Therefore fewer answers are outstanding
+            // in the second part.
             some in (1..=MOST).prop_flat_map(|most| (sent(most, 20, 240), sent(most - 1, 0, 480))),
         ) {
             let (with, without) = some;
@@ -172,7 +174,7 @@ mod tests {
             assert_eq!(lateness.count(true, 1, 1), 0);
             lateness.count(true, 0, 1);
             assert_eq!(lateness.count(true, 1, long), long as u8);
-            // This tick also gets the answer to the Move of the tick before.
+            // This tick also gets the answer to the Move of the previous tick.
             lateness.count(true, 2, 1);
             assert_eq!(lateness.count(true, 1, long), long as u8 - 1);
         }

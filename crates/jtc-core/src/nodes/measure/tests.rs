@@ -34,7 +34,7 @@ fn step(joint: &mut Measurement, tick: &Tick) -> bool {
     joint.step(tick, past, &Config::avena()) == Outcome::Used
 }
 
-/// A joint that has moved at this velocity for a while. The joint is at position 0 now.
+/// Returns the measurement of a joint that has moved at this velocity for some time and is now at position 0.
 fn moving(velocity: f64) -> Measurement {
     let mut joint = Measurement::default();
     for k in -20..=0 {
@@ -140,8 +140,8 @@ fn j63_a_long_tick_is_predicted_for_its_length() {
     assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < ROUNDED);
 }
 
-/// A joint moves at `rate` but reports another velocity. Then an answer is `off` its position, `since` more answers follow from there, and
-/// the next answer is missing. Returns the rate of its prediction.
+/// Simulates a joint that moves at `rate` but reports another velocity. Then an answer differs from its position by `off`, `since` more
+/// answers follow from that position, and the next answer is missing. Returns the rate of the prediction.
 fn carried_after(rate: f64, reported: f64, off: f64, since: u8) -> f64 {
     let mut joint = Measurement::default();
     let answer = |k: f64, off: f64| Tick {
@@ -180,7 +180,7 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     }
 }
 
-/// The predicted velocity follows the commands. Its difference from the answer fades.
+/// The predicted velocity follows the commands. The difference between prediction and answer fades.
 #[test]
 fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     let mut joint = moving(0.4);
@@ -232,11 +232,11 @@ fn j63_an_offset_fades_like_a_critically_damped_filter() {
             assert!((fading.slope - exact.1).abs() < 1e-4 * 1e-3, "{ms} ms: {fading:?} {exact:?}");
         }
     }
-    // A small remainder is not dropped at once either.
+    // A small remainder is also not dropped at once.
     let mut little = Fading { left: 1e-6, slope: 0.0 };
     little.step(1, &config);
     assert!(little.left > 0.9e-6, "{little:?}");
-    // Without elapsed time nothing fades. An offset is dropped only if both its value and its slope are below the bound.
+    // Without elapsed time, an offset does not fade. An offset is dropped only if its value and its slope are both below the bound.
     for (left, slope, dropped) in [
         (FADED, 0.0, false),
         (0.0, -FADED, false),

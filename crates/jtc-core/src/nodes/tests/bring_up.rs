@@ -1,4 +1,4 @@
-//! Requests to a drive, and the diagram of them in docs/protocol-jtc.md.
+//! Tests of the requests to a drive, and of the diagram of these requests in docs/protocol-jtc.md.
 extern crate std;
 use std::format;
 use std::string::String;
@@ -7,7 +7,8 @@ use std::vec::Vec;
 use super::*;
 use crate::docs_check::is_in_the_protocol;
 
-/// States of a drive, without those that it leaves by itself after some time; the request that leads to each, and its name.
+/// States of a drive, each with the request that leads to the state and the name of the state. States that the drive leaves by itself after
+/// some time are not included.
 const STATES: [(NodeState, Target, &str); 5] = [
     (NodeState::START, Target::NoChange, "Start"),
     (NodeState::INIT, Target::Init, "Init"),
@@ -17,7 +18,7 @@ const STATES: [(NodeState, Target, &str); 5] = [
 ];
 const GOALS: [(Goal, &str); 3] =
     [(Goal::Ready, "in Init"), (Goal::Enabled, "with torque"), (Goal::Down, "in Error")];
-/// Possible knowledge about the configuration of a node.
+/// Knowledge of the controller about the configuration of a node.
 const KNOWN: [(bool, bool, &str); 3] =
     [(false, false, "unknown"), (false, true, "refused"), (true, false, "accepted")];
 

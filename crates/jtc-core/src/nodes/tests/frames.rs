@@ -1,4 +1,4 @@
-//! Requests to nodes, and the frame that each tick sends (J-12, J-16, J-20, J-23).
+//! Tests of the requests to nodes, and of the frame that each tick sends (J-12, J-16, J-20, J-23).
 use super::*;
 
 #[test]
@@ -63,7 +63,7 @@ fn j20_a_node_is_configured_in_init_and_ready_once() {
     }
 }
 
-/// Kind of the frame of a tick.
+/// Kind of the frame that a tick sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sent {
     Move,
@@ -73,7 +73,7 @@ enum Sent {
     ResetAll,
 }
 
-/// Sends one frame to ready nodes that `change` has modified. `moves`: number of Moves since the last other frame.
+/// Sends one frame to ready nodes that `change` has modified. `moves` is the number of Moves since the last frame of another kind.
 fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     let (config, mut nodes) = (Config::avena(), ready());
     nodes.moves = moves;
@@ -128,7 +128,7 @@ fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
     }
 }
 
-/// Under torque, a frame for the gripper alone is sent in one tick of twenty.
+/// While the torque is on, a frame for the gripper alone is sent in one tick of twenty.
 #[test]
 fn j23_a_gripper_is_brought_up_on_the_side() {
     let (wait, many) = (|nodes: &mut Nodes| waits(nodes, GRIPPER), 19);
@@ -153,19 +153,19 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
         nodes.nodes[GRIPPER].silent = 5;
     };
     assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
-    // A joint that must be enabled does not wait for this number of ticks.
+    // A joint that must be enabled does not wait for twenty ticks.
     let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
     assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
 }
 
-/// Configurations and changes of state take turns, but a node that is enabled refuses a configuration.
+/// Configurations and changes of state alternate, but a node that is enabled refuses a configuration.
 #[test]
 fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     for (state, seen, configured_last, frame) in [
         (NodeState::ENABLED, true, false, Sent::ControllerState),
         (NodeState::ENABLED, true, true, Sent::ControllerState),
-        // The node must be brought from Init to Ready, which can wait.
+        // The change of the node from Init to Ready can wait.
         (NodeState::INIT, true, false, Sent::Mode),
         (NodeState::INIT, true, true, Sent::ControllerState),
         // After a restart, earlier reports of the node are not valid.
@@ -181,7 +181,8 @@ fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     }
 }
 
-/// If no other frame must be sent, one configuration may follow another. A node that must stay enabled does not need to wait.
+/// If no other frame must be sent, one configuration frame may follow another. A node that must stay enabled does not delay a configuration
+/// frame.
 #[test]
 fn j20_configurations_and_changes_of_state_take_turns() {
     let enabling = |nodes: &mut Nodes| {
@@ -222,7 +223,8 @@ fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool
     }
 }
 
-/// A gripper that keeps its part does not change while the arm has no torque, except for its own clear, and not for ever.
+/// A gripper that keeps holding its part does not change its state while the arm has no torque, except if the gripper itself is cleared.
+/// This exception does not last for ever.
 #[test]
 fn j23_what_a_gripper_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};
@@ -232,13 +234,13 @@ fn j23_what_a_gripper_is_asked_for() {
         (Goal::Ready, NodeState::ENABLED, true, false, Ready, NoChange),
         (Goal::Down, NodeState::ENABLED, true, true, Ready, Ready),
         (Goal::Ready, NodeState::ENABLED, true, true, Ready, Ready),
-        // Enabled, but the configuration is lost: the gripper accepts a new one only in Ready.
+        // The gripper is enabled but has lost its configuration. The gripper accepts a new configuration only in Ready.
         (Goal::Enabled, NodeState::ENABLED, false, false, Ready, Ready),
         (Goal::Enabled, NodeState::READY, true, false, Enable, Enable),
         (Goal::Enabled, NodeState::READY, false, false, NoChange, NoChange),
         (Goal::Enabled, NodeState::START, false, false, Init, Init),
         (Goal::Enabled, NodeState::INIT, true, false, Ready, Ready),
-        // In Error no node is brought up.
+        // In Error, the controller does not bring up any node.
         (Goal::Ready, NodeState::START, false, false, Init, Init),
         (Goal::Down, NodeState::START, false, false, NoChange, NoChange),
     ] {

@@ -1,4 +1,4 @@
-//! Moves without an answer, without a possible answer, and without an acknowledgement (J-14, J-35, J-63).
+//! Tests of Moves without an answer, without a plausible answer, and without an acknowledgement (J-14, J-35, J-63).
 extern crate std;
 
 use super::*;
@@ -6,7 +6,7 @@ use super::*;
 #[test]
 fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     let lost = BusState { acknowledged: false, bus_off: false };
-    // During bus-off no node can have answered, even if an earlier frame was acknowledged.
+    // During bus-off, answers are not possible, even if an earlier frame was acknowledged.
     let off = BusState { acknowledged: true, bus_off: true };
     for (state, sent_move, unacknowledged, silent) in [
         (GOOD, true, 0, 1),
@@ -25,7 +25,7 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
         for (n, node) in nodes.nodes.iter().enumerate() {
             assert_eq!(node.silent, if n == 4 { 0 } else { silent }, "{state:?} {sent_move}, node {n}");
         }
-        // A node that answers has started.
+        // If a node answers, the node has started.
         nodes.sent_move = true;
         tick(&mut nodes, &all(NodeState::READY), GOOD);
         assert_eq!((nodes.unacknowledged, nodes.nodes[4].boot_left), (0, 0));
@@ -37,14 +37,15 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     assert_eq!(booting.unacknowledged, 0, "nobody is there to acknowledge");
 }
 
-/// Until the transmit timeout, a joint is predicted if no node can have answered, and this is counted as a missing answer of the joint.
+/// Until the transmit timeout, a joint is predicted if answers are not possible. Each of these ticks counts as a missing answer of the
+/// joint.
 #[test]
 fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known() {
     let lost = BusState { acknowledged: false, bus_off: false };
     for (unacknowledged, sent_move, valid, before, missed) in [
         (0, true, true, 0, 1),
         (3, true, true, 0, 1),
-        // In this tick the transmit timeout is raised, and applies to all joints.
+        // In this tick, the transmit timeout is raised and applies to all joints.
         (4, true, true, 0, 0),
         (4, true, true, 3, 0),
         (2, false, true, 3, 3),
@@ -64,8 +65,9 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
     assert!(!nodes.node(GRIPPER).misbehaved);
 }
 
-/// If two answers come in a tick, the first one was late: the distance between them is not a motion. In the next tick, a single answer may
-/// again be the first one in time. Its difference from the prediction is bridged as well.
+/// If two answers come in a tick, the first answer was late, so the distance between the two answers does not show a motion within this
+/// tick. In the next tick, a single answer may again be the first answer in time. The difference of this answer from the prediction is also
+/// bridged.
 #[test]
 fn j63_the_second_answer_of_a_tick_makes_no_step() {
     let mut nodes = ready();
@@ -78,7 +80,7 @@ fn j63_the_second_answer_of_a_tick_makes_no_step() {
     bus[2] = answer(0.001);
     tick(&mut nodes, &bus, GOOD);
     let before = nodes.positions()[2];
-    // The position that the joint has reached by now, plus 1 mrad.
+    // The answer contains the present position of the joint plus 1 mrad.
     bus.push(answer(0.003));
     tick(&mut nodes, &bus, GOOD);
     let carried = nodes.positions()[2] - before;
@@ -109,7 +111,7 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
         assert_eq!(nodes.node(2).misbehaved, ms == 5, "after {ms}");
         assert!(!nodes.node(2).fresh() && nodes.node(1).fresh() && nodes.node(2).silent == 0);
     }
-    // An answer without a Move before it is checked as well.
+    // An answer without a previous Move is also checked.
     let mut nodes_without = ready();
     tick(&mut nodes_without, &all(NodeState::READY), GOOD);
     nodes_without.sent_move = false;
@@ -117,7 +119,7 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes_without, &bus, GOOD);
     assert_eq!((nodes_without.node(2).missed, nodes_without.node(1).missed), (1, 0));
-    // After that, the answer is used without a correction.
+    // The next answer is used without a correction.
     let mut bus = all(NodeState::READY);
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes, &bus, GOOD);
@@ -144,7 +146,7 @@ fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
     assert_eq!(absent.gripper_flags(&config), 0, "none is expected");
 }
 
-/// Any node may have lost its supply while it was silent, but an enabled gripper shows this by its state.
+/// Any node may have lost its supply while it did not answer, but the state of an enabled gripper shows this.
 #[test]
 fn j14_a_node_that_was_silent_has_lost_its_configuration_unless_it_is_an_enabled_gripper() {
     for (n, state, kept) in [

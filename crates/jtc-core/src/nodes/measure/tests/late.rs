@@ -1,25 +1,25 @@
-//! Late answers, and lost answers among them (J-63).
+//! Tests of late answers, and of lost answers among late answers (J-63).
 use std::vec::Vec;
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// One step of the encoders, rad.
+/// Resolution of the encoders, rad.
 const ENCODER: f64 = 96e-6;
 
-/// A joint that moves to and fro.
+/// Joint that moves to and fro.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     /// Amplitude, rad.
     amplitude: f64,
     /// Angular frequency, 1/s.
     rate: f64,
-    /// Commanded share of the motion. The rest of the motion is not commanded.
+    /// Commanded share of the motion. The remaining motion is not commanded.
     commanded: f64,
 }
 
-/// Difference between the values used in a millisecond, and the real position and speed of the joint.
+/// Difference between the used values and the real position and speed of the joint in one millisecond.
 #[derive(Clone, Copy, Debug)]
 struct Off {
     /// Position, rad.
@@ -51,7 +51,7 @@ impl Motion {
         }
     }
 
-    /// Runs all milliseconds. `came`: the numbers of the answers in each of them.
+    /// Runs all milliseconds. `came` contains the numbers of the answers in each millisecond.
     fn off(&self, came: &[Vec<u32>]) -> Vec<Off> {
         self.off_with(came, &Config::avena())
     }
@@ -85,8 +85,8 @@ impl Motion {
     }
 }
 
-/// Returns the numbers of the answers that come in each millisecond. `late`: lateness of each answer; the answers keep their order. `lost`:
-/// answers that never come.
+/// Returns the numbers of the answers that come in each millisecond. `late` is the lateness of each answer. The answers keep their order.
+/// `lost` marks answers that never come.
 fn arrivals(late: &[u32], lost: &[u32]) -> Vec<Vec<u32>> {
     let mut came = std::vec![Vec::new(); late.len()];
     let mut last = 0;
@@ -104,8 +104,8 @@ fn most(off: &[Off]) -> f64 {
     off.iter().fold(0.0, |most, off| most.max(off.position.abs()))
 }
 
-/// Lateness of each answer: twenty answers in time, then a burst that shows the highest lateness, then any lateness. In every 24th tick all
-/// answers have come.
+/// Returns the lateness of each answer. Twenty answers come in time, then a burst shows the highest lateness, and after that any lateness
+/// may occur. In every 24th tick, no answer is outstanding.
 fn lateness(most: u32) -> impl Strategy<Value = Vec<u32>> {
     let burst = (0..=20).map(|_| 0).chain((0..=most).rev());
     let burst: Vec<u32> = burst.collect();
@@ -149,15 +149,15 @@ proptest! {
         }
     }
 
-    /// However many answers are lost among the late ones, the position error is at most the distance in the highest lateness, plus the
-    /// bridged difference when the loss is detected, which is equally large. No part of the error remains.
+    /// For any number of lost answers among the late answers, the position error has an upper bound. The bound is the distance in the
+    /// highest lateness, plus the equally large difference that is bridged when the loss is detected. No part of the error remains.
     #[test]
     fn j63_answers_lost_among_late_ones_are_taken_for_late_for_a_while_only(
         motion in motion(),
         late in lateness(3),
         lost in prop::collection::vec(30u32..300, 0..20),
     ) {
-        // No answer is late at the end, but the losses are detected there as well.
+        // No answer is late at the end, but the lost answers are also detected there.
         let late: Vec<u32> = late.iter().enumerate().map(|(n, late)| if n < 400 { *late } else { 0 }).collect();
         let off = motion.off(&arrivals(&late, &lost));
         let way = 4.0 * motion.speed() * DT;
@@ -166,8 +166,8 @@ proptest! {
     }
 }
 
-/// The answer of a fast joint after a lost one is at its predicted position, and does not lag by the distance of a millisecond. So the loss
-/// is detected before the window is over.
+/// The answer of a fast joint after a lost answer is at the predicted position, and does not lag by the distance of a millisecond. So the
+/// lost answer is detected before the window ends.
 #[test]
 fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -177,7 +177,7 @@ fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     assert!(most(&off[190..250]) <= 3.0 * ENCODER, "{:?}", &off[190..250]);
 }
 
-/// Late answers before the first evidence make no step: the difference is bridged, and fades.
+/// Late answers before the first evidence do not cause a step, because the difference is bridged and fades.
 #[test]
 fn j63_the_first_late_answers_make_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -190,7 +190,7 @@ fn j63_the_first_late_answers_make_no_step() {
     }
 }
 
-/// Once answers are known to be late, a change of the lateness makes no step, even if the encoder is configured as coarse.
+/// When late answers have been detected, a change of the lateness does not cause a step, even with a coarse configured encoder step.
 #[test]
 fn j63_a_lateness_that_shifts_makes_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -207,8 +207,8 @@ fn j63_a_lateness_that_shifts_makes_no_step() {
     }
 }
 
-/// A constant delay is not detected; `delay_ticks` exists for it. If all answers have the same lateness, the position follows them without
-/// a permanent offset.
+/// A constant delay is not detected. The setting `delay_ticks` accounts for a constant delay. If all answers have the same lateness, the
+/// position follows them without a permanent offset.
 #[test]
 fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -241,7 +241,7 @@ fn j63_what_was_bridged_is_taken_back() {
     }
 }
 
-/// The remainder changes towards zero, and not beyond it.
+/// The remainder changes towards zero, but not beyond zero.
 #[test]
 fn j63_only_what_is_left_is_taken_back() {
     for (left, by, remains) in [

@@ -1,4 +1,4 @@
-//! Reports of the controller: the telemetry of the tick and the JtcStatus frame (section 2).
+//! Reports of the controller: the telemetry of a tick, and the JtcStatus frame (section 2).
 use jtc_wire::{GripperStatus, JointStatus, RawPoint, Response, Status};
 
 use crate::JOINTS;
@@ -11,7 +11,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.observed = Observed { tick: self.observed.tick + 1, torque: *torque };
     }
 
-    /// Returns the values that the last tick computed. This function collects them instead of the tick, because a board needs few of them.
+    /// Returns the values that the last tick computed. The tick does not collect these values, because a board needs only a few of the
+    /// values.
     #[inline]
     pub fn telemetry(&self) -> Telemetry {
         Telemetry {
@@ -58,7 +59,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Returns `true` if a JtcStatus is due: at once for a response, otherwise once per period (J-04).
     pub(crate) fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
-        // This is also computed while the line is busy, so that every tick does the same work.
+        // The result is also computed while the line is busy, so that every tick does the same work.
         let wanted = !self.records.is_empty() | (self.since_status_ms >= self.config.status_period_ms);
         let due = wanted && free;
         if due {

@@ -1,4 +1,4 @@
-//! Response records that wait for their status frame (J-04), in a queue for each host line.
+//! Queues of the response records that wait for their status frames (J-04), one queue for each host line.
 use jtc_wire::Response;
 
 /// Highest number of records that wait on a line. Up to this number no record is lost.
@@ -6,13 +6,13 @@ pub const RECORDS_MAX: usize = 64;
 /// Number of host lines.
 pub const HOST_LINES: usize = 2;
 
-/// The records of one line, oldest first.
+/// Response records of one line, oldest first.
 #[derive(Clone, Debug)]
 struct ResponseQueue {
     ring: [Response; RECORDS_MAX],
     first: usize,
     len: usize,
-    /// Index, from the oldest record, of the single record for all noise.
+    /// Index of the single record for all noise, counted from the oldest record.
     noise: Option<usize>,
 }
 
@@ -25,10 +25,11 @@ impl ResponseQueue {
         &mut self.ring[(self.first + n) % RECORDS_MAX]
     }
 
-    /// Appends a record. Returns `false` if this drops a record: the record of noise if the queue has one, otherwise the oldest.
+    /// Appends a record. Returns `false` if a record is dropped. This is the record of noise if the queue contains one, otherwise the
+    /// oldest record.
     fn push(&mut self, response: Response, noise: bool) -> bool {
         if noise && self.noise.is_some() {
-            // The record that already waits also stands for this noise.
+            // The waiting record of noise also represents this noise.
             return true;
         }
         let full = self.len == RECORDS_MAX;
@@ -61,13 +62,13 @@ impl ResponseQueue {
         let response = *self.slot(0);
         self.first = (self.first + 1) % RECORDS_MAX;
         self.len -= 1;
-        // The record of noise moves up by one, or was removed.
+        // The record of noise moves forward by one position, or was removed.
         self.noise = self.noise.and_then(|place| place.checked_sub(1));
         Some(response)
     }
 }
 
-/// The records of all lines. A full line does not drop records of another line.
+/// Response records of all lines. A full queue does not drop records of another line.
 #[derive(Clone, Debug)]
 pub(crate) struct ResponseQueues {
     lines: [ResponseQueue; HOST_LINES],
@@ -91,13 +92,13 @@ impl ResponseQueues {
         self.lost
     }
 
-    /// Adds a record for `line`. `noise`: the received bytes are not a frame.
+    /// Adds a record for `line`. `noise` means that the received bytes are not a frame.
     pub(crate) fn push(&mut self, line: usize, response: Response, noise: bool) {
         let kept = self.lines.get_mut(line).is_some_and(|queue| queue.push(response, noise));
         self.lost = self.lost.saturating_add(u32::from(!kept));
     }
 
-    /// Returns the oldest record of a line, with the line. The lines take turns.
+    /// Returns the oldest record of a line, and the number of the line. The lines are served in turn.
     pub(crate) fn pop(&mut self) -> Option<(usize, Response)> {
         for _ in 0..HOST_LINES {
             let line = self.turn;
@@ -179,7 +180,7 @@ mod tests {
         assert_eq!(all(&mut records), (0..64).map(|n| (0, good(n))).collect::<Vec<_>>());
     }
 
-    /// The index must not grow without end, or it would overflow.
+    /// The index must not grow without a limit, because it would overflow.
     #[test]
     fn j04_the_ring_stays_a_ring() {
         let mut queue = ResponseQueue::new();
@@ -190,7 +191,7 @@ mod tests {
         }
     }
 
-    /// Wherever the record of noise is, the other records move up in order.
+    /// For any position of the record of noise, the other records move forward in order.
     #[test]
     fn j04_what_goes_for_another_leaves_the_others_in_order() {
         for place in [0, 1, 30, 62, 63] {

@@ -1,17 +1,17 @@
-//! The safety input (J-22): a 0 takes the torque away, at once or after a stop.
+//! Safety input (J-22). The value 0 removes the torque, at once or after a stop.
 use jtc_wire::{ExecCommand, RawPoint};
 
 use crate::controller::Controller;
 use crate::io::Inputs;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
-/// Marks that the time for a stop is over.
+/// Value that marks the end of the time for a stop.
 const OVER: u16 = u16::MAX;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Runs a tick in which the safety input is 0, or has been 0 before. With `safety_input_ramp_ms` a commanded motion comes to rest first
-    /// (stop category 1 of IEC 60204-1), even if the input returns to 1 meanwhile. The error is raised in every case, even if the torque
-    /// has already been taken away.
+    /// Runs a tick in which the safety input is 0, or has been 0 before. If `safety_input_ramp_ms` is set, a commanded motion comes to rest
+    /// first (stop category 1 of IEC 60204-1), even if the input returns to 1 meanwhile. The error is raised in every case, even if the
+    /// torque has already been removed.
     #[cold]
     pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
@@ -31,7 +31,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
     }
 
-    /// Returns `true` if the safety input takes the torque away in this tick.
+    /// Returns `true` if the safety input removes the torque in this tick.
     pub(crate) fn safety_input_releases(&self, level: bool) -> bool {
         match self.safety_stop_ms {
             Some(ms) => ms == OVER,
@@ -48,8 +48,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// Returns `true` if the arm moves by command or is led, and every joint has torque. If a drive is not enabled yet, a joint yields, or
-    /// the arm moves for another reason, a stop would only keep the torque on for longer.
+    /// Returns `true` if a command or a hand moves the arm, and every joint has torque. If a drive is not enabled yet, a joint yields, or
+    /// the arm moves for another reason, a stop would only delay the removal of the torque.
     fn has_to_stop(&self) -> bool {
         let enabled = |j: usize| self.nodes.node(j).enabled() || self.config.absent.get(j) == Some(&true);
         let moves = match self.state {

@@ -1,5 +1,5 @@
-//! Settings that a host reads and changes (J-53): the table of settings, and functions that apply a list of values completely or not at
-//! all.
+//! Settings that a host reads and changes (J-53). The module contains the table of settings, and functions that apply a list of values
+//! completely or not at all.
 use jtc_dynamics::{Payload, PayloadError};
 use jtc_wire::SettingValue;
 
@@ -28,22 +28,22 @@ pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
 /// States in which a setting may be changed, in addition to Init and Error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Live {
-    /// Never. The setting is part of the arm: stored, and in its hash.
+    /// No other state. The setting is part of the arm, so it is stored with the arm and included in the hash of the arm.
     No,
-    /// Never, like `No`, but the setting is not part of the arm.
+    /// No other state, like `No`, but the setting is not part of the arm.
     Unpowered,
-    /// In HoldPos, Teaching and Pause, but not while a motion runs. The setting is not part of the arm.
+    /// HoldPos, Teaching and Pause, but not during a motion. The setting is not part of the arm.
     Standing,
-    /// In every state, also while the arm moves. The setting is not part of the arm.
+    /// Every state, also while the arm moves. The setting is not part of the arm.
     Always,
 }
 
-/// Kind of a setting, and the place of its value.
+/// Kind of a setting, which determines the storage of its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A number for each joint.
     Joint,
-    /// A number for each joint that is not one of its limits.
+    /// A number for each joint that does not belong to the joint limits.
     Each,
     /// A switch for each joint, 0 or 1.
     EachSwitch,
@@ -62,7 +62,7 @@ pub struct Setting {
     pub number: u8,
     /// Name in arm files, including the unit.
     pub name: &'static str,
-    /// Unit; empty if the setting has none.
+    /// Unit of the setting. The text is empty if the setting has no unit.
     pub unit: &'static str,
     /// Lowest value.
     pub low: f64,
@@ -84,14 +84,14 @@ pub enum SettingError {
     Unknown {
         /// Number of the setting.
         setting: u8,
-        /// Joint, from 1; 0 for a setting of the arm.
+        /// Number of the joint, from 1. The number is 0 for a setting of the arm.
         joint: u8,
     },
     /// The value is out of range, NaN, or not a whole number.
     Value {
         /// Name of the setting.
         name: &'static str,
-        /// Joint, from 1; 0 for a setting of the arm.
+        /// Number of the joint, from 1. The number is 0 for a setting of the arm.
         joint: u8,
         /// The value.
         value: f64,
@@ -100,7 +100,7 @@ pub enum SettingError {
         /// Highest allowed value.
         high: f64,
     },
-    /// The settings are not valid together.
+    /// The combination of settings is not valid.
     Config(ConfigError),
     /// The payload is not a valid body (J-60).
     Payload(PayloadError),
@@ -138,17 +138,18 @@ impl Setting {
         matches!(self.kind, Kind::Joint | Kind::Each | Kind::EachSwitch)
     }
 
-    /// Returns `true` if the setting is part of the arm: it is stored with the arm and included in its hash.
+    /// Returns `true` if the setting is part of the arm, so that it is stored with the arm and included in the hash of the arm.
     pub const fn of_arm(&self) -> bool {
         matches!(self.live, Live::No)
     }
 
-    /// Returns the number of values: one, or one for each joint.
+    /// Returns the number of values, which is 1 or the number of joints.
     const fn count(&self) -> usize {
         if self.of_joint() { JOINTS } else { 1 }
     }
 
-    /// Returns the value in `config`. `joint`: from 1; 0 for a setting of the arm. Returns `None` if the setting has no such value.
+    /// Returns the value in `config`. `joint` is the number of the joint, from 1, or 0 for a setting of the arm. Returns `None` if the
+    /// setting has no such value.
     pub fn get(&self, config: &Config, joint: u8) -> Option<f64> {
         table::get(config, self.number, self.index(joint)?)
     }
@@ -158,7 +159,7 @@ impl Setting {
         if self.of_joint() { usize::from(joint).checked_sub(1) } else { (joint == 0).then_some(0) }
     }
 
-    /// Returns the values in `config`, from index `first` on.
+    /// Returns the values in `config`, beginning with index `first`.
     fn values_from(&self, config: &Config, first: usize) -> impl Iterator<Item = SettingValue> + use<'_> {
         let (start, end) = if self.of_joint() { (1, JOINTS as u8) } else { (0, 0) };
         let values = core::array::from_fn::<f64, JOINTS, _>(|j| {
@@ -194,12 +195,13 @@ pub fn named(name: &str) -> Option<&'static Setting> {
     TABLE.iter().find(|setting| setting.name == name)
 }
 
-/// Returns the number of values in the table. `arm_only`: only those that are part of the arm.
+/// Returns the number of values in the table. `arm_only` selects only the values that are part of the arm.
 pub fn count(arm_only: bool) -> usize {
     TABLE.iter().filter(|setting| !arm_only || setting.of_arm()).map(Setting::count).sum()
 }
 
-/// Returns the values of a configuration in the order of the table, from index `first` on. `arm_only`: only those that are part of the arm.
+/// Returns the values of a configuration in the order of the table, beginning with index `first`. `arm_only` selects only the values that
+/// are part of the arm.
 pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<Item = SettingValue> {
     let mut skip = first;
     TABLE.iter().filter(move |setting| !arm_only || setting.of_arm()).flat_map(move |setting| {

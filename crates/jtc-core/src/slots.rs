@@ -1,8 +1,8 @@
-//! Two flash slots that keep one image through any loss of power (J-54).
+//! Two flash slots that preserve one image during any loss of power (J-54).
 //!
 //! An image, here a stored arm, is a sequence of bytes that this module does not interpret. An image is written to the slot that does not
-//! hold the newest image, so that the previous image stays complete until the new one is complete. A slot is a header of one flash word
-//! followed by the image, filled up to whole words:
+//! contain the newest image, so that the previous image stays complete until the new image is complete. A slot is a header of one flash
+//! word followed by the image, filled up to whole words:
 //!
 //! | bytes | content |
 //! |---|---|
@@ -15,8 +15,8 @@
 //! | 28..32 | CRC-32 (ISO-HDLC) of bytes 0..28 and of all words after them |
 //! | 32.. | the image; the rest of its last word is 0xFF |
 //!
-//! The header is written last, so a slot whose writing was interrupted has no header. A word that was being programmed, or a sector that
-//! was being erased, may contain any data; the CRC detects this. All numbers are little-endian.
+//! The header is written last, so a slot whose writing was interrupted has no header. After a loss of power, a word that was being
+//! programmed, or a sector that was being erased, may contain any data. The CRC detects this. All numbers are little-endian.
 //!
 //! This module does not access hardware: [`Storing`] returns the next action, and the owner of the flash executes it. A flash word can be
 //! programmed once after it was erased, which is sufficient for [`Storing`].
@@ -36,14 +36,14 @@ pub type Word = [u8; WORD];
 
 const MAGIC: [u8; 4] = *b"JTCA";
 const VERSION: u16 = 1;
-/// Content of erased flash. This byte also fills the last word of an image.
+/// Byte value of erased flash. This byte also fills the last word of an image.
 const ERASED: u8 = 0xFF;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 const _: () = assert!(IMAGE_MAX.is_multiple_of(WORD), "a buffer of IMAGE_MAX takes whole words");
 
-/// The first word of a slot.
+/// First word of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     length: u32,
@@ -63,7 +63,7 @@ impl Header {
         Some(Self { crc: digest.finalize(), ..header })
     }
 
-    /// Parses a word as a header. [`Header::accepts`] decides whether its slot is complete.
+    /// Parses a word as a header. [`Header::accepts`] decides whether the slot of this header is complete.
     pub fn parse(word: &Word) -> Option<Self> {
         let field = |at: usize| Some(u32::from_le_bytes(*word.get(at..)?.first_chunk()?));
         let header = Self { length: field(8)?, sequence: field(12)?, crc: field(28)? };
@@ -103,7 +103,7 @@ impl Header {
         1 + self.length().div_ceil(WORD)
     }
 
-    /// Returns the image if `rest`, which begins with the words after the header, matches the header.
+    /// Returns the image if `rest` matches the header. `rest` begins with the words after the header.
     pub fn accepts<'a>(&self, rest: &'a [u8]) -> Option<&'a [u8]> {
         let words = rest.get(..(self.words() - 1) * WORD)?;
         let mut digest = CRC.digest();
@@ -113,7 +113,7 @@ impl Header {
     }
 }
 
-/// Returns a word of an image. The last word is filled up.
+/// Returns a word of an image. The last word is filled up with erased bytes.
 fn padded(bytes: &[u8]) -> Word {
     let mut word = [ERASED; WORD];
     word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
@@ -125,7 +125,7 @@ pub fn newer(a: u32, b: u32) -> bool {
     (a.wrapping_sub(b).cast_signed()).cmp(&0) == Ordering::Greater
 }
 
-/// Content of the slots: the sequence number of each complete slot.
+/// Content of the slots, stored as the sequence number of each complete slot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Slots([Option<u32>; SLOTS]);
 
@@ -135,7 +135,7 @@ impl Slots {
         Self(found)
     }
 
-    /// Returns the slot of the newest image, and its sequence number; `None` if no slot is complete.
+    /// Returns the slot of the newest image, and the sequence number of the image. Returns `None` if no slot is complete.
     pub fn current(&self) -> Option<(usize, u32)> {
         match self.0 {
             [Some(a), Some(b)] if newer(b, a) => Some((1, b)),
@@ -145,7 +145,7 @@ impl Slots {
         }
     }
 
-    /// Returns the slot for the next image, and its sequence number. This is never the slot of the newest image.
+    /// Returns the slot for the next image, and the sequence number of the image. The returned slot never contains the newest image.
     pub fn next(&self) -> (usize, u32) {
         self.current().map_or((0, 1), |(slot, sequence)| (1 - slot, sequence.wrapping_add(1)))
     }
@@ -165,16 +165,16 @@ pub enum Action {
         /// Number of the slot.
         slot: usize,
     },
-    /// Program a word, read it back and compare.
+    /// Program a word, read the word back and compare it.
     Program {
         /// Number of the slot.
         slot: usize,
-        /// Index of the word in the slot; 0 is the header.
+        /// Index of the word in the slot. The header has index 0.
         word: usize,
         /// Content to program.
         bytes: Word,
     },
-    /// No action is left: the image is stored and can be found.
+    /// No further action is needed, because the image is stored and can be found.
     Stored,
 }
 
@@ -203,13 +203,13 @@ pub enum Action {
 pub struct Storing {
     slot: usize,
     header: Header,
-    /// Number of completed actions: the erasure, then one per word.
+    /// Number of completed actions. The first action erases the slot, and each further action programs one word.
     done: usize,
 }
 
 impl Storing {
-    /// Begins to store an image. Returns `None` if it is longer than [`IMAGE_MAX`]. From now on the old content of its slot is considered
-    /// lost.
+    /// Begins to store an image. Returns `None` if the image is longer than [`IMAGE_MAX`]. After this call, the old content of the slot is
+    /// considered lost.
     pub fn begin(slots: &mut Slots, image: &[u8]) -> Option<Self> {
         let (slot, sequence) = slots.next();
         let header = Header::new(image, sequence)?;
@@ -222,7 +222,7 @@ impl Storing {
         let slot = self.slot;
         let Some(before) = self.done.checked_sub(1) else { return Action::Erase { slot } };
         let words = self.header.words();
-        // First the words of the image, and after all of them the header.
+        // The words of the image are programmed first, followed by the header.
         match before + 1 {
             word if word < words => {
                 let at = before * WORD;
@@ -238,12 +238,12 @@ impl Storing {
         self.done = self.done.saturating_add(1).min(self.header.words() + 1);
     }
 
-    /// Returns the slot, and the sequence number of the image in it.
+    /// Returns the slot, and the sequence number of the image in the slot.
     pub fn target(&self) -> (usize, u32) {
         (self.slot, self.header.sequence)
     }
 
-    /// Records the new image if every action is done. Otherwise it has no effect.
+    /// Records the new image if every action is completed. Otherwise the call has no effect.
     pub fn finish(&self, slots: &mut Slots) {
         if self.done > self.header.words() {
             slots.set(self.slot, Some(self.header.sequence));

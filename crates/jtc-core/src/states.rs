@@ -1,4 +1,4 @@
-//! The states of the controller, and the choice of the next one (J-20 to J-25). The diagram in docs/protocol-jtc.md shows this function.
+//! States of the controller, and the choice of the next state (J-20 to J-25). The diagram in docs/protocol-jtc.md shows this function.
 use crate::ControllerState;
 
 /// Conditions that choose the next state.
@@ -18,7 +18,7 @@ pub(crate) struct Conditions {
     pub execute: bool,
 }
 
-/// Returns the next state: the first of Error, Init, Teaching, Operate and HoldPos whose conditions hold.
+/// Returns the next state, which is the first of Error, Init, Teaching, Operate and HoldPos whose conditions are met.
 pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> ControllerState {
     let Conditions { error, clearing, initialised, teaching, teachable, execute } = *conditions;
     if error || (state == ControllerState::Error && clearing) {
@@ -26,7 +26,7 @@ pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> Con
     } else if !initialised {
         ControllerState::Init
     } else if teaching && (state == ControllerState::Teaching || teachable) {
-        // An accepted teach request waits until every joint is held at rest, because the loads of the arm are found only then (J-25).
+        // An accepted teach request waits until every joint is held at rest, because the loads of the arm can be found only at rest (J-25).
         ControllerState::Teaching
     } else if execute {
         ControllerState::Operate

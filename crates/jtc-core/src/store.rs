@@ -1,4 +1,4 @@
-//! The trajectory store: acceptance of segments (J-30), and memory of the points.
+//! Trajectory store, which accepts segments (J-30) and contains the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::bit_codec::bit_codec;
@@ -6,7 +6,7 @@ use crate::check::{Passed, SpeedRange, Violation};
 use crate::interpolation::{SetPoint, Step};
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
-/// If the time is less than this share of a step before a point, it is taken as the time of the point.
+/// Share of a step before a point. A time within this share is treated as the time of the point.
 const AT_POINT: f64 = 1e-9;
 
 /// Received part of the current trajectory. `M` is the memory for the points.
@@ -15,13 +15,13 @@ pub(crate) struct Store<M> {
     points: M,
     /// Number of points in the accepted segments.
     received: usize,
-    /// Index of the next segment; equal to `segments` when the trajectory is complete.
+    /// Index of the next segment. The index is equal to `segments` when the trajectory is complete.
     next_segment: u16,
     segments: u16,
     number: u16,
     /// Segment 0 came on a plain line.
     plain: bool,
-    /// A Stop has dropped the upload. Its other segments are refused until a segment 0 arrives.
+    /// A Stop has dropped the upload. Further segments of this upload are refused until a segment 0 arrives.
     dropped: bool,
     /// A Stop came during this upload, whose host cannot handle a refused segment. The upload is completed but not executed.
     stopped: bool,
@@ -31,7 +31,7 @@ pub(crate) struct Store<M> {
     step: Step,
     /// State of the check after the accepted segments.
     passed: Passed,
-    /// Number of points in memory, including those of a discarded trajectory, and their hash.
+    /// Number of points in memory, and hash of these points. The points of a discarded trajectory are included.
     held: usize,
     hash: u32,
 }
@@ -75,7 +75,7 @@ bit_codec!(StoreState {
     hash
 });
 
-/// Start value of a hash of points. `mix` adds a word to the hash with one multiplication, so that copying a segment stays cheap.
+/// Start value of a hash of points. `mix` adds a word to the hash with one multiplication, so that copying a segment takes little time.
 const HASH_BEGIN: u32 = 0x811C_9DC5;
 fn mix(hash: u32, word: u32) -> u32 {
     (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
@@ -112,7 +112,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Returns the number of points that fit: the limit of the protocol, or of the memory if that is lower.
+    /// Returns the number of points that fit, which is the limit of the protocol or of the memory, whichever is lower.
     fn capacity(&self) -> usize {
         self.points.as_ref().len().min(POINTS_MAX)
     }
@@ -133,8 +133,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.segments > 0 && self.next_segment < self.segments
     }
 
-    /// Drops an incomplete upload because of a Stop (J-30). An upload that was begun on a plain line is completed but not executed, because
-    /// its host would wait for ever. Returns `true` if there was an incomplete upload.
+    /// Drops an incomplete upload because of a Stop (J-30). An upload that began on a plain line is completed but not executed, because its
+    /// host would otherwise wait for ever. Returns `true` if an upload was incomplete.
     pub(crate) fn drop_upload(&mut self) -> bool {
         let receiving = self.receiving();
         if receiving && self.plain {
@@ -151,7 +151,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.stopped
     }
 
-    /// Returns `true` if the upload was begun on a plain line, whose host cannot handle a refused segment (J-51).
+    /// Returns `true` if the upload began on a plain line, because the host of a plain line cannot handle a refused segment (J-51).
     pub(crate) fn plain(&self) -> bool {
         self.plain
     }
@@ -161,7 +161,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.refused.get_or_insert(violation);
     }
 
-    /// Returns the violation that the check has found in this trajectory. Such a trajectory is not executed (J-36).
+    /// Returns the violation that the check has found in this trajectory. A trajectory with a violation is not executed (J-36).
     pub(crate) fn refused(&self) -> Option<Violation> {
         self.refused
     }
@@ -171,18 +171,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.dropped = true;
     }
 
-    /// Returns `true` if the upload was dropped and no other upload has been begun since.
+    /// Returns `true` if the upload was dropped and no other upload has begun after that.
     pub(crate) fn dropped(&self) -> bool {
         self.dropped
     }
 
     /// Returns the time of the last point, ms.
     pub(crate) fn duration_ms(&self) -> u32 {
-        // At most 11 999 · 65 535, which fits.
+        // The product is at most 11 999 · 65 535, which fits into 32 bits.
         (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step.ms))
     }
 
-    /// Checks that the segment may follow the received ones. The check changes nothing.
+    /// Checks that the segment may follow the received segments. The check does not change the store.
     pub(crate) fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
         let first = segment.segment == 0;
         let before = if first { 0 } else { self.received };
@@ -210,8 +210,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         Ok(())
     }
 
-    /// Begins to copy an accepted segment. Segment 0 replaces the old trajectory. `plain`: its line is plain; `stopped`: a Stop came before
-    /// the turn of the segment.
+    /// Begins to copy an accepted segment. Segment 0 replaces the old trajectory. `plain` means that the line of the segment is plain.
+    /// `stopped` means that a Stop came before the segment was processed.
     pub(crate) fn begin(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) {
         if segment.segment == 0 {
             self.clear();
@@ -223,7 +223,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Copies points `from..to` of the segment after the received ones. The copied points become valid with `commit`.
+    /// Copies points `from..to` of the segment into the memory after the received points. The copied points become valid with `commit`.
     pub(crate) fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
         let slots = self.points.as_mut().get_mut(self.received + from..self.received + to).unwrap_or(&mut []);
         for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
@@ -240,12 +240,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.held = self.received;
     }
 
-    /// Returns the hash and the number of the points in memory, including those of a discarded trajectory.
+    /// Returns the hash and the number of the points in memory, including the points of a discarded trajectory.
     pub(crate) fn points_hash(&self) -> (u32, u32) {
         (self.hash, self.held as u32)
     }
 
-    /// Returns the points in memory from number `first` on.
+    /// Returns the points in memory, beginning with number `first`.
     pub(crate) fn held_points(&self, first: usize) -> &[RawPoint] {
         self.points.as_ref().get(first..self.held).unwrap_or(&[])
     }
@@ -307,14 +307,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         (self.held, self.hash) = (held.min(self.capacity()), hash);
     }
 
-    /// Stores points from number `first` on.
+    /// Stores points, beginning with number `first`.
     pub(crate) fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         for (slot, point) in self.points.as_mut().iter_mut().skip(first).zip(points) {
             *slot = *point;
         }
     }
 
-    /// Returns the number of points, the last point, and the state of the check after it. Returns `None` without points.
+    /// Returns the number of points, the last point, and the state of the check after the last point. Returns `None` without points.
     pub(crate) fn tail(&self) -> Option<(u32, RawPoint, Passed)> {
         let last = *self.points.as_ref().get(..self.received)?.last()?;
         Some((self.received as u32, last, self.passed))
@@ -350,7 +350,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         // point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
-        // This is also done exactly at a point and at the last one, without any effect, so that every tick does the same work.
+        // The interpolation is also computed exactly at a point and at the last point, without any effect, so that every tick does the same
+        // work.
         let (end, u) = match points.get(index + 1) {
             Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),

@@ -1,8 +1,8 @@
-//! Torques that Teaching adds to gravity (J-25): the load found, damping, dry friction at standstill, compensation of part of the joints'
-//! own friction, and soft ends.
+//! Torques that Teaching adds to gravity (J-25): the found load, damping, dry friction at standstill, partial compensation of the joint
+//! friction, and soft ends.
 //!
 //! A hand leads the arm. When the hand lets go, the arm must stay in its pose. From the torques that HoldPos found, a mass at the flange is
-//! estimated and carried to other poses; the remaining torques fade while the arm is led ([`carried`]). Every motion is damped. A joint
+//! estimated and carried to other poses. The remaining torques fade while the arm is led ([`carried`]). Every motion is damped. A joint
 //! that is too fast for the damping ends Teaching ([`joint`]).
 mod carried;
 mod joint;
@@ -18,37 +18,37 @@ use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};
 use joint::{TaughtJoint, rotor};
 
-/// Ticks of a round in which slowly changing values are computed, and ticks before the first round. These are the tick in which Teaching
-/// begins, one tick for the mass at the flange, one for the inertia of the whole arm, which a ramp needs, and one for the inertia of each
-/// joint.
+/// Number of ticks in a round that computes slowly changing values, and number of ticks before the first round. Before the first round, one
+/// tick begins Teaching and one tick computes the mass at the flange. Another tick computes the inertia of the whole arm, which a ramp
+/// needs, and one tick per joint computes the inertia of the joint.
 const TURNS: u8 = 76;
 const FIRST: u8 = 9;
-/// Ticks between two checks of the load, and that time in s.
+/// Time between two checks of the load, in ticks and in s.
 const JUDGED_MS: u8 = 12;
 const PERIOD: f64 = JUDGED_MS as f64 * DT;
-/// Torque of 1 kg at the flange on all joints together, as the root of the sum of squares (N·m/kg). Up to the first value no load is
-/// attributed to a mass, from the second value on the complete fit. HoldPos cannot distinguish a load from static friction, and a little
-/// friction must not become a large mass in another pose.
+/// Torque of 1 kg at the flange on all joints together, as the root of the sum of squares (N·m/kg). Up to the first value, no load is
+/// attributed to a mass. Above the second value, the complete fitted mass is used. HoldPos cannot distinguish a load from static friction,
+/// and a small friction must not be interpreted as a large mass in another pose.
 const LOADS: (f64, f64) = (2.0, 6.0);
-/// Time for which a mass must have driven the arm by itself before it is removed, ms, and time constant of the removal, s.
+/// Time for which a mass must have driven the arm by itself before the mass is removed, ms, and time constant of the removal, s.
 const DRIVEN_MS: u16 = 1_000;
 const GOES_S: f64 = 1.5;
 /// Time for which a joint must have sunk without a removed mass before the mass is added again, ms, and time constant of the return, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
-/// Speed above which a joint is considered led, rad/s. Distance of the fastest joint over which torque that no mass explains falls to a
-/// third, rad.
+/// Speed above which a joint is considered led, rad/s. Distance of the fastest joint over which a torque that is not explained by a mass
+/// falls to a third, rad.
 const LED: f64 = 0.02;
 const WAY: f64 = 0.3;
 
-/// Computation that is done in a tick. An index is that of a joint.
+/// Computation of a tick. An index is the index of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
-    /// First tick: all loads that were found are carried.
+    /// First tick, in which all found loads are carried.
     Begin,
     /// Computes the mass at the flange that explains the loads.
     Mass,
-    /// Leaves time for the inertia of the whole arm, which the ramp computes.
+    /// Leaves time for the computation of the inertia of the whole arm by the ramp.
     Ramp,
     Inertia(usize),
     /// Computes the friction of a joint, and the torque of 1 kg at the flange on all joints.
@@ -60,7 +60,7 @@ enum Turn {
 }
 
 impl Turn {
-    /// Returns the turn with this number. In each round, every fourth turn computes a slowly changing value.
+    /// Returns the computation with this number. In each round, every fourth computation is that of a slowly changing value.
     fn of(number: u8) -> Self {
         let Some(turn) = number.checked_sub(FIRST) else {
             return match number {
@@ -90,16 +90,16 @@ impl Turn {
 pub(crate) struct Taught {
     joints: [TaughtJoint; JOINTS],
     carried: [Carried; JOINTS],
-    /// Mass at the flange that the model lacks, kg: the mass that was found, and the mass that is carried. Negative if the modelled arm is
-    /// too heavy.
+    /// Mass at the flange that the model does not contain, kg. `found` is the mass that was found, and `mass` is the mass that is carried.
+    /// Both values are negative if the modelled arm is too heavy.
     found: f32,
     mass: f32,
     /// Torque of 1 kg at the flange on each joint, N·m.
     unit: [f32; JOINTS],
-    /// Time for which the mass alone has explained the motion, and time for which a joint has sunk because the mass is missing, ms.
+    /// Time for which the mass alone has explained the motion, and time for which a joint has sunk because the mass was removed, ms.
     driven_ms: u16,
     sinks_ms: u16,
-    /// Excess of the flange speed over the tool speed limit, 0 to 1.
+    /// Excess of the flange speed over the tool speed limit, as a value from 0 to 1.
     haste: f32,
     /// Tick counter, which selects the computation of a tick.
     turn: u8,
@@ -120,7 +120,7 @@ impl Taught {
         taught
     }
 
-    /// Fits a mass at the flange to the loads that were found, by least squares over the joints of the arm at `q` (rad).
+    /// Fits a mass at the flange to the found loads, by least squares over the joints of the arm at `q` (rad).
     fn fit(&mut self, q: &[f64; JOINTS], dynamics: &Dynamics) {
         let unit = dynamics.flange_torque(q);
         let (mut load, mut moment) = (0.0, 0.0);
@@ -137,16 +137,16 @@ impl Taught {
         }
     }
 
-    /// Reduces the mass that was found by `mass` (kg) at the flange, which the model carries from this tick on (J-60). The mass does not
-    /// change its sign: any excess of `mass` was not there when the mass was found.
+    /// Reduces the found mass by `mass` (kg) at the flange, which the model contains from this tick on (J-60). The found mass does not
+    /// change its sign, because an excess of `mass` was not present when the mass was found.
     pub(crate) fn give_way(&mut self, mass: f64) {
         let left =
             |of: f32| (f64::from(of) - mass).max(f64::from(of.min(0.0))).min(f64::from(of.max(0.0))) as f32;
         (self.found, self.mass) = (left(self.found), left(self.mass));
     }
 
-    /// Evaluates the answer of a joint in each tick. `late`: delay of this tick, ms; `fresh`: the joint has answered, with this `position`,
-    /// rad. Returns the speed that follows from its positions, rad/s.
+    /// Evaluates the answer of a joint in each tick. `late` is the delay of this tick in ms. `fresh` means that the joint has answered with
+    /// this `position`, rad. Returns the speed computed from the joint positions, rad/s.
     #[inline(always)]
     pub(crate) fn hear(&mut self, j: usize, fresh: bool, position: f64, late: u16) -> f32 {
         self.joints[j].hear(fresh, position, late)
@@ -162,14 +162,14 @@ impl Taught {
         Turn::of(self.turn) == Turn::Ramp
     }
 
-    /// Returns the torque that a joint carries in the first tick, N·m: the whole load that was found. No part of it is attributed to a mass
-    /// yet.
+    /// Returns the torque that a joint carries in the first tick, N·m. This torque is the whole found load, because no part of the load is
+    /// attributed to a mass yet.
     pub(crate) fn first_load(&self, j: usize) -> f64 {
         self.carried[j].rest.into()
     }
 
-    /// Computes one of the slowly changing values, in turns. Returns `true` if this took too long to compute the torques of the joints in
-    /// this tick. The very first tick adds only the load, because the torque would step without it.
+    /// Computes the slowly changing values, one per tick. Returns `true` if the tick has no time left to compute the torques of the joints.
+    /// The very first tick adds only the load, because the torque would step without the load.
     #[inline(never)]
     pub(crate) fn look(
         &mut self,
@@ -256,7 +256,7 @@ impl Taught {
         }
     }
 
-    /// Returns the torque that holds a joint at `position` (rad), N·m: the load and the dry friction.
+    /// Returns the torque that holds a joint at `position` (rad), N·m. This torque is the sum of the load and the dry friction.
     pub(crate) fn held(&self, j: usize, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         self.carried[j].torque(self.by_mass(j)) + self.joints[j].dry_spring(position, limits, config)
     }

@@ -1,4 +1,4 @@
-//! Values that a tick computed, for recordings and tests.
+//! Values that a tick has computed, for recordings and tests.
 use jtc_bus::NodeState;
 
 use crate::bit_codec::bit_codec;
@@ -19,7 +19,7 @@ pub struct JointTelemetry {
     pub position: f64,
     /// Measured velocity, rad/s.
     pub velocity: f64,
-    /// Position and velocity were measured for this tick; otherwise they are predicted (J-63).
+    /// Position and velocity were measured for this tick. Otherwise both values are predicted (J-63).
     pub fresh: bool,
     /// Bearing temperature, °C.
     pub temperature: f64,
@@ -33,7 +33,7 @@ pub struct JointTelemetry {
     pub torque_d: f64,
     /// Friction compensation, N·m.
     pub torque_friction: f64,
-    /// Torque that blends out a step at a change of state, and load and brake of Teaching, N·m.
+    /// Torque that blends out a step at a change of state, plus the load and braking torque of Teaching, N·m.
     pub torque_other: f64,
     /// Torque commanded on the bus, N·m.
     pub torque: f64,
@@ -55,7 +55,7 @@ impl JointTelemetry {
 pub struct Telemetry {
     /// Ticks since the start of the device.
     pub tick: u64,
-    /// State in this tick.
+    /// Controller state in this tick.
     pub state: ControllerState,
     /// Trajectory execution state.
     pub trajectory: TrajectoryState,

@@ -1,4 +1,4 @@
-//! The control tick, in the order of docs/architecture.md.
+//! Control tick, in the order of docs/architecture.md.
 use jtc_bus::Frame;
 use jtc_wire::{RawPoint, Response};
 
@@ -13,8 +13,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Runs one control tick (1 ms). The amount of work is bounded for any inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let before = self.state;
-        // 1. Inputs. The error flags are formed before the commands of the host are executed, so that a clear cannot hide a fault that
-        //    appears in the same tick. In Start no command is executed yet; the events are offered again.
+        // 1. Inputs. The error flags are computed before the commands of the host are executed, so that a clear cannot hide a fault that
+        // appears in the same tick. In Start, commands are not executed yet, and the board offers the events again later.
         self.take_answers(inputs);
         if !inputs.safety_input || self.safety_stop_ms.is_some() {
             self.watch_safety_input(inputs);
@@ -32,18 +32,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         self.choose_state();
 
-        // 3. The work of that state.
+        // 3. The work of this state is executed.
         let (torque, found) = self.work();
 
-        // 4. An error found now zeroes the torque of this same tick.
+        // 4. An error found in this step sets the torque of the present tick to zero.
         let torque = self.form_error_flags_again(torque, &found);
 
         // 5. The frame for the bus.
         let bus = self.frame(before, torque);
         self.observe(&torque);
 
-        // 6. Outputs for the board and the hosts.
-        // J-22: the output is 0 in Start and while an internal error is latched.
+        // 6. Outputs for the board and the hosts. J-22: the safety output is 0 in Start and while an internal error is latched.
         let safety_output = self.state != ControllerState::Start && !self.errors.internal();
         let status = self.status_due(inputs.status_free);
         let record_line = if status { self.prepare_status() } else { None };
@@ -73,7 +72,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises errors from outside the control law. These errors latch (J-21).
+    /// Raises errors from outside the control law. Errors from outside the control law are latched (J-21).
     fn form_error_flags(&mut self, inputs: &Inputs<'_>) {
         if self.safety_input_releases(inputs.safety_input) {
             self.errors.raise_emergency_input();
@@ -85,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Does the work of the state. Returns torques within their limits, and the joint errors that were found.
+    /// Executes the work of the present state. Returns torques within their limits, and the joint errors that were found.
     fn work(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         match self.state {
             ControllerState::Start | ControllerState::Init | ControllerState::Error => {
@@ -149,8 +148,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.control(ControlMode::Teach)
     }
 
-    /// Runs the control step in Operate. This step is a separate function so that its instructions can be counted. On the path their number
-    /// is the same in every tick.
+    /// Runs the control step in Operate. This step is a separate function so that its instructions can be counted. On the path, the number
+    /// of instructions is the same in every tick.
     #[inline(never)]
     fn operate(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         self.motion.latch(&self.nodes, &self.config);
@@ -161,10 +160,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// Runs the control law and its limits. Returns the torques to command, and the joint errors to which the controller has no other
-    /// reaction (J-66).
+    /// Runs the control law and its limits. Returns the torques to command, and the joint errors that have no other reaction than an error
+    /// (J-66).
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A joint above its over-speed limit is out of control. Removing the torque is the only possible reaction.
+        // A joint above its over-speed limit is out of control. The only possible reaction is to remove the torque.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let braking = self.brake();
         let blended = if self.parameters.trial.runs() && mode != ControlMode::Teach {
@@ -183,7 +182,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (limited.torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
     }
 
-    /// Ignores positions outside their limits in motion (J-43) where the check of the trajectory has accepted the path outside the limits
+    /// Ignores positions outside their limits in motion (J-43) if the check of the trajectory has accepted the path outside the limits
     /// (J-36).
     #[cold]
     fn tolerate_positions(&self, found: &mut [Found; JOINTS]) {
@@ -214,15 +213,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Returns the frame of this tick (J-12).
     pub(crate) fn frame(&mut self, before: ControllerState, torque: [f64; JOINTS]) -> Frame {
-        // Drives keep their last torque, so removing it has priority over all other frames.
+        // Drives keep their last torque, so the removal of the torque has priority over all other frames.
         let new_error = self.state == ControllerState::Error && before != ControllerState::Error;
         let must_move = new_error || (before.has_torque() && !self.powered());
-        // J-61: up to here all torques are joint torques.
+        // J-61: before this line, all torques are torques at the joints.
         let torque = core::array::from_fn(|j| torque[j] * self.config.joints[j].torque_gain);
         self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move)
     }
 
-    /// Puts the oldest record into a status. Returns the line of that record.
+    /// Puts the oldest response record into a status. Returns the host line of this record.
     fn prepare_status(&mut self) -> Option<usize> {
         let record = self.records.pop();
         let status = self.status(record.map_or(Response::NONE, |(_, record)| record));
@@ -236,7 +235,7 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    /// An accepted teach request waits at most as long as enabling may take. Later the operator would not expect the arm to become
+    /// An accepted teach request waits at most as long as enabling may take. After that, the operator would not expect the arm to become
     /// compliant.
     #[test]
     fn j25_teaching_waits_for_a_while_only() {

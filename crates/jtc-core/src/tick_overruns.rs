@@ -1,16 +1,16 @@
-//! Late and missing ticks (J-12). A few are tolerated; ten within a second are a failure of the device.
+//! Late and missing ticks (J-12). A few late ticks are tolerated, but ten within a second are a failure of the device.
 use crate::bit_codec::bit_codec;
 
-/// Number of late ticks that is a failure.
+/// Number of late ticks that counts as a failure of the device.
 const COUNT: usize = 10;
-/// Length of the window, ms: the first and the last of these ticks must be less than this apart.
+/// Length of the window, ms. The time between the first and the last of the late ticks must be shorter than the window.
 const WINDOW_MS: u64 = 1_000;
 
 /// Times of the last late or missing ticks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TickOverruns {
     now_ms: u64,
-    /// The last times, in a ring. Empty slots have times that are far enough in the past.
+    /// Ring of the last times. Empty slots contain times that are far enough in the past.
     at_ms: [u64; COUNT],
     next: usize,
 }
@@ -24,7 +24,7 @@ impl Default for TickOverruns {
 }
 
 impl TickOverruns {
-    /// Records one tick, before which `missed` ticks were missing or late. Returns `true` if there have been too many.
+    /// Records one tick, before which `missed` ticks were missing or late. Returns `true` if too many ticks were missing or late.
     pub(crate) fn count(&mut self, missed: u16) -> bool {
         self.now_ms += 1 + u64::from(missed);
         let mut too_many = false;
@@ -33,7 +33,7 @@ impl TickOverruns {
                 *slot = self.now_ms;
             }
             self.next = (self.next + 1) % COUNT;
-            // This slot now holds the oldest of the last ten times.
+            // This slot now contains the oldest of the last ten times.
             too_many |= self.at_ms.get(self.next).is_some_and(|oldest| self.now_ms - oldest < WINDOW_MS);
         }
         too_many
@@ -44,7 +44,7 @@ impl TickOverruns {
 mod tests {
     use super::*;
 
-    /// Returns the tick in which there are too many late ticks, if every `n`-th tick comes after `missed` missing ones.
+    /// Returns the tick in which the number of late ticks is too high, if every `n`-th tick comes after `missed` missing ticks.
     fn until_too_many(n: u32, missed: u16) -> Option<u32> {
         let mut late = TickOverruns::default();
         (1..20_000).find(|tick| late.count(if tick % n == 0 { missed } else { 0 }))
@@ -55,7 +55,7 @@ mod tests {
         assert_eq!(until_too_many(1, 1), Some(10));
         assert_eq!(until_too_many(2, 1), Some(20), "every second or third one");
         assert_eq!(until_too_many(100, 1), Some(1000), "the tenth 909 ms after the first");
-        // A late tick every 112 ms: the first and the tenth are 1008 ms apart.
+        // With a late tick every 112 ms, the first and the tenth late tick are 1008 ms apart.
         assert_eq!(until_too_many(111, 1), None);
         assert_eq!(until_too_many(109, 1), Some(1090));
         // Each of several ticks that are missing at once is counted.
@@ -67,7 +67,8 @@ mod tests {
 
     #[test]
     fn j12_ten_late_ticks_in_exactly_a_second_are_borne() {
-        // The first and the ninth late tick are 16 ms apart. The tenth comes 2 ms after the last of the ticks `between`, which are in time.
+        // The first and the ninth late tick are 16 ms apart. The tenth late tick comes 2 ms after the last of the ticks `between`, which
+        // are in time.
         for (between, too_many) in [(981, true), (982, false)] {
             let mut late = TickOverruns::default();
             assert!(!(0..9).any(|_| late.count(1)));

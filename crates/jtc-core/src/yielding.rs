@@ -1,9 +1,9 @@
-//! A joint that yields to a push (J-68), or lowers a load that its torque limit cannot hold (J-70).
+//! Behaviour of a joint that yields to a push (J-68), or lowers a load that its torque limit cannot hold (J-70).
 //!
-//! The position controller opposes a push with the whole torque limit within a few milliradians: the joint would clamp an obstacle, and
-//! only the torque limit would bound its force. A yielding joint has a weak spring instead, whose other end is dragged along, and a damper.
-//! So the joint follows a hand with a share of its torque limit, and stops a shove with all of it. Meanwhile the model and the load that
-//! the integral had found continue to carry the arm.
+//! The position controller opposes a push with the whole torque limit within a few milliradians. The joint would clamp an obstacle, and
+//! only the torque limit would bound the force. A yielding joint has a damper and a weak spring instead. The other end of the spring is
+//! dragged along with the joint. So the joint follows a hand with a share of its torque limit, and stops a shove with the whole torque
+//! limit. Meanwhile, the model torque and the load that the integral had found continue to carry the arm.
 //!
 //! A joint that lowers a load has no spring. The damper alone lets the load sink slowly, at any torque within the limit. The torque that
 //! the damper needs becomes part of the load, so a load that the limit can hold comes to rest.
@@ -17,24 +17,24 @@ mod swing;
 
 use swing::Swing;
 
-/// Longest stretch of the spring, rad.
+/// Longest extension of the spring, rad.
 const STRETCH: f64 = 0.02;
 /// Highest natural frequency of the spring with the inertia of the joint, 1/s.
 pub(crate) const SPRING_RATE: f64 = 30.0;
-/// Rate at which the damper of a lowered load reduces a speed, 1/s. If several joints lower loads, they share it. Held joints move each
-/// other at frequencies at which an old speed measurement makes the loop unstable, so a joint feels only a third of its inertia with the
-/// others fixed.
+/// Rate at which the damper of a lowered load reduces a speed, 1/s. If several joints lower loads, these joints share this rate. Held
+/// joints affect each other at frequencies at which an old speed measurement makes the loop unstable. A joint then feels only a third of
+/// the inertia that it has while the other joints are fixed.
 const LOWERING_RATE: f64 = 40.0;
 /// Change per tick of the damper and the spring, as a fraction of the remaining change.
 const SETTLES: f64 = 0.2;
-/// Like [`SETTLES`], for the brake.
+/// Change per tick of the brake, as a fraction of the remaining change, like [`SETTLES`].
 const BRAKE_SETTLES: f64 = 0.5;
 /// Highest rate at which a damper reduces a speed, 1/s. Measured speeds are about 8 ms old, because the drives average them. A damper above
-/// 200 1/s would make a joint oscillate, and joints that move each other lower that bound.
+/// 200 1/s would make a joint oscillate, and this bound is lower if joints affect each other.
 const DAMPING_RATE: f64 = 100.0;
-/// Speeds, in velocity limits, at which the brake of a joint begins and at which it uses the whole torque limit. The brake acts if its
-/// torque is higher than the damper's. `BRAKES_LOWERED` is for a joint that lowers a load. `BRAKE_RATE` bounds the rate at which the brake
-/// reduces a speed, 1/s, because positions are about 4 ms old.
+/// Speeds, as multiples of the velocity limit, at which the brake of a joint begins and at which the brake uses the whole torque limit. The
+/// brake acts if its torque is higher than the torque of the damper. `BRAKES_LOWERED` is for a joint that lowers a load. `BRAKE_RATE`
+/// bounds the rate at which the brake reduces a speed, 1/s, because positions are about 4 ms old.
 const BRAKES: (f64, f64) = (0.2, 0.8);
 const BRAKES_LOWERED: (f64, f64) = (0.4, 1.0);
 const BRAKE_RATE: f64 = 250.0;
@@ -42,30 +42,31 @@ const BRAKE_RATE: f64 = 250.0;
 const CALM: f64 = 0.05;
 /// Speed below which a lowered load is at rest, rad/s.
 const AT_REST: f64 = 0.02;
-/// Time for which a joint must be calm before it is held again, and longest time for which its load may then have seemed to drive it, ms.
+/// Time for which a joint must be calm before it is held again, ms. A joint is not calm if its load has seemed to drive it for
+/// `DRIVEN_CALM_MS`.
 const CALM_MS: u16 = 200;
 const DRIVEN_CALM_MS: u16 = 50;
-/// Least torque of gravity and load on a joint, as a share of the torque limit, for a motion to be considered sinking.
+/// Lowest torque of gravity and load on a joint, as a share of the torque limit, at which a motion is considered sinking.
 const LOADED: f64 = 0.05;
 /// Distance (rad) and time (ms) of sinking after which the joint is considered overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
 /// Time constant for the load to take over the torque of the damper, s.
 const LEARNS_S: f64 = 0.5;
-/// Range of the torque of spring and damper against a joint that its own load drives, as shares of that load; the rest is friction. A load
-/// that has driven the joint for [`DRIVEN_MS`] is interpreted as a person who leaned on the arm. The load fades with the time constant
-/// [`GOES_S`] (s), and returns with [`COMES_BACK_S`] (s) if the joint sinks without it.
+/// Range of the torque of spring and damper against a joint that its own load drives, as shares of this load. The remaining share is
+/// friction. If a load has driven the joint for [`DRIVEN_MS`], the load is interpreted as a person who leaned on the arm. The load fades
+/// with the time constant [`GOES_S`] (s), and returns with [`COMES_BACK_S`] (s) if the joint sinks without the load.
 const DRIVEN: (f64, f64) = (0.5, 1.2);
 /// Speed above which a load is considered to drive its joint, rad/s.
 const CREEPS: f64 = 0.002;
 const DRIVEN_MS: u16 = 300;
 const GOES_S: f64 = 1.0;
 const COMES_BACK_S: f64 = 0.3;
-/// Share of the torque limit up to which the position controller holds a lowered load again. The rest is for encoder noise.
+/// Share of the torque limit up to which the position controller holds a lowered load again. The remaining share is for encoder noise.
 const HOLDABLE: f64 = 0.95;
 /// Number of missing answers after which the spring does not act.
 const MISSING: u8 = 2;
-/// Number of yields of a joint, of which the last one continues until the host clears it. Yields are counted together if each yield of the
-/// arm begins within [`AGAIN_MS`] after the one before.
+/// Number of yields of a joint after which the last yield continues until the host clears it. Yields are counted together if each yield of
+/// the arm begins within [`AGAIN_MS`] after the previous yield.
 const TIMES: u8 = 3;
 /// See [`TIMES`].
 const AGAIN_MS: u16 = 10_000;
@@ -81,8 +82,8 @@ pub(crate) struct Yield {
     set: f64,
     /// Lower bound of the inertia that the joint moves, kg·m².
     inertia: f64,
-    /// Torque of the load that the model lacks, N·m. `least`: its value at the beginning of the yield or of the lowering; a lowered load
-    /// never falls below it.
+    /// Torque of the load that the model does not contain, N·m. `least` is the value of this torque at the beginning of the yield or of the
+    /// lowering. A lowered load never falls below `least`.
     load: f64,
     least: f64,
     /// Time for which the load has driven the joint, ms.
@@ -93,7 +94,8 @@ pub(crate) struct Yield {
     braking: f64,
     grip: f64,
     swing: Swing,
-    /// `holdable`: the position controller can hold the load of the joint. `cleared`: the host has decided that it must.
+    /// `holdable` means that the position controller can hold the load of the joint. `cleared` means that the host requires it to hold the
+    /// load.
     holdable: bool,
     cleared: bool,
     calm_ms: u16,
@@ -132,7 +134,7 @@ pub(crate) struct Joint<'a> {
     pub velocity: f64,
     /// Velocity over the last 5 ms, rad/s.
     pub young_velocity: f64,
-    /// All values were measured for this tick.
+    /// All values of the joint were measured for this tick.
     pub fresh: bool,
     /// Torque of the model, N·m.
     pub model: f64,
@@ -146,7 +148,7 @@ pub(crate) struct Joint<'a> {
 }
 
 impl Yield {
-    /// Begins the yield of a joint. `set`: commanded position, rad; `load`: torque that the model lacks, N·m.
+    /// Begins the yield of a joint. `set` is the commanded position in rad. `load` is the torque that the model does not contain, N·m.
     pub(crate) fn begin(lowers: bool, stays: bool, set: f64, inertia: f64, load: f64) -> Self {
         Self {
             lowers,
@@ -169,7 +171,7 @@ impl Yield {
         }
     }
 
-    /// Drags the end of the spring along with a joint at `position` (rad). Returns the new position of the end.
+    /// Drags the free end of the spring along with a joint at `position` (rad). Returns the new position of this end.
     pub(crate) fn drag(&mut self, position: f64) -> f64 {
         self.set = self.set.max(position - STRETCH).min(position + STRETCH);
         self.set
@@ -195,7 +197,7 @@ impl Yield {
         self.lowers
     }
 
-    /// Makes the joint lower its load from now on. The torque of the `spring`, N·m, becomes part of the load.
+    /// Makes the joint lower its load after this call. The torque of the `spring`, N·m, becomes part of the load.
     pub(crate) fn lower(&mut self, spring: f64) {
         (self.lowers, self.calm_ms) = (true, 0);
         self.load += spring;
@@ -207,8 +209,8 @@ impl Yield {
         self.lowers || self.load != self.least
     }
 
-    /// Returns the torque that the position controller must take over, N·m. The spring (`spring`, N·m) may have opposed a part of the load;
-    /// that part no longer acts. If the spring carried a part of a doubted load, the position controller continues to carry it.
+    /// Returns the torque that the position controller must take over, N·m. The spring (`spring`, N·m) may have opposed a part of the load,
+    /// and this part no longer acts. If the spring carried a part of a doubted load, the position controller continues to carry this part.
     pub(crate) fn left(&self, spring: f64) -> f64 {
         if self.lowers {
             self.load
@@ -217,13 +219,13 @@ impl Yield {
         }
     }
 
-    /// Returns the torque that Teaching carries, N·m. If the load is doubted, this is only the part that the `spring` (N·m) has not
-    /// opposed, because the rest may not exist.
+    /// Returns the torque that Teaching carries, N·m. If the load is doubted, Teaching carries only the part that the `spring` (N·m) has
+    /// not opposed, because the opposed part may not exist.
     pub(crate) fn taught_load(&self, spring: f64) -> f64 {
         if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
     }
 
-    /// Returns the torque of the load that the model lacks, N·m.
+    /// Returns the torque of the load that the model does not contain, N·m.
     pub(crate) fn load(&self) -> f64 {
         self.load
     }
@@ -236,7 +238,7 @@ impl Yield {
         self.missing = if joint.fresh { 0 } else { self.missing.saturating_add(1) };
 
         let soft = self.swing.step(velocity);
-        // With `wanted`, a joint at half of its velocity limit is braked with all of its torque limit.
+        // With the damping `wanted`, a joint at half of its velocity limit is braked with the whole torque limit.
         let wanted = 2.0 * (limit - most) / joint.limits.velocity_max;
         let damping = if self.lowers {
             LOWERING_RATE / f64::from(joint.lowering.max(1)) * self.inertia
@@ -244,7 +246,7 @@ impl Yield {
             wanted.min(soft * DAMPING_RATE * self.inertia)
         };
         self.damping += SETTLES * (damping - self.damping);
-        // Zero in the first tick, because an initial torque would be blended in.
+        // The brake is zero in the first tick, because an initial torque would be blended in.
         let brakes = if self.lowers { BRAKES_LOWERED } else { BRAKES };
         let brake = soft * self.braking * self.grip * brake(joint, self.inertia, brakes);
         self.braking += BRAKE_SETTLES * (1.0 - self.braking);
@@ -269,7 +271,7 @@ impl Yield {
         if !self.lowers {
             self.doubt(velocity, p + d);
         } else if loaded {
-            // The load never exceeds the limit. If the joint is lifted, the load does not fall below its initial torque.
+            // The load never exceeds the torque limit. If the joint is lifted, the load does not fall below its initial torque.
             let learned = self.load + damper * DT / LEARNS_S;
             let learned = if carried > 0.0 { learned.max(self.least) } else { learned.min(self.least) };
             self.load = learned.max(-limit - joint.model).min(limit - joint.model);
@@ -284,8 +286,8 @@ impl Yield {
         PidTorque { p, i: self.load, d }
     }
 
-    /// Reduces a load that drives the joint by itself, against this `torque` (N·m) of spring and damper. The load returns if the joint
-    /// sinks without it.
+    /// Reduces a load that drives the joint by itself against the `torque` (N·m) of spring and damper. The load returns if the joint sinks
+    /// without the load.
     fn doubt(&mut self, velocity: f64, torque: f64) {
         let (along, has) = (velocity * self.least.signum(), self.load.abs());
         let against = -torque * self.least.signum();
@@ -316,7 +318,7 @@ fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Yielded {
     times: [u8; JOINTS],
-    /// Ticks since the last yield of a joint.
+    /// Number of ticks since the last yield of any joint.
     since_ms: u16,
 }
 
@@ -331,7 +333,7 @@ impl Yielded {
         }
     }
 
-    /// Counts a yield of the joint. Returns `true` if the joint yields too often, so that its yield continues until the host clears it.
+    /// Counts a yield of the joint. Returns `true` if the joint yields too often, so that the yield continues until the host clears it.
     pub(crate) fn count(&mut self, joint: usize) -> bool {
         self.since_ms = 0;
         let Some(times) = self.times.get_mut(joint) else { return false };

@@ -1,15 +1,15 @@
-//! The format of a block in the flight recorder's memory (J-56).
+//! Format of a block in the flight recorder's memory (J-56).
 //!
-//! A block has a head of [`HEAD`] words, followed by bits. Its *commit* word contains the number of bits and their check, and is written
-//! last, once per tick. Bits after the committed ones, which an interrupted tick has left, are not read. Memory that was never written or
-//! is damaged fails the check and is not read as a block.
+//! A block has a head of [`HEAD`] words, followed by bits. The *commit* word of a block contains the number of bits and the check value of
+//! the bits, and is written last, once per tick. Bits after the committed bits are not read, because an interrupted tick may have written
+//! them. If memory was never written or is damaged, the check fails and the memory is not read as a block.
 use jtc_wire::LogState;
 
 use super::{BLOCK_WORDS, Block};
 
 /// "JTCF" and the version of the layout. Raise the version with each change of the written data, including a list of `bit_codec!`.
 pub(super) const MAGIC: u32 = 0x4A46_000A;
-/// Words before the bits.
+/// Number of words before the bits.
 pub(super) const HEAD: usize = 5;
 /// Number of bits in a block.
 pub(super) const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
@@ -19,23 +19,24 @@ pub(super) mod head {
     pub(crate) const MAGIC: usize = 0;
     /// Number of the block.
     pub(crate) const SEQUENCE: usize = 1;
-    /// Number of bits (low half) and their check.
+    /// Number of bits (low half) and check value of the bits.
     pub(crate) const COMMIT: usize = 2;
-    /// Start of the first snapshot (low half; [`super::NONE`] if none exists) and its complement.
+    /// Start of the first snapshot (low half) and complement of this number. The number is [`super::NONE`] if the block contains no start
+    /// of a snapshot.
     pub(crate) const SNAPSHOT: usize = 3;
-    /// State of the log (low half) and its complement.
+    /// State of the log (low half) and complement of this number.
     pub(crate) const FLAGS: usize = 4;
 }
 
-/// No snapshot begins in a block.
+/// Value for a block in which no snapshot begins.
 pub(super) const NONE: u16 = 0xFFFF;
 
-/// The controller has had torque since the log was begun.
+/// Flag: the controller has had torque since the log began.
 pub(super) const POWERED: u16 = 0x100;
-/// The next block continues this one.
+/// Flag: the next block continues this block.
 pub(super) const CLOSED: u16 = 0x200;
 
-/// Returns a number with its complement above it.
+/// Returns a word with the number in the low half and its complement in the high half.
 pub(super) const fn doubled(value: u16) -> u32 {
     value as u32 | (!value as u32) << 16
 }
@@ -50,19 +51,19 @@ pub(super) fn mix(hash: u32, word: u32) -> u32 {
     (hash ^ word).wrapping_mul(0x0100_0193).rotate_left(7)
 }
 
-/// Returns the commit word for this number of `bits`; `rest` contains the last of them.
+/// Returns the commit word for this number of `bits`. `rest` contains the last bits.
 pub(super) fn commit(hash: u32, rest: u32, bits: u32) -> u32 {
     let hash = mix(hash, rest);
     bits | (hash ^ hash << 16) & 0xFFFF_0000
 }
 
-/// A block that was written, with a valid head and valid bits.
+/// Block that was written, with a valid head and valid bits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Whole<'a> {
     pub sequence: u32,
     /// Number of committed bits.
     pub bits: u32,
-    /// The next block continues the bits of this one.
+    /// The next block continues the bits of this block.
     pub closed: bool,
     /// Start of the first snapshot.
     pub snapshot: Option<u32>,

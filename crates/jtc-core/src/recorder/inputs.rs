@@ -1,7 +1,7 @@
-//! Encodes the inputs of a tick relative to earlier ones. Values that change in each tick are written as whole words, which takes little
-//! time. All other values are written as bits, if a bit of the first word says so.
+//! Encodes the inputs of a tick relative to the inputs of earlier ticks. Values that change in each tick are written as whole words, which
+//! takes little time. All other values are written as bits. A bit of the first word shows whether they are present.
 //!
-//! Writer and reader keep the same [`Reference`]. A snapshot resets it on both sides.
+//! Writer and reader each store an identical [`Reference`]. A snapshot resets the reference on both sides.
 use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, Segment, UrgentCommand, UrgentCommands};
 
@@ -14,15 +14,15 @@ use crate::{JOINTS, NODES};
 
 /// Longest frame of a host whose bytes are recorded.
 pub(super) const HOST_BYTES: usize = 48;
-/// Number of bytes of host frames that are recorded: on average per tick, and at most at once.
+/// Number of recorded bytes of host frames: the average per tick, and the highest number at one time.
 const ALLOWANCE: (u16, u16) = (2, 500);
-/// Bytes that are charged for an event in addition to its own bytes. An event takes 15 to 20 bits.
+/// Bytes that are subtracted from the allowance for an event, in addition to the bytes of its frame. An event takes 15 to 20 bits.
 const EVENT_BYTES: u16 = 2;
 
 /// Reference for encoding the next inputs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {
-    /// The last answers to a Move: lengths, and words from [`words`]. Velocity and torque are those of the last tick in which another value
+    /// Lengths and words (from [`words`]) of the last answers to a Move. Velocity and torque belong to the last tick in which another value
     /// had changed.
     pub(super) len: [u8; NODES],
     pub(super) words: [Words; NODES],
@@ -35,7 +35,7 @@ pub(super) struct Reference {
 /// Words of a payload.
 pub(super) type Words = [u32; MAX_LEN / 4];
 
-/// Returns the words of an answer as they are in memory. Only the position is converted to a number.
+/// Returns the words of an answer as in memory. Only the position is converted to a number.
 #[inline]
 fn words(frame: &Frame) -> Words {
     let mut words = frame.words();
@@ -54,10 +54,11 @@ impl Default for Reference {
     }
 }
 
-/// Index of the word of an answer that contains the position, and of the word with velocity and torque.
+/// Index of the word with the position in an answer, and index of the word with velocity and torque.
 pub(super) const POSITION: usize = 0;
 pub(super) const RATES: usize = 1;
-/// Bits for the distance of a joint in a tick, in steps of a 16-bit encoder, if no joint has moved further.
+/// Number of bits for the distance of a joint in a tick, in steps of a 16-bit encoder. These bits are used if the distances of all joints
+/// fit.
 const WAY_BITS: u32 = 5;
 /// Mask of [`WAY_BITS`], and half of its range.
 const WAY: u32 = (1 << WAY_BITS) - 1;
@@ -69,29 +70,29 @@ pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
     before.wrapping_add(way << 16)
 }
 
-/// The first word of a tick. In a tick bit 0 is 0; a 1 announces a snapshot.
+/// Bits of the first word of a tick. Bit 0 is 0 for a tick and 1 for a snapshot.
 pub(super) mod head {
     pub(crate) const STATUS_FREE: u32 = 1 << 1;
     /// The only inputs are answers.
     pub(crate) const QUIET: u32 = 1 << 2;
-    /// Each expected node has answered, in order. Words with the distances of the joints follow.
+    /// Each expected node has answered in order. Words with the distances of the joints follow.
     pub(crate) const ORDERED: u32 = 1 << 3;
     /// The distance of a joint is too large for [`super::WAY_BITS`], so the words contain all positions.
     pub(crate) const FAR: u32 = 1 << 4;
-    /// Other values than the motion have changed.
+    /// Values other than the motion have changed.
     pub(crate) const CHANGED: u32 = 1 << 5;
-    /// First bit of the check of the outputs.
+    /// First bit of the check value of the outputs.
     pub(crate) const CHECK: u32 = 16;
 }
 
-/// Motion of the joints, from answers that came in order.
+/// Motion of the joints in answers that came in order.
 struct Answers {
     positions: [u32; JOINTS],
     rates: [u32; JOINTS],
-    /// Distances of the joints, and bits that are set if a joint has moved too far for [`WAY_BITS`].
+    /// Distances of the joints, and bits that are not zero if a joint has moved too far for [`WAY_BITS`].
     ways: u32,
     far: u32,
-    /// Bits in which other words differ.
+    /// Bits in which the other words differ from the reference.
     changed: u32,
 }
 
@@ -111,10 +112,10 @@ fn is_move_answer(frame: &Frame) -> bool {
 }
 
 impl Reference {
-    /// Writes a tick: its inputs, and a check of its outputs. Returns `true` if all inputs are written, so that a replay of this tick has
-    /// the same result.
+    /// Writes the inputs of a tick, and a check value of the outputs. Returns `true` if all inputs are written, so that a replay of this
+    /// tick has the same result.
     ///
-    /// Drives send new positions in each tick, and the rest of their answers changes seldom. A tick usually takes eight words.
+    /// Drives send new positions in each tick, but the other values in the answers rarely change. A tick usually takes eight words.
     pub(super) fn write<P, const N: usize>(
         &mut self,
         inputs: &Inputs<'_>,
@@ -153,7 +154,7 @@ impl Reference {
         (quiet && !changed) || self.write_more(head, inputs, done, to)
     }
 
-    /// Returns the motion if each expected node has answered, in order.
+    /// Returns the motion if each expected node has answered in order.
     #[inline]
     fn ordered(&self, bus: &[Frame]) -> Option<Answers> {
         if bus.len() != usize::from(self.expected) {
@@ -184,7 +185,7 @@ impl Reference {
         (misplaced == 0).then_some(answers)
     }
 
-    /// Writes all inputs of a tick except the motion, as the first word announces.
+    /// Writes all inputs of a tick except the motion, according to the bits of the first word.
     #[inline(never)]
     fn write_more<P, const N: usize>(
         &mut self,
@@ -246,7 +247,7 @@ impl Reference {
         }
     }
 
-    /// Writes an answer of node `n` to a Move. Its length is already known.
+    /// Writes an answer of node `n` to a Move. The reader already knows the length of the answer.
     fn write_answer<S: BitSink>(&mut self, n: usize, frame: &Frame, to: &mut S) {
         let Some(before) = self.words.get_mut(n) else { return };
         let now = words(frame);
@@ -274,7 +275,7 @@ impl Reference {
                 to.put(count.into(), 8);
             }
         }
-        // Events that were done, and the next event, which was worked on or has waited; at most as many as fit.
+        // The completed events and the next event, which was executed in part or has waited. At most as many events as fit are written.
         let looked_at = inputs.host.get(..done + 1).unwrap_or(inputs.host);
         let left = looked_at.iter().take(EVENTS_MAX).position(|event| !self.allows(event));
         let count = left.unwrap_or(looked_at.len().min(EVENTS_MAX));
@@ -298,7 +299,7 @@ impl Reference {
         rest.is_some()
     }
 
-    /// Writes one event. Returns `false` if its bytes were omitted.
+    /// Writes one event. Returns `false` if the bytes of the event were omitted.
     fn write_event<S: BitSink>(&self, event: &HostEvent<'_>, to: &mut S) -> bool {
         to.put(event.line.min(3) as u32, 2);
         to.put(event.overtaken.into(), 1);

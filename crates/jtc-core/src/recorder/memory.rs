@@ -1,4 +1,4 @@
-//! The memory of the flight recorder: a ring of blocks that stay readable even if a reset interrupts the writing (J-56).
+//! Memory of the flight recorder, which is a ring of blocks. The blocks stay readable even if a reset interrupts the writing (J-56).
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use jtc_wire::LogState;
@@ -14,7 +14,7 @@ struct Place {
     block: usize,
 }
 
-/// Memory in one or more pieces, used as one ring.
+/// Memory that consists of one or more pieces and is used as one ring.
 pub(super) struct Ring<P, const N: usize> {
     pieces: [P; N],
 }
@@ -36,7 +36,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         None
     }
 
-    /// Returns the position of the block with this number: its piece, and its index in that piece.
+    /// Returns the position of the block with this number, which consists of the piece and the index in that piece.
     fn place(&self, sequence: u32) -> Place {
         let mut at = sequence.checked_rem(self.len()).unwrap_or(0) as usize;
         for (piece, blocks) in self.pieces.iter().enumerate() {
@@ -87,7 +87,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
 /// Writes bits into the ring.
 pub(super) struct Writer<P, const N: usize> {
     ring: Ring<P, N>,
-    /// Number of the open block; `None` before the first block.
+    /// Number of the open block. `None` before the first block.
     open: Option<u32>,
     /// Position of the open block.
     place: Place,
@@ -95,7 +95,7 @@ pub(super) struct Writer<P, const N: usize> {
     next: u32,
     /// The head of the open block has been written.
     begun: bool,
-    /// Index of the word that is filled next; `rest` contains its first `fill` bits.
+    /// Index of the word that is filled next. `rest` contains the first `fill` bits of this word.
     word: usize,
     rest: u32,
     fill: u32,
@@ -107,7 +107,7 @@ pub(super) struct Writer<P, const N: usize> {
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
-    /// Creates a writer, for any content of the memory.
+    /// Creates a writer for any content of the memory.
     pub(super) fn new(pieces: [P; N]) -> Self {
         let ring = Ring { pieces };
         let newest = ring.newest();
@@ -145,7 +145,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.ring.block(sequence)
     }
 
-    /// Returns `true` if the memory holds no log.
+    /// Returns `true` if the memory does not contain a log.
     pub(super) fn is_empty(&self) -> bool {
         self.open.is_none()
     }
@@ -161,8 +161,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.open_block();
     }
 
-    /// Marks the start of a snapshot at the present position. Until the snapshot is committed, the mark points past the committed bits and
-    /// is not used.
+    /// Marks the start of a snapshot at the present position. Until the snapshot is committed, the mark points beyond the committed bits
+    /// and is not used.
     pub(super) fn mark_snapshot(&mut self) {
         if !self.marked {
             self.marked = true;
@@ -304,7 +304,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     #[cold]
     #[inline(never)]
     fn next_block(&mut self) {
-        // The bits so far are committed, even if they end in the middle of a tick. The rest of the tick follows in the next block.
+        // The bits so far are committed, even if the bits end in the middle of a tick. The remaining bits of the tick follow in the next
+        // block.
         self.commit();
         self.set_head(head::FLAGS, doubled(flags(self.state, self.powered) | CLOSED));
         self.open_block();
@@ -321,7 +322,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
             return;
         }
         let word = self.rest;
-        // Bits that did not fit, if any.
+        // Bits that did not fit into the block, if any.
         let used = 32 - self.fill;
         (self.rest, self.fill) = (value.checked_shr(used).unwrap_or(0), fill - 32);
         self.full(word);
@@ -332,7 +333,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
         let fill = self.fill;
         if value != 0 {
             let (low, high) = (value as u32, (value >> 32) as u32);
-            // A set bit and the 64 bits of the value: 65 bits.
+            // A set bit and the 64 bits of the value make 65 bits.
             let (a, b, c) = (low << 1 | 1, low >> 31 | high << 1, high >> 31);
             let over = |word: u32| (word >> 1) >> (31 - fill);
             let words = [self.rest | a << fill, over(a) | b << fill];

@@ -36,13 +36,13 @@ impl<'a> Reader<'a> {
         self.block
     }
 
-    /// Returns `true` if no bits are left, or the next block does not continue this one.
+    /// Returns `true` if no bits are left, or the next block does not continue this block.
     pub(super) fn at_end(&mut self) -> bool {
         self.advance();
         self.current.is_none_or(|whole| self.bit >= whole.bits)
     }
 
-    /// Moves to the next block if this one is used up and the next one continues it.
+    /// Moves to the next block if all bits of this block were read and the next block continues this block.
     fn advance(&mut self) {
         let Some(whole) = self.current else { return };
         if self.bit < whole.bits || !whole.closed {

@@ -1,4 +1,4 @@
-//! The inputs of a tick as they are read from a log.
+//! Inputs of a tick as read from a log.
 use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{
     EVENTS_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Response, UrgentCommand, UrgentCommands,
@@ -21,7 +21,7 @@ pub struct RecordedEvent {
     pub overtaken: bool,
     /// The event came on a plain line (J-51).
     pub plain: bool,
-    /// Type byte; 0 if it was not known.
+    /// Type byte of the frame. The byte is 0 if the type was not known.
     pub frame_type: u8,
     /// Kind of the event.
     pub kind: RecordedKind,
@@ -41,9 +41,9 @@ pub enum RecordedKind {
     Frame,
     /// A valid frame whose bytes are not in the log, because it is too long, there were too many frames, or it contains parameters.
     Unrecorded,
-    /// A damaged frame, and its status.
+    /// Damaged frame with its status.
     Bad(FrameStatus),
-    /// Noise, and its status.
+    /// Noise with its status.
     Noise(FrameStatus),
 }
 
@@ -64,8 +64,9 @@ impl RecordedEvent {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// Returns the event as an input of the controller. A frame that was not recorded is replaced by one that changes nothing. Segment 0 of
-    /// a trajectory is replaced by a segment without points, which has the effect of any segment 0 in Operate (J-30).
+    /// Returns the event as an input of the controller. A frame that was not recorded is replaced by a frame that does not change the
+    /// controller. Segment 0 of a trajectory is replaced by a segment without points, which has the same effect in Operate as any segment 0
+    /// (J-30).
     pub fn event(&self) -> HostEvent<'_> {
         let event = match (self.kind, FrameType::from_byte(self.frame_type)) {
             (RecordedKind::Bad(status), _) => LinkEvent::Bad(Response::bad(self.frame_type, status, 0)),
@@ -113,11 +114,11 @@ pub struct RecordedInputs {
     pub bus_state: BusState,
     /// Level of the safety input.
     pub safety_input: bool,
-    /// Ticks before this one that were missed.
+    /// Number of ticks that were missed before this tick.
     pub missed_ticks: u16,
     /// Stop and Pause commands that arrived.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// The lines could take a status.
+    /// The host lines could accept a status.
     pub status_free: bool,
     bus: [Option<Frame>; FRAMES_MAX],
     host: [RecordedEvent; EVENTS_MAX],
@@ -141,7 +142,7 @@ impl RecordedInputs {
         !self.left_out && self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
     }
 
-    /// Reads a tick and the check of its outputs.
+    /// Reads a tick and the check value of its outputs.
     pub(super) fn read(reference: &mut Reference, from: &mut Reader<'_>) -> (Self, u16) {
         let head = from.take(32);
         let mut inputs = Self {
@@ -194,9 +195,9 @@ impl RecordedInputs {
 
 /// Form of the recorded positions.
 enum Way {
-    /// Distances of all joints.
+    /// Form with the distances of all joints.
     Moved(u32),
-    /// Position of each joint.
+    /// Form with the position of each joint.
     Far([u32; JOINTS]),
 }
 

@@ -15,28 +15,28 @@ use crate::io::{HostEvent, Inputs, Outputs};
 use crate::nodes::FRAMES_MAX;
 use crate::telemetry::Telemetry;
 
-/// A record of a log.
-// A snapshot is large, but there are few of them.
+/// Record of a log.
+// A snapshot is large, but a log contains only a few snapshots.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub enum Record {
-    /// The state after the previous tick.
+    /// State after the previous tick.
     Snapshot(Snapshot),
     /// One tick.
     Tick {
         /// Inputs of the tick.
         inputs: RecordedInputs,
-        /// Check of the outputs of all ticks since the last snapshot.
+        /// Check value of the outputs of all ticks since the last snapshot.
         check: u16,
     },
 }
 
-/// A log: blocks in the order of their numbers. Reading never fails: for any content of the blocks, it returns the records of the valid
-/// ones, from the first snapshot on.
+/// Log that consists of blocks in the order of their numbers. Reading never fails. For any content of the blocks, the reader returns the
+/// records of the valid blocks, beginning with the first snapshot.
 #[derive(Clone, Debug)]
 pub struct Log<'a> {
     blocks: &'a [Block],
-    /// Index of the block from which on the next snapshot is searched.
+    /// Index of the block at which the search for the next snapshot begins.
     next: usize,
     reader: Option<Reader<'a>>,
     reference: Reference,
@@ -48,7 +48,7 @@ impl<'a> Log<'a> {
         Self { blocks, next: 0, reader: None, reference: Reference::default() }
     }
 
-    /// Returns the number of the newest block and its state, which shows why the log ends; `None` if no block is valid.
+    /// Returns the number of the newest block and its state, which shows why the log ends. Returns `None` if no block is valid.
     pub fn end(&self) -> Option<(u32, LogState)> {
         self.blocks.iter().rev().find_map(Whole::parse).map(|whole| (whole.sequence, whole.state))
     }
@@ -102,25 +102,25 @@ impl Iterator for Log<'_> {
 /// Result of comparing a replayed tick with the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The outputs are equal to those in the log.
+    /// The outputs and the log agree.
     Same,
-    /// The outputs differ from those in the log.
+    /// The outputs and the log differ.
     Differs,
-    /// For this reason, the outputs may differ until the next snapshot.
+    /// For the contained reason, the outputs may differ from the log until the next snapshot.
     Unsure(Unsure),
 }
 
 /// Reason why a replay may differ from the recorded ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsure {
-    /// An input is not in the log: a long frame, parameters, or more frames than fit. Or a StoreArm depends on memory that the replay does
-    /// not have.
+    /// An input is not in the log, because of a long frame, parameters, or too many frames. Another cause is a StoreArm, which depends on
+    /// memory that the replay does not have.
     Input,
-    /// The arm is not the recorded one.
+    /// The arm differs from the recorded arm.
     Arm,
     /// The points of the recorded trajectory are not known.
     Points,
-    /// There has been no snapshot yet.
+    /// The replay has not reached a snapshot yet.
     NoSnapshot,
 }
 
@@ -133,7 +133,7 @@ pub struct Step {
     pub boots: u32,
     /// Inputs. `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
     pub inputs: Option<RecordedInputs>,
-    /// Outputs; `None` for a snapshot.
+    /// Outputs. `None` for a snapshot.
     pub outputs: Option<Outputs>,
     /// Comparison with the log.
     pub outcome: Outcome,
@@ -143,11 +143,11 @@ pub struct Step {
 pub struct Replay<'a, M> {
     log: Log<'a>,
     controller: Controller<M>,
-    /// Starts of the device in the last snapshot that was restored; `None` before the first.
+    /// Number of device starts in the last restored snapshot. `None` before the first snapshot.
     boots: Option<u32>,
     chain: u32,
     outcome: Outcome,
-    /// An input is not in the log, but the outputs have still been equal since then.
+    /// An input is not in the log, but the outputs since that input have still been equal.
     follows: bool,
     arm: Option<u64>,
     points_hash: Option<u32>,
@@ -156,7 +156,7 @@ pub struct Replay<'a, M> {
 impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
     /// Creates a replay of this log. The controller has an arm, and its memory contains the points with this hash.
     pub fn new(log: Log<'a>, mut controller: Controller<M>, points_hash: Option<u32>) -> Self {
-        // The limit is far above the number of parts of an image.
+        // This number of calls is far above the number of parts of an image.
         for _ in 0..IMAGE_MAX {
             controller.hash_arm();
         }
@@ -172,7 +172,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.points_hash == Some(points_hash)
     }
 
-    /// Returns the outcome that a replay from this snapshot on can have.
+    /// Returns the outcome that a replay after this snapshot can have.
     fn worth(&self, snapshot: &Snapshot) -> Outcome {
         let Origin { arm, points_hash, .. } = snapshot.origin;
         if arm != self.arm {
@@ -259,7 +259,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.chain = chain(self.chain, &self.controller, self.controller.errors.word(), &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
         let same = check(self.chain) == recorded_check;
-        // A replay has no permanent memory. A device with such memory takes some ticks for a StoreArm, which is refused at once here.
+        // A replay has no permanent memory. A device with permanent memory takes some ticks for a StoreArm, which the replay refuses at
+        // once.
         let stores = |event: &RecordedEvent| event.frame_type == FrameType::StoreArm as u8;
         let repeatable = recorded.is_whole() && !recorded.host().iter().any(stores);
         if !repeatable && self.outcome == Outcome::Same {
@@ -273,7 +274,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         } else if self.outcome == Outcome::Same && !same {
             self.outcome = Outcome::Differs;
         }
-        // A missing input may have changed nothing. This is assumed as long as the outputs are equal.
+        // A missing input possibly had no effect. The replay assumes this as long as the outputs are equal.
         self.follows &= same && self.outcome == Outcome::Unsure(Unsure::Input);
         let outcome = if self.follows { Outcome::Same } else { self.outcome };
         self.step(Some(*recorded), Some(outputs), outcome)

@@ -1,5 +1,5 @@
-//! The state of the controller in a snapshot: all values that affect the motion of the arm and the reports of the controller. The arm and
-//! the points of the trajectory are not included; a log identifies them by their hashes.
+//! State of the controller in a snapshot, with all values that affect the motion of the arm and the reports of the controller. The arm and
+//! the points of the trajectory are not included, because a log identifies both by their hashes.
 //!
 //! The state of the host link (waiting records, frames to send, progress of a long frame) is not included. A replay gives the same frames
 //! on the joint bus and the same states, but not the same bytes on the host lines.
@@ -27,17 +27,18 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 /// Identity of the device, the arm and the trajectory of a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// Starts of the device.
+    /// Number of starts of the device.
     pub boots: u32,
     /// Hash of the firmware's version and revision (FNV-1a, 64 bits).
     pub firmware: u64,
-    /// Hash of the arm in use (J-52); `None` if it was not known yet.
+    /// Hash of the arm in use (J-52). `None` if the hash was not known yet.
     pub arm: Option<u64>,
-    /// Gains, model and friction polynomial are the built-in ones. These have more digits than an arm image contains.
+    /// Flags that show whether gains, model and friction polynomial are the built-in values. The built-in values have more digits than an
+    /// arm image can contain.
     pub built_in: [bool; 3],
     /// Hash of the points of the trajectory in memory.
     pub points_hash: u32,
-    /// Number of those points.
+    /// Number of points of the trajectory in memory.
     pub points: u32,
 }
 
@@ -68,7 +69,7 @@ impl LiveSettings {
     }
 }
 
-/// The state of the controller.
+/// State of the controller.
 #[derive(Clone, Debug)]
 pub(crate) struct Dynamic {
     state: ControllerState,

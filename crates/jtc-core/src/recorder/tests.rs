@@ -22,7 +22,7 @@ enum Change {
     Byte { node: usize, at: usize, to: u8 },
     /// A node answers with this number of bytes, or does not answer.
     Length { node: usize, len: usize },
-    /// Two answers change places.
+    /// Two answers are swapped.
     Swap { first: usize, second: usize },
     /// A frame that is not an answer to a Move comes first.
     Other { id: u16, len: usize },

@@ -1,5 +1,6 @@
-//! The table of settings (J-53): number in the wire format, name, unit, range, meaning, and field of each. Docs, arm files and the output
-//! of `jtc arm show` are generated from it. A number is never used again: 59 to 63 belonged to an earlier Teaching.
+//! Table of settings (J-53), with the wire number, name, unit, range, meaning and field of each setting. Docs, arm files and the output of
+//! `jtc arm show` are generated from it. A number of a removed setting is never reused. For example, 59 to 63 belonged to an earlier
+//! version of Teaching.
 use super::{Kind, Live, Setting};
 use crate::config::Config;
 
@@ -20,7 +21,7 @@ macro_rules! settings {
             kind: Kind::$kind,
         },)+];
 
-        /// The value of a setting; of a joint the one with this index.
+        /// Value of a setting. For a setting of the joints, the value of the joint with this index.
         pub(super) fn get(config: &Config, number: u8, joint: usize) -> Option<f64> {
             match number {
                 $($number => settings!(@get $kind config joint $($place)+),)+
@@ -28,7 +29,7 @@ macro_rules! settings {
             }
         }
 
-        /// Writes the value; `false` if the joint does not exist.
+        /// Writes the value. Returns `false` if the joint does not exist.
         pub(super) fn set(config: &mut Config, number: u8, joint: usize, value: f64) -> bool {
             match number {
                 $($number => settings!(@set $kind config joint value $($place)+),)+

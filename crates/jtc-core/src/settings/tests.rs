@@ -40,7 +40,7 @@ fn j53_numbers_and_names_are_unique_and_in_order() {
     }
 }
 
-/// Every field of the configuration is in the table: the table has as many values as the configuration has numbers.
+/// The table contains every field of the configuration, because the table has as many values as the configuration has numbers.
 #[test]
 fn j53_every_field_has_a_row() {
     let text = std::format!("{:?}", Config::avena());
@@ -83,7 +83,7 @@ fn j53_what_is_out_of_range_is_refused_and_named() {
         }
     }
     assert_eq!(set(200, 0, 1.0), Err(SettingError::Unknown { setting: 200, joint: 0 }));
-    // These values are not valid together.
+    // The combination of these values is not valid.
     assert!(matches!(set(1, 1, 2.98), Err(SettingError::Config(ConfigError::Range { joint: 1, .. }))));
     assert!(matches!(set(8, 2, 9.0), Err(SettingError::Config(ConfigError::TorqueScale { joint: 2, .. }))));
     assert!(matches!(set(3, 4, 5.0), Err(SettingError::Config(ConfigError::SpeedScale { joint: 4, .. }))));

@@ -1,4 +1,4 @@
-//! The state machine under all conditions, and its diagram in docs/protocol-jtc.md.
+//! Tests of the state machine under all conditions, and of the diagram in docs/protocol-jtc.md.
 extern crate std;
 use std::format;
 use std::string::String;
@@ -19,7 +19,7 @@ const STATES: [ControllerState; 6] = [
     ControllerState::Error,
 ];
 
-/// A condition, and the texts in the diagram for the cases that it holds and that it does not hold.
+/// Condition, with the texts in the diagram for the cases that the condition is met and not met.
 type Named = (fn(&Conditions) -> bool, &'static str, &'static str);
 const NAMES: [Named; 6] = [
     (|c| c.error, "an error", "errors cleared"),
@@ -63,7 +63,7 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     Conditions { teaching, execute, ..Conditions::default() }
 }
 
-/// Returns the conditions that are possible in a state. Some of them need a command that the host sends and the state accepts.
+/// Returns the conditions that are possible in a state. Some conditions need a command that the host sends and the state accepts.
 fn possible(state: ControllerState) -> Vec<Conditions> {
     // The host is not served in Start, so all parameters are missing there.
     let start = state == ControllerState::Start;
@@ -78,8 +78,8 @@ fn possible(state: ControllerState) -> Vec<Conditions> {
         .collect()
 }
 
-/// Returns the conditions of an arrow: those that hold whenever the arrow is taken. Conditions that only exclude a state with higher
-/// priority are left out.
+/// Returns the conditions of an arrow in the diagram, which are met at every transition along this arrow. Conditions that only exclude a
+/// state with higher priority are omitted.
 fn label(from: ControllerState, to: ControllerState) -> Option<String> {
     let all = possible(from);
     let taken: Vec<_> = all.iter().filter(|c| next_state(from, c) == to).collect();

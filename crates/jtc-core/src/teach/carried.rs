@@ -1,8 +1,8 @@
-//! The part of a load that a joint carries in Teaching. HoldPos has found the load.
+//! Part of a load that a joint carries in Teaching. HoldPos has found the load.
 //!
-//! HoldPos cannot distinguish a load from a person who leans on the arm and will let go. If the torque drives its joint, its acting share
-//! falls with the speed of the joint, so that a joint is driven only slowly. When the joint slows down, all of the torque acts again. A
-//! load is removed permanently only if a motion without a hand cannot be explained otherwise.
+//! HoldPos cannot distinguish a load from a person who leans on the arm and will let go. If the torque drives its joint, the acting share
+//! of the torque falls with the speed of the joint, so that the joint is driven only slowly. When the joint slows down, the whole torque
+//! acts again. A load is removed permanently only if a motion without a hand cannot be explained otherwise.
 use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::interpolation::smooth;
@@ -10,33 +10,34 @@ use crate::limits::JointConfig;
 use crate::load::Load;
 use crate::soft_end::SOFT_END;
 
-/// Speeds along the load (rad/s) at which the acting share begins to fall and at which it is zero. `DRIVES` is for a joint that is hardly
-/// damped, which is fast before its speed is measured. `DAMPED` is added if the damping of the joint balances the load.
+/// Speeds along the load (rad/s) at which the acting share begins to fall and at which it is zero. `DRIVES` is for a joint with little
+/// damping, which is fast before its speed is measured. `DAMPED` is added if the damping of the joint balances the load.
 const DRIVES: (f64, f64) = (0.03, 0.15);
 const DAMPED: (f64, f64) = (0.17, 0.35);
-/// Time constants of the acting share, s: for its fall, for its return, and for its return if the joint falls against its load.
+/// Time constants of the acting share, s. The share falls with the first constant and returns with the second. If the joint falls against
+/// its load, the share returns with the third constant.
 const FALLS_S: f64 = 0.006;
 const RETURNS_S: f64 = 0.3;
 const CATCHES_S: f64 = 0.05;
 /// Lowest speed of a joint that may be driven by its load, rad/s.
 const MOVES: f64 = 0.1;
-/// Range of the torque of damping and friction against a motion, as a share of the acting torque. Within it, the acting torque alone
-/// explains the motion.
+/// Range of the torque of damping and friction against a motion, as a share of the acting torque. Within this range, the acting torque
+/// alone explains the motion.
 const EXPLAINED: (f64, f64) = (0.8, 1.3);
 /// Removed torque, as a share of the highest torque that the joint carries, above which the torque is considered missing if the joint
 /// sinks.
 const MISSED: f64 = 0.1;
 
-/// Load that a joint carries.
+/// Load that a joint carries in Teaching.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Carried {
     /// Torque that is not explained by a mass at the flange, N·m.
     pub rest: f32,
-    /// Highest torque that may be carried: the torque that was found, or the highest that may be found, N·m.
+    /// Highest torque that may be carried, N·m. This is the found torque or the highest torque that may be found, whichever is higher.
     most: f32,
     /// Share of the load that does not act because the joint is fast.
     left_out: f32,
-    /// Share that does not act because the load pushes the joint outwards in its soft end.
+    /// Share of the load that does not act because the load pushes the joint outwards in its soft end.
     inside: f32,
 }
 
@@ -66,8 +67,8 @@ impl Carried {
         self.whole(by_mass) * (1.0 - f64::from(self.left_out)) * (1.0 - f64::from(self.inside))
     }
 
-    /// Runs one tick. `balanced`: share of the load that the damping of the joint balances. `depth`: compression of the joint's soft end,
-    /// like [`depth`](crate::soft_end::depth), rad.
+    /// Runs one tick. `balanced` is the share of the load that the damping of the joint balances. `depth` is the compression of the joint's
+    /// soft end in rad, like [`depth`](crate::soft_end::depth).
     pub(super) fn step(&mut self, by_mass: f64, velocity: f64, balanced: f64, depth: f64) -> f64 {
         let whole = self.whole(by_mass);
         let along = if whole < 0.0 { -velocity } else { velocity };
@@ -84,7 +85,7 @@ impl Carried {
         self.torque(by_mass)
     }
 
-    /// Returns `true` if the mass alone drives the joint. `against`: torque of damping and friction against the motion, N·m.
+    /// Returns `true` if the mass alone drives the joint. `against` is the torque of damping and friction against the motion, N·m.
     pub(super) fn is_driven(&self, by_mass: f64, velocity: f64, against: f64) -> bool {
         let acts = self.torque(by_mass);
         let mostly_mass = by_mass * acts > 0.0 && by_mass.abs() > f64::from(self.rest).abs();
@@ -92,7 +93,8 @@ impl Carried {
         mostly_mass && along && explains(acts, against)
     }
 
-    /// Returns `true` if the joint sinks because a torque is missing. `gone`: torque of the mass that the joint no longer carries, N·m.
+    /// Returns `true` if the joint sinks because a torque is missing. `gone` is the torque of the mass that the joint no longer carries,
+    /// N·m.
     pub(super) fn sinks(&self, gone: f64, velocity: f64, against: f64) -> bool {
         let missed = gone.abs() > MISSED * f64::from(self.most);
         missed && velocity * gone < -MOVES * gone.abs() && explains(gone, against)
@@ -104,7 +106,7 @@ impl Carried {
     }
 }
 
-/// Returns `true` if a torque alone explains a motion against which damping and friction have the torque `against`, N·m.
+/// Returns `true` if a torque alone explains a motion. `against` is the torque of damping and friction against this motion, N·m.
 fn explains(torque: f64, against: f64) -> bool {
     against >= EXPLAINED.0 * torque.abs() && against <= EXPLAINED.1 * torque.abs()
 }

@@ -7,29 +7,29 @@ use crate::limits::JointConfig;
 use crate::soft_end;
 use crate::yielding::SPRING_RATE;
 
-/// Speeds of a joint between which its damping grows, rad/s.
+/// Speeds of a joint between which the damping increases, rad/s.
 const FAST: (f64, f64) = (0.4, 0.8);
-/// Highest rate at which the damping reduces the speed of a joint while the other joints are free to move, 1/s. Measured speeds are about
-/// 8 ms old. Joints that move each other tolerate less damping.
+/// Highest rate at which the damping reduces the speed of a joint while the other joints are free to move, 1/s. Measured speeds are about 8
+/// ms old. Joints whose motions affect each other tolerate less damping.
 pub(super) const DAMPING_RATE: f64 = 90.0;
 /// Speed at which the damping of a joint balances the load that it carries, rad/s, if its inertia tolerates that damping.
 const SINKS: f64 = 0.5;
-/// Value to which the damping grows, divided by the torque limit, s/rad.
+/// Value to which the damping increases, divided by the torque limit, s/rad.
 const GROWN: f64 = 1.0;
-/// Speeds between which a brake is added to the damping, rad/s, and deceleration of that brake, rad/s². The brake is too weak to reverse a
-/// joint before that is measured. Without it, over-speed would release the arm.
+/// Speeds between which a braking torque is added to the damping, rad/s, and deceleration of this torque, rad/s². The braking torque is too
+/// weak to reverse a joint before the reversal is measured. Without the braking torque, over-speed would release the arm.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
-/// Speed above which a joint is no longer taught but brought to rest: in rad/s, and as a share of the over-speed threshold (J-35). The
-/// lower one is used.
+/// Speed above which Teaching ends and the joint is brought to rest, in rad/s and as a share of the over-speed threshold (J-35). The lower
+/// of the two speeds is used.
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
-/// Time constant of the speed that is computed from positions, s. Drives report a mean over 10 ms.
+/// Time constant of the speed that is computed from positions, s. The speed that drives report is a mean over 10 ms.
 const SPEED_S: f32 = 0.004;
-/// Share of a rotor inertia that is relied on, because the value may be a proposal that was not measured. If none is configured, the
-/// proposal is the torque limit divided by `PROPOSED`, rad/s².
+/// Share of a rotor inertia that the controller relies on, because the value may be an unmeasured proposal. If no inertia is configured,
+/// the proposal is the torque limit divided by `PROPOSED`, rad/s².
 const ROTOR: f64 = 0.2;
 const PROPOSED: f64 = 200.0;
-/// Part of the modelled friction that every joint has.
+/// Share of the modelled friction that every joint has at least.
 const CERTAIN_FRICTION: f64 = 0.7;
 /// Highest share of the damping that the friction compensation may cancel, because the friction may not exist.
 const USED_UP: f64 = 0.5;
@@ -39,7 +39,7 @@ const GRIP_S: f64 = 0.1;
 const STANDING: f64 = 0.01;
 /// Highest speed at which the full dry friction may act, rad/s.
 const SLOW: f64 = 0.3;
-/// Longest stretch of the spring that holds a joint at rest, rad.
+/// Longest extension of the spring that holds a joint at rest, rad.
 const STRETCH: f64 = 0.005;
 /// Speed around zero in which the sign of the friction compensation is smoothed, rad/s.
 const SIGN_WIDTH: f64 = 0.1;
@@ -49,13 +49,13 @@ const COMPENSATED: (f64, f64) = (0.3, 0.6);
 const MISSING: u8 = 2;
 const LETS_GO: u8 = 5;
 
-/// Returns the speed, computed from positions, above which a joint ends Teaching, rad/s. The position controller can stop a joint that a
-/// damper cannot stop, before over-speed releases the arm.
+/// Returns the speed, computed from positions, above which a joint ends Teaching, rad/s. The position controller can stop a joint before
+/// over-speed releases the arm, even if damping cannot stop the joint.
 pub(crate) fn too_fast(limits: &JointConfig, config: &Config) -> f64 {
     TOO_FAST.0.min(TOO_FAST.1 * config.overspeed_factor * limits.velocity_max)
 }
 
-/// Returns the least rotor inertia that is relied on for a joint, kg·m².
+/// Returns the lowest rotor inertia that the controller assumes for a joint, kg·m².
 pub(super) fn rotor(limits: &JointConfig) -> f64 {
     let given = limits.rotor_inertia;
     ROTOR * if given > 0.0 { given } else { limits.torque_max / PROPOSED }
@@ -67,18 +67,20 @@ pub(crate) struct TaughtJoint {
     /// Anchor of the spring of the dry friction, rad, and the share of the spring that acts.
     anchor: f32,
     pub(super) grip: f32,
-    /// Depth inside a soft end at which the joint began, rad. The spring acts only beyond it, so that it moves nothing by itself.
+    /// Depth of the joint inside a soft end at the beginning of Teaching, rad. The spring acts only beyond this depth, so that the spring
+    /// does not move the joint by itself.
     begun: f32,
-    /// Friction of the joint according to its parameters, N·m: the Coulomb part, and the whole friction at a recent speed.
+    /// Friction of the joint according to its parameters, N·m. `coulomb` is the Coulomb part, and `rubs` is the whole friction at a recent
+    /// speed.
     coulomb: f32,
     rubs: f32,
     /// Least inertia that the joint moves, kg·m².
     inertia: f32,
     /// Torque of damping and friction against the last motion, N·m.
     against: f32,
-    /// Position that follows the joint, rad. The faster the joint is, the more this position lags.
+    /// Position that follows the joint, rad. The lag of this position increases with the speed of the joint.
     behind: f32,
-    /// Number of consecutive missing answers, and progress of fading springs and damping, which is complete at 2 · [`LETS_GO`].
+    /// Number of consecutive missing answers, and progress of the fading springs and damping. The fading is complete at 2 · [`LETS_GO`].
     missing: u8,
     lost: u8,
 }
@@ -107,12 +109,12 @@ pub(crate) struct TaughtTorque {
     pub friction: f64,
 }
 
-/// How the joint carries its load.
+/// Data about the load that the joint carries.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bears {
     /// Share of the load that the damping balances at [`SINKS`].
     pub balanced: f64,
-    /// Depth of the joint inside a soft end beyond the depth at which it began, rad. The sign is that of [`soft_end::depth`].
+    /// Depth of the joint inside a soft end beyond the depth at the beginning of Teaching, rad. The sign is that of [`soft_end::depth`].
     pub compressed: f64,
 }
 
@@ -131,9 +133,9 @@ impl TaughtJoint {
         }
     }
 
-    /// Evaluates the answer of the joint in each tick. `late`: delay of this tick, ms; `fresh`: the joint has answered, with this
-    /// `position`, rad. Without an answer its speed is old, and its springs pull to its old position. Returns the speed that follows from
-    /// its positions, rad/s.
+    /// Evaluates the answer of the joint in each tick. `late` is the delay of this tick in ms. `fresh` means that the joint has answered
+    /// with this `position`, rad. Without an answer, the speed of the joint is old, and the springs pull to the old position. Returns the
+    /// speed computed from the joint positions, rad/s.
     #[inline(always)]
     pub(super) fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
         // A late tick has the effect of a missing answer.
@@ -182,14 +184,15 @@ impl TaughtJoint {
         self.against = torque as f32;
     }
 
-    /// Returns the damping at low speed, and the damping to which it grows, N·m·s/rad.
+    /// Returns the damping at low speed and the highest damping, N·m·s/rad.
     fn dampings(&self, load: f64, limits: &JointConfig) -> (f64, f64) {
         let most = DAMPING_RATE * f64::from(self.inertia);
         let damping = limits.teach_damping.max(load.abs() / SINKS).min(most);
         (damping, damping.max(most.min(GROWN * limits.torque_max)))
     }
 
-    /// Runs one tick of a joint that carries this `load`, N·m. `haste`: excess of the flange speed over the tool speed limit, 0 to 1.
+    /// Runs one tick of a joint that carries this `load`, N·m. `haste` is the excess of the flange speed over the tool speed limit, as a
+    /// value from 0 to 1.
     #[inline(always)]
     pub(super) fn step(
         &mut self,
@@ -204,7 +207,7 @@ impl TaughtJoint {
         let depth = soft_end::depth(position, range);
         let begun = f64::from(self.begun).min(depth.abs());
         self.begun = begun as f32;
-        // The damping grows with the speed of the joint and of the flange, and towards a position limit.
+        // The damping increases with the speed of the joint and of the flange, and towards a position limit.
         let fast =
             if velocity.abs() > FAST.0 { smooth((velocity.abs() - FAST.0) / (FAST.1 - FAST.0)) } else { 0.0 };
         let compressed = depth - begun.copysign(depth);
@@ -231,8 +234,9 @@ impl TaughtJoint {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }
 
-    /// Returns the dry friction of a slow joint. The dry friction fades between the speed at which damping balances its torque and three
-    /// times that speed. So any lower torque is stopped, and the sum of damping and dry friction never falls with the speed.
+    /// Returns the dry friction of a slow joint. The dry friction fades between the speed at which damping balances the friction torque and
+    /// three times that speed. So the joint stops against any lower torque, and the sum of damping and dry friction never decreases with
+    /// the speed.
     fn dry_friction(
         &mut self,
         position: f64,
@@ -251,13 +255,13 @@ impl TaughtJoint {
             if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (2.0 * slow)) } else { 1.0 };
         let grip = f64::from(self.grip);
         self.grip = (grip + (gripped - grip) * (DT / GRIP_S)) as f32;
-        // The spring slips when its full torque stretches it. In a fast joint the spring only follows.
+        // The spring slips when it is extended by its full torque. If the joint is fast, the anchor of the spring only follows the joint.
         let stretch = if gripped > 0.0 { self.stretch(breakaway) } else { 0.0 };
         self.anchor = f64::from(self.anchor).max(position - stretch).min(position + stretch) as f32;
         self.dry_spring(position, limits, config)
     }
 
-    /// Returns the stretch at which the spring of the dry friction slips, rad.
+    /// Returns the extension at which the spring of the dry friction slips, rad.
     fn stretch(&self, breakaway: f64) -> f64 {
         STRETCH.max(breakaway / (SPRING_RATE * SPRING_RATE * f64::from(self.inertia)).max(f64::MIN_POSITIVE))
     }
@@ -269,8 +273,8 @@ impl TaughtJoint {
         f64::from(self.grip) * (breakaway / self.stretch(breakaway) * way).max(-breakaway).min(breakaway)
     }
 
-    /// Returns the friction of the joint that is compensated, N·m. Near standstill it grows with the speed at most half as fast as the
-    /// damping.
+    /// Returns the friction of the joint that is compensated, N·m. Near standstill, the compensation increases with the speed at most half
+    /// as fast as the damping.
     fn compensation(&self, velocity: f64, damping: f64, config: &Config) -> f64 {
         let torque = config.teach_friction * f64::from(self.coulomb);
         let slope = (torque / SIGN_WIDTH).min(USED_UP * damping);

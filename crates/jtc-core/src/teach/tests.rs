@@ -1,4 +1,4 @@
-//! Tests of the found loads that Teaching carries (J-25).
+//! Tests of the loads that HoldPos found and that Teaching carries (J-25).
 use proptest::prelude::*;
 
 use super::*;
@@ -33,7 +33,7 @@ fn j25_a_mass_at_the_flange_is_found_and_carried_to_other_poses() {
     }
 }
 
-/// Teaching begins without a step. After a motion of 1 rad, the torque that no mass explains has fallen to a thirtieth.
+/// Teaching begins without a step. After a motion of 1 rad, the torque that is not explained by a mass has fallen to a thirtieth.
 #[test]
 fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
     let missing = [7.0, 10.0, -3.0, 1.0, 0.0, 2.0];
@@ -50,7 +50,8 @@ fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
 
 #[test]
 fn j25_friction_never_becomes_a_great_mass() {
-    // If the arm is stretched vertically, a mass at the flange loads no joint. Near that pose the mass would need to be enormous.
+    // If the arm is stretched vertically, a mass at the flange does not load any joint. Near this pose, only an enormous mass could explain
+    // the loads.
     assert!(begun([8.0; JOINTS], &[0.0; JOINTS]).mass.abs() < 0.2);
     for k in 0..200 {
         let q = [0.0, 0.01 * f64::from(k), 0.0, 0.0, 0.0, 0.0];
@@ -62,7 +63,7 @@ fn j25_friction_never_becomes_a_great_mass() {
 }
 
 proptest! {
-    /// The mass changes towards zero, not beyond it and never back.
+    /// The mass changes only towards zero, and never beyond zero.
     #[test]
     fn j60_a_mass_that_is_given_goes_from_the_one_that_was_found(found in -3.0..3.0f32, given in prop::collection::vec(-4.0..4.0f64, 1..8)) {
         let mut taught = Taught { found, mass: found, ..Taught::default() };
@@ -75,8 +76,9 @@ proptest! {
         }
     }
 
-    /// For any load that was found, at rest or in motion, even while it was lowered: at a position limit no load pushes a joint outwards,
-    /// and the spring of the soft end is stronger there. The carried torque never exceeds the torque that was found or may be found.
+    /// The test uses any load that was found at rest, in motion, or while a joint lowered the load. At a position limit, the load does not
+    /// push a joint outwards, and the spring of the soft end is stronger. The carried torque never exceeds the torque that was found or may
+    /// be found.
     #[test]
     fn j25_at_a_position_limit_no_load_pushes_outwards(load in -180.0..180.0f64, by_mass in -180.0..180.0f64, velocity in -0.5..0.5f64) {
         let limits = Config::avena().joints[1];
@@ -92,7 +94,7 @@ proptest! {
         }
     }
 
-    /// The acting share of a load falls with the speed along it, is complete at rest, and is not lost.
+    /// The acting share of a load falls with the speed along the load. At rest the whole load acts, so the load is not lost.
     #[test]
     fn j25_a_load_acts_the_less_the_faster_it_drives(load in 1.0..54.0f64, balanced in 0.0..1.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)]) {
         let limits = Config::avena().joints[1];
@@ -116,7 +118,7 @@ proptest! {
     }
 }
 
-/// An arm that carries 2 kg at its flange. Its joint 2 moves along that load.
+/// An arm carries 2 kg at its flange, and joint 2 moves along this load.
 struct Driven {
     taught: Taught,
     q: [f64; JOINTS],
@@ -128,8 +130,8 @@ impl Driven {
         Self { taught: begun(dynamics().flange_torque(&q).map(|u| 2.0 * u), &q), q }
     }
 
-    /// Moves joint 2 for `ms` at `velocity` (rad/s, along the load). `against`: torque of damping and friction against that motion, as a
-    /// share of the acting torque. Returns the share of the mass that remains.
+    /// Moves joint 2 for `ms` at `velocity` (rad/s, along the load). `against` is the torque of damping and friction against this motion,
+    /// as a share of the acting torque. Returns the share of the mass that remains.
     fn moves(&mut self, against: f64, velocity: f64, ms: usize) -> f32 {
         let along = velocity * f64::from(self.taught.unit[1]).signum();
         for _ in 0..ms / usize::from(JUDGED_MS) {
@@ -141,8 +143,8 @@ impl Driven {
     }
 }
 
-/// A mass that alone explains the motion is removed, within seconds and without a step. If a hand moves the arm faster or more slowly than
-/// the mass would, the mass is not removed.
+/// A mass that alone explains the motion is removed within seconds, without a torque step. If a hand moves the arm faster or more slowly
+/// than the mass would, the mass is not removed.
 #[test]
 fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     let left = |against, velocity, ms| Driven::new().moves(against, velocity, ms);
@@ -155,13 +157,14 @@ fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     }
 }
 
-/// A removed mass is added again if the joint sinks without it and nothing else explains this.
+/// A removed mass is added again if the joint sinks without the mass and no other torque explains this motion.
 #[test]
 fn j25_a_mass_that_is_missed_comes_back() {
     let mut driven = Driven::new();
     let gone = driven.moves(1.0, 0.3, 4_000);
     assert!(gone < 0.2, "{gone}");
-    // The missing torque drives the joint as the acting torque did before. The missing torque is this multiple of the remaining torque.
+    // The missing torque drives the joint in the way in which the acting torque drove it before. The missing torque is this multiple of the
+    // remaining torque.
     let sinking = f64::from((1.0 - gone) / gone);
     for (against, velocity, ms) in
         [(sinking, -0.05, 1_000), (sinking, -0.2, 90), (sinking, 0.2, 1_000), (0.5 * sinking, -0.2, 1_000)]
@@ -174,12 +177,13 @@ fn j25_a_mass_that_is_missed_comes_back() {
         back = driven.moves(sinking, -0.2, 12);
     }
     assert!((0.8..1.0).contains(&back), "{back}");
-    // Mass that the model carries meanwhile is not added again.
+    // Mass that the model has contained since then is not added again.
     driven.taught.give_way(1.5);
     assert!(driven.taught.mass > 0.0 && driven.taught.found <= 0.51, "{} kg", driven.taught.found);
 }
 
-/// In each round the inertia and the friction of every joint are computed once, the load is checked as often, and the ramp gets its tick.
+/// In each round, the inertia and the friction of every joint are computed once. The load is checked once per joint, and the ramp gets one
+/// tick.
 #[test]
 fn j25_each_round_computes_all_that_changes_slowly() {
     let of =

@@ -1,4 +1,4 @@
-//! Yields and lowered loads, joint by joint.
+//! Tests of yields and of lowered loads for single joints.
 use proptest::prelude::*;
 
 use super::*;
@@ -11,7 +11,7 @@ fn limits() -> JointConfig {
     Config::avena().joints[1]
 }
 
-/// The brake has no torque in the first tick of a yield, its full torque soon after, and always acts against the motion.
+/// The brake has zero torque in the first tick of a yield and its full torque soon after. The brake always acts against the motion.
 #[test]
 fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
     let limits = limits();
@@ -26,7 +26,7 @@ fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
     }
 }
 
-/// A joint in the middle of a wide range.
+/// Inputs of a joint in the middle of a wide range.
 fn at<'a>(limits: &'a JointConfig, position: f64, velocity: f64, model: f64) -> Joint<'a> {
     Joint {
         position,
@@ -48,8 +48,8 @@ fn tick(yields: &mut Yield, joint: &Joint<'_>) -> PidTorque {
 }
 
 proptest! {
-    /// For any motion of the joint, the torque of the spring never exceeds the share. The sum of spring and damper exceeds it only if the
-    /// damper alone does. The damper only dissipates energy.
+    /// For any motion of the joint, the torque of the spring never exceeds the share. The sum of spring and damper exceeds the share only
+    /// if the damper alone exceeds it. The damper only dissipates energy.
     #[test]
     fn j68_a_slow_push_has_the_share_against_it_and_a_shove_the_limit(
         set in -3.0..3.0f64,
@@ -72,13 +72,14 @@ proptest! {
         prop_assert!((torque.p + torque.d).abs() <= most.max(torque.d.abs()) + 1e-9);
         prop_assert!(torque.d * velocity <= 0.0 && (velocity != 0.0 || torque.d == 0.0));
         prop_assert_eq!(torque.i, load);
-        // Half of the velocity limit needs the whole torque, unless the joint is too light.
+        // At half of the velocity limit, the whole torque is needed, unless the joint is too light.
         let expected = (limits.torque_max - most) * velocity.abs() / (0.5 * limits.velocity_max);
         let light = DAMPING_RATE * inertia * velocity.abs();
         prop_assert!((torque.d.abs() - expected.min(light).min(limits.torque_max)).abs() < 1e-3);
     }
 
-    /// A lowered load has no spring. Its torque never exceeds the limit, and never falls below its value at the beginning.
+    /// A lowered load has no spring. The torque of a lowered load never exceeds the limit, and never falls below its value at the
+    /// beginning.
     #[test]
     fn j70_a_load_that_is_lowered_is_damped_and_learned_within_the_limit(
         model in prop_oneof![-170.0..-20.0f64, 20.0..170.0f64],
@@ -101,7 +102,7 @@ proptest! {
     }
 }
 
-/// A hand lifts a joint that lowers its load, and lets go. The torque that carried the joint is still there.
+/// A hand lifts a joint that lowers its load, and lets go. The torque that carried the joint still acts.
 #[test]
 fn j70_a_joint_that_is_lifted_keeps_what_carries_it() {
     let limits = limits();
@@ -179,7 +180,7 @@ fn j68_a_joint_that_is_calm_for_200_ms_is_held_again() {
     assert!(stays.is_calm() && !stays.is_over(), "the host decides");
     stays.clear();
     assert!(stays.is_over());
-    // A motion restarts the time of calm.
+    // A motion restarts the time for which the joint must be calm.
     tick(&mut stays, &at(&limits, 0.0, 0.2, 0.0));
     assert!(!stays.is_calm());
 }
@@ -209,7 +210,7 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
     }
 }
 
-/// A lowered load comes to rest if the limit can hold it. The load is then held if a little of the limit remains for the position
+/// A lowered load comes to rest if the limit can hold it. The load is then held if a small part of the limit remains for the position
 /// controller.
 #[test]
 fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
@@ -258,9 +259,9 @@ fn moves(yields: &mut Yield, velocity: f64, ms: u16) -> f64 {
     yields.load()
 }
 
-/// Spring and damper have 40 N·m against a joint without a push. Its own load drives it, so that load was a person who leaned on the arm.
-/// The load fades within a second, and returns if the joint sinks. If a hand leads the joint faster, or against its load, nothing follows
-/// about the load.
+/// Spring and damper have 40 N·m against a joint without a push. The joint is driven by its own load, so the load was a person who leaned
+/// on the arm. The load fades within a second, and returns if the joint sinks. If a hand leads the joint faster, or against its load, the
+/// load does not change.
 #[test]
 fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     let begun = || Yield::begin(false, false, 0.0, INERTIA, 40.0);
@@ -276,8 +277,8 @@ fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     assert!((0.9 * 40.0..=40.0).contains(&back), "{back} N·m");
 }
 
-/// The position controller takes over the part of the load that the spring has not opposed: never more than the load, and never with the
-/// opposite sign.
+/// The position controller takes over the part of the load that the spring has not opposed. This part is never larger than the load, and
+/// never has the opposite sign.
 #[test]
 fn j68_the_position_controller_takes_over_what_the_spring_leaves() {
     for (load, spring, left) in [

@@ -224,7 +224,6 @@ fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool
 }
 
 /// A gripper that keeps holding its part does not change its state while the arm has no torque, except if the gripper itself is cleared.
-/// This exception does not last for ever.
 #[test]
 fn j23_what_a_gripper_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};

@@ -5,12 +5,12 @@ use super::*;
 
 const INERTIA: f64 = 3.0;
 
-/// Joint 2 of the default arm: 180 N·m, 90 N·m·s/rad.
+/// Returns joint 2 of the default arm, with 180 N·m and 90 N·m·s/rad.
 fn limits() -> JointConfig {
     Config::avena().joints[1]
 }
 
-/// A joint at rest at `position` (rad), with this Coulomb friction (N·m).
+/// Returns a joint at rest at `position` (rad) with this Coulomb friction (N·m).
 fn begun(position: f64, coulomb: f64) -> TaughtJoint {
     let mut joint = TaughtJoint::begin(position, &limits(), (-1.5, 1.5));
     joint.set_inertia(INERTIA);
@@ -41,8 +41,8 @@ fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
 }
 
 proptest! {
-    /// Together with the damping, neither the friction compensation nor the dry friction ever drives a joint, and the torque against the
-    /// motion never falls with the speed.
+    /// Together with the damping, the friction compensation and the dry friction never drive a joint. The torque against the motion never
+    /// decreases with the speed.
     #[test]
     fn j25_the_faster_a_joint_is_the_more_torque_it_has_against_it(
         slow in 0.001..1.4f64, more in 0.001..0.3f64, coulomb in 0.0..10.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)],
@@ -100,8 +100,8 @@ fn j25_the_dry_friction_lets_go_of_a_joint_that_moves_and_takes_hold_again() {
     assert!(held < -0.9 * 0.03 * limits().torque_max, "{held} N·m after 300 ms");
 }
 
-/// Half of the Coulomb friction, smoothed within 0.1 rad/s, and zero from 0.6 rad/s on. This share is less if the damping does not allow
-/// its slope.
+/// The compensation is half of the Coulomb friction, smoothed within 0.1 rad/s, and zero above 0.6 rad/s. This share is lower if the
+/// damping does not allow the slope of the compensation.
 #[test]
 fn j25_a_share_of_the_coulomb_friction_is_taken_away() {
     for (velocity, share) in
@@ -125,13 +125,13 @@ fn j25_at_a_soft_end_a_joint_is_pushed_back_and_one_that_begins_there_is_not() {
         let torque = tick(&mut joint, position, 0.0).brake;
         assert!((torque + part * share).abs() < 1e-3, "{torque} N·m at {position} rad");
     }
-    // A joint that begins inside the soft end, or beyond the limit, is not moved. Further out, the spring acts.
+    // A joint that begins inside the soft end, or beyond the limit, is not moved. If the joint moves further outwards, the spring acts.
     for (found, further) in [(1.45, 1.5), (1.7, 1.75), (-1.45, -1.5)] {
         let mut joint = begun(found, 8.0);
         assert!(tick(&mut joint, found, 0.0).brake.abs() < 1e-3, "{found}");
         let torque = tick(&mut joint, further, 0.0).brake;
         assert!((torque + 0.5 * share * f64::signum(found)).abs() < 1e-3, "{torque} N·m at {further} rad");
-        // After it was led inwards and out again, the spring acts on the joint from the start of the soft end.
+        // After the joint was led inwards and outwards again, the spring acts from the start of the soft end.
         tick(&mut joint, 0.0, 0.0);
         let torque = tick(&mut joint, 1.45, 0.0).brake;
         assert!((torque + 0.5 * share).abs() < 1e-3, "{torque} N·m");

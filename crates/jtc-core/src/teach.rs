@@ -60,7 +60,7 @@ enum Turn {
 }
 
 impl Turn {
-    /// Returns the computation with this number. In each round, every fourth computation is that of a slowly changing value.
+    /// Returns the computation with this number. In each round, every fourth tick computes a slowly changing value.
     fn of(number: u8) -> Self {
         let Some(turn) = number.checked_sub(FIRST) else {
             return match number {

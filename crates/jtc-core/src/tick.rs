@@ -14,7 +14,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let before = self.state;
         // 1. Inputs. The error flags are computed before the commands of the host are executed, so that a clear cannot hide a fault that
-        // appears in the same tick. In Start, commands are not executed yet, and the board offers the events again later.
+        //    appears in the same tick. In Start, commands are not executed yet, and the board offers the events again later.
         self.take_answers(inputs);
         if !inputs.safety_input || self.safety_stop_ms.is_some() {
             self.watch_safety_input(inputs);
@@ -35,7 +35,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // 3. The work of this state is executed.
         let (torque, found) = self.work();
 
-        // 4. An error found in this step sets the torque of the present tick to zero.
+        // 4. An error found in step 3 sets the torque of the present tick to zero.
         let torque = self.form_error_flags_again(torque, &found);
 
         // 5. The frame for the bus.
@@ -160,8 +160,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// Runs the control law and its limits. Returns the torques to command, and the joint errors that have no other reaction than an error
-    /// (J-66).
+    /// Runs the control law and its limits. Returns the torques to command, and the joint errors for which the controller must release the
+    /// arm (J-66).
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
         // A joint above its over-speed limit is out of control. The only possible reaction is to remove the torque.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);

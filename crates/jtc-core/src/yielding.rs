@@ -94,8 +94,8 @@ pub(crate) struct Yield {
     braking: f64,
     grip: f64,
     swing: Swing,
-    /// `holdable` means that the position controller can hold the load of the joint. `cleared` means that the host requires it to hold the
-    /// load.
+    /// `holdable` means that the position controller can hold the load of the joint. `cleared` means that the host requires the position
+    /// controller to hold the load.
     holdable: bool,
     cleared: bool,
     calm_ms: u16,

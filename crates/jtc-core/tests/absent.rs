@@ -1,4 +1,4 @@
-//! Absent joints (J-53): their substitute values, refused commands, and a drive that answers although its joint is absent.
+//! Tests of absent joints (J-53): substitute values, refused commands, and a drive that answers although its joint is absent.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -26,7 +26,7 @@ fn absent(joints: &[(usize, f64)]) -> Vec<(u8, usize, f64)> {
         .collect()
 }
 
-/// Returns a rig in which these joints are absent. Their nodes never answer.
+/// Returns a rig in which these joints are absent. The nodes of absent joints never answer.
 fn bench(joints: &[(usize, f64)]) -> Rig {
     bench_with(Config::avena(), joints)
 }
@@ -51,7 +51,7 @@ fn is_absent(rig: &Rig, j: usize) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
-    /// Whichever joints are absent, the other joints are brought up and held, with the torque that the model of the whole arm requires.
+    /// For any absent joints, the present joints are brought up and held with the torque that the model of the whole arm requires.
     #[test]
     fn j53_absent_joints_are_waited_for_nowhere(mask in 1u8..63, angles in prop::array::uniform6(-1.5..1.5f64)) {
         let joints: Vec<_> = ALL.into_iter().filter(|j| mask & (1 << j) != 0).map(|j| (j, angles[j])).collect();
@@ -72,7 +72,7 @@ proptest! {
                 prop_assert!((telemetry.joints[j].torque_model - gravity[j]).abs() < 1e-3, "joint {}", j + 1);
             }
         }
-        // The nodes of absent joints were never given a torque or asked for a state.
+        // The controller never sent a torque or a requested state to the nodes of absent joints.
         for request in &rig.sent {
             match request {
                 Request::Move { torque, .. } => {
@@ -101,7 +101,7 @@ fn j53_absent_is_set_in_init_and_error_only() {
         rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 100);
         assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Operate");
         assert!(!is_absent(&rig, j));
-        // In Error, after a drive has stopped answering, the same values are accepted.
+        // In Error, after a drive has stopped answering, these values are accepted.
         rig.nodes[j].silent = true;
         rig.until(50, |r| r.state() == ControllerState::Error);
         assert_eq!(set(&mut rig, &all), DataStatus::NoError);
@@ -157,7 +157,7 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
             };
             rig.until(10, |r| r.state() == ControllerState::Error);
             assert_ne!(rig.errors() & error::EXTERNAL_JOINTS, 0);
-            // The state of the drive is shown, so that the operator can see which joint it is.
+            // The state of the drive is shown, so that the operator can identify the joint.
             let shown = rig.status().joints.map(|joint| joint.state);
             assert_eq!(shown[j], rig.nodes[j].report.state);
             rig.clear(true, 0x7F);
@@ -219,7 +219,7 @@ fn j53_absent_joints_acknowledge_nothing() {
     assert_eq!(resets.count(), 0, "what is not there is not reset");
 }
 
-/// The absent joints are not part of the arm's settings. A payload is carried whether joints are absent or not.
+/// The absent joints are not part of the arm's settings. A payload is carried with and without absent joints.
 #[test]
 fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     let mut rig = bench(&[(1, 0.9), (4, -0.3)]);
@@ -238,7 +238,7 @@ fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     assert_eq!((q[1], q[4]), (0.9, -0.3));
 }
 
-/// A payload or a model is not refused because of a load that only an absent joint would hold.
+/// A payload or a model is not refused if only an absent joint would have to hold a load that is too high.
 #[test]
 fn j53_absent_joints_hold_nothing() {
     let payload = |mass: f64| {
@@ -257,7 +257,7 @@ fn j53_absent_joints_hold_nothing() {
         assert_eq!(rig.state(), ControllerState::HoldPos);
         let expected = if there { DataStatus::IncorrectValue } else { DataStatus::NoError };
         assert_eq!(rig.ask(FrameType::SetSettings, &payload(8.0)), expected);
-        // The load is accepted again when it is checked at the end of Init.
+        // At the end of Init, the load is checked and accepted again.
         rig.press_stop(10);
         rig.clear(true, 0x7F);
         rig.run(3_000);

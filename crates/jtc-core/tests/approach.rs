@@ -1,4 +1,4 @@
-//! The approach to the path, and the departure from it. State that belongs to a motion must not remain after the motion.
+//! Tests of the approach to the path, and of leaving the path. The state of a motion must not remain after the motion.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState, joint_error};
@@ -6,7 +6,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
 use rig::{Rig, floats, model_body, raw, segment_body};
 
-/// A motion with at most 0.1 rad/s, at rest at both ends.
+/// Returns a motion with at most 0.1 rad/s, at rest at both ends.
 fn points() -> Vec<RawPoint> {
     (0..200)
         .map(|k| {
@@ -19,7 +19,7 @@ fn points() -> Vec<RawPoint> {
         .collect()
 }
 
-/// If the end of a pause was not detected, the pause ends when the arm is taught, because a hand then moves the joints.
+/// If the end of a pause was not detected, the pause ends when Teaching begins, because a hand then moves the joints.
 #[test]
 fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     let mut rig = Rig::holding();
@@ -56,13 +56,13 @@ fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
             rig.nodes[1].report.velocity = 0.0;
             rig.run(12_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{command:?} {taught_ms}");
-            // The second command has no effect, because there is nothing to stop.
+            // The second command has no effect, because the arm is already stopped.
             assert_eq!(rig.exec(command), DataStatus::NotAllowed);
         }
     }
 }
 
-/// An operator who stops an arm may press Pause as well.
+/// An operator who stops an arm may also press Pause.
 #[test]
 fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     for ms in [1, 20, 100, 180] {
@@ -77,7 +77,7 @@ fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     }
 }
 
-/// If an arm is touched after a pause, it is held. Only path time that cannot be stopped is an error.
+/// If a person touches an arm after a pause, the arm is held. Only path time that cannot be stopped is an error.
 #[test]
 fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     let mut rig = Rig::holding();
@@ -112,8 +112,8 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     assert_eq!(rig.errors(), 0);
 }
 
-/// A Stop or a Pause during the approach: the arm slows down at once and comes to rest before it reaches the first point. The next Execute
-/// begins from there.
+/// After a Stop or a Pause during the approach, the arm slows down at once and comes to rest before it reaches the first point. The next
+/// Execute begins at that position.
 #[test]
 fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     for (command, trajectory) in
@@ -156,8 +156,9 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     }
 }
 
-/// A simulated arm with a load that the controller knows, in random poses, at the highest allowed distance from the first point: 0.02 rad,
-/// and 0.3 rad with a wide tolerance. During the approach no torque reaches its limit. If Execute is refused, little torque remains.
+/// A simulated arm carries a load that the controller knows, in random poses. The distance from the first point is the highest allowed
+/// distance: 0.02 rad, or 0.3 rad with a wide tolerance. During the approach no torque reaches its limit. If Execute is refused, only a
+/// small torque remains.
 #[test]
 fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     let seed = 13;
@@ -205,8 +206,8 @@ fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of 500 refused; at most {:.0} % of a torque limit, {longest} ms", 100.0 * most);
 }
 
-/// A joint holds a position with 98 % of its limit, and its friction needs more than the margin. The joint does not start: Execute is
-/// refused (8), as for an arm at another position.
+/// A joint holds a position with 98 % of its limit, and its friction needs more than the margin. The joint does not start, because Execute
+/// is refused with status 8, as for an arm at another position.
 #[test]
 fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     let holds = Parameters::avena().model;
@@ -264,8 +265,8 @@ fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     }
 }
 
-/// An arm that is exactly at its paused point continues with any torque margin. A friction table with torque at standstill once prevented
-/// that.
+/// An arm that is exactly at its paused point continues with any torque margin. In an earlier version, a friction table with torque at
+/// standstill prevented the continuation.
 #[test]
 fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     let model = Parameters::avena().model;
@@ -380,7 +381,7 @@ fn j16_an_execute_does_not_wait_for_ever() {
 fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     let mut rig = Rig::new(Config::avena());
     let mut model = Parameters::avena().model;
-    // The lengths are given in millimetres instead of metres.
+    // The model contains lengths in millimetres instead of metres.
     for joint in &mut model.joints {
         joint.xyz = joint.xyz.map(|x| 1000.0 * x);
     }

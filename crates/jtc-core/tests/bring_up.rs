@@ -1,4 +1,4 @@
-//! Order of the bring-up: validity of reports, and frames to each node (J-16, J-20, J-21).
+//! Tests of the order of the bring-up: validity of reports, and frames to each node (J-16, J-20, J-21).
 use crate::rig;
 
 use jtc_bus::{Answer, Frame, JointReport, NodeState, Request, Target, warning};
@@ -105,7 +105,7 @@ fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
-/// A node in state 10, the transition from Start to Init, has not reached Init yet.
+/// A node in state 10 (the transition from Start to Init) has not reached Init yet.
 #[test]
 fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     let mut rig = Rig::holding();
@@ -127,7 +127,7 @@ fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
-/// No node is configured in Error or while it is being cleared.
+/// A node is not configured in Error or while the node is being cleared.
 #[test]
 fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     let mut rig = Rig::holding();
@@ -157,7 +157,7 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init));
 }
 
-/// The occurred words report past errors, the current words present errors.
+/// The occurred words report past errors. The current words report present errors.
 #[test]
 fn j21_occurred_errors_are_not_reported_as_current() {
     // An error of a joint, and a CAN timeout.
@@ -184,8 +184,8 @@ fn j21_occurred_errors_are_not_reported_as_current() {
     assert!(status.occurred != 0 && status.can_occurred != 0 && status.joints[JOINT].internal_occurred != 0);
 }
 
-/// The drive must go through Init to clear its error. If the last parameter arrives in the very next frame, the arm is held only after
-/// that.
+/// The drive must go through Init to clear its error. If the last parameter arrives in the very next frame, the arm is held only after the
+/// clear.
 #[test]
 fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
     let mut rig = Rig::new(Config::avena());
@@ -216,7 +216,7 @@ fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
     assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.state == NodeState::READY && n.configured));
     let status = rig.status();
     assert_eq!((status.jtc_init, status.node_init), (0b111, 0));
-    // Each parameter clears its bit. Then Init ends.
+    // Each received parameter clears its status bit. Then Init ends.
     for (t, left) in [
         (FrameType::PidParamUseDefault, 0b101),
         (FrameType::FrictionTableUseDefault, 0b100),
@@ -306,7 +306,7 @@ fn j16_enabling_has_a_time_limit() {
         (rig.state(), rig.errors()),
         (ControllerState::Error, error::EXTERNAL | error::EXTERNAL_JOINTS)
     );
-    // The default leaves time for the motor alignment, which takes four seconds.
+    // The default setting leaves time for the motor alignment, which takes four seconds.
     assert_eq!(Config::avena().enable_timeout_ms, 10_000);
 }
 
@@ -324,7 +324,7 @@ fn j16_only_known_states_are_requested_and_positions_count_after_configuration()
         for j in 0..6 {
             let q = t.joints[j].position;
             assert!(q == 0.0 || (q - 0.1 * j as f64).abs() < 1e-6);
-            // The position 0 that a drive reports before its configuration is never latched as hold position.
+            // Before its configuration, a drive reports the position 0, which is never latched as the hold position.
             if t.state == ControllerState::HoldPos {
                 assert!((t.joints[j].set_position - 0.1 * j as f64).abs() < 1e-6);
             }

@@ -1,4 +1,4 @@
-//! Enabling an arm with a load that its model lacks (J-43): every load within the torque limits is caught.
+//! Tests of enabling an arm with a load that the model does not contain (J-43). Every load within the torque limits is caught.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -8,14 +8,14 @@ use jtc_wire::{ExecCommand, RawPoint};
 use plant::{LuGre, POSES, Plant, loaded};
 use rig::Rig;
 
-/// Friction from zero, which does not damp a swing, to the friction of the default arm.
+/// Friction factors from zero, which does not damp a swing, to the friction of the default arm.
 const FRICTIONS: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
 
 fn friction(factor: f64) -> [LuGre; 6] {
     if factor == 0.0 { [LuGre::NONE; 6] } else { LuGre::of_avena_times(factor) }
 }
 
-/// Share of its torque limit that the most loaded joint needs to hold `mass` kg.
+/// Returns the share of its torque limit that the most loaded joint needs to hold `mass` kg.
 fn share(mass: f64, pose: &[f64; 6]) -> f64 {
     let model = loaded(Parameters::avena().model, mass);
     let gravity = Dynamics::new(&model, Config::avena().gravity).gravity_torque(pose);
@@ -59,7 +59,7 @@ impl Let {
         }
     }
 
-    /// Checks `ticks` ticks, beginning when the joints are enabled.
+    /// Checks `ticks` ticks, beginning with the tick in which the joints are enabled.
     fn caught(&mut self, ticks: usize) {
         while !self.enabled() {
             self.run(1);
@@ -104,7 +104,7 @@ fn j43_an_unknown_payload_is_caught_in_motion() {
         let mut it = Let::new(Config::avena(), 2.5, POSES[1], 0.1);
         it.arm.brakes = false;
         while !it.enabled() {
-            // Hands hold the arm back.
+            // Hands hold the moving arm back.
             (it.arm.q, it.arm.v) = (POSES[1], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
             it.run(1);
         }
@@ -140,8 +140,8 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
     assert!(cases > 20, "{cases}");
 }
 
-/// The time for a catch ends one second after a joint was enabled. A load that is added later is an error of J-43 again. The time is a
-/// setting.
+/// The time for a catch ends one second after a joint was enabled. A load that is added later is again an error according to J-43. A
+/// setting determines this time.
 #[test]
 fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {

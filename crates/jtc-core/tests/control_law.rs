@@ -1,4 +1,4 @@
-//! The control law in the loop of the controller (section 6), and torque without steps.
+//! Tests of the control law in the loop of the controller (section 6), and of torque without steps.
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
@@ -50,7 +50,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
     rig.move_along(&points, 105);
     let t = rig.controller.telemetry();
     let (q, qd, qdd) = (
-        // J-62: the measured position plus the motion that was commanded since the measurement.
+        // J-62: the model uses the measured position plus the motion that was commanded since the measurement.
         t.joints.map(|j| j.position + (j.set_position - j.due_position)),
         t.joints.map(|j| j.set_velocity),
         t.joints.map(|j| j.set_acceleration),
@@ -71,7 +71,7 @@ fn j40_gravity_is_a_setting() {
     for j in 0..6 {
         assert!((model(&down)[j] + model(&up)[j]).abs() < 1e-9);
     }
-    // At position zero the arm is stretched vertically. Only a horizontal gravity loads joint 1.
+    // At position zero the arm is stretched vertically. Joint 1 is loaded only if gravity is horizontal.
     assert!(model(&down)[1].abs() < 1.0);
     assert!(model(&sideways)[1].abs() > 50.0);
 }
@@ -136,7 +136,7 @@ fn j42_polynomial_order_and_lengths() {
     for j in &rig.controller.telemetry().joints {
         assert!((j.torque_friction - 5.0).abs() < 1e-9, "Coulomb friction only: {}", j.torque_friction);
     }
-    // Six coefficients: c5..c0. c5 is 25 °C, so the factor is 1.
+    // The frame contains six coefficients, c5..c0. c5 is 25 °C, so the factor is 1.
     let mut rig = Rig::holding();
     let six = floats((0..6).flat_map(|_| [25.0, -0.02, 0.0, 0.0, 10.0, 2.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &six), DataStatus::NoError);
@@ -151,7 +151,7 @@ fn j42_polynomial_order_and_lengths() {
 fn j44_no_torque_step_at_any_switch() {
     let mut rig = Rig::holding();
     rig.follow = false;
-    // A permanent error, so that the PID controller has torque to carry over.
+    // A permanent position error is set, so that the PID controller has torque that must be continued.
     for j in 0..6 {
         rig.nodes[j].report.position = 0.0003;
     }
@@ -170,7 +170,7 @@ fn j44_no_torque_step_at_any_switch() {
     rig.send(FrameType::TeachingModeDisable, &[]);
     run_without_steps(&mut rig, 300, 1.5);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // New gains while holding.
+    // New gains are set while the arm is held.
     rig.send(FrameType::PidParam, &floats((0..6).flat_map(|_| [100.0, 10.0, 1.0, -1.0, 1.0])));
     run_without_steps(&mut rig, 300, 1.5);
 }
@@ -182,7 +182,7 @@ fn j25_teaching_compensates_gravity_and_damps_what_moves() {
     rig.run(150);
     rig.run(100);
     assert_eq!(torques(&rig), model(&rig), "nothing but the model");
-    // The joint has more friction of its own than Teaching adds. Teaching compensates half of the Coulomb part.
+    // The joint itself has more friction than Teaching adds. Teaching compensates half of the Coulomb part.
     rig.nodes[2].report.velocity = 0.2;
     rig.run(3);
     let t = rig.controller.telemetry().joints[2];
@@ -241,7 +241,7 @@ fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
                 let t = rig.controller.telemetry().joints[1];
                 assert!(side * (limit - t.set_position) >= 0.0, "{} beyond {limit}", t.set_position);
                 assert!((t.set_velocity - last.set_velocity).abs() < 0.01, "{last:?} {t:?}");
-                // J-40: gravity, and the torque that decelerates the joint.
+                // J-40: the torque consists of gravity and the torque that decelerates the joint.
                 let now = rig.controller.telemetry().joints;
                 let q = now.map(|j| j.position + (j.set_position - j.due_position));
                 let (v, a) = (now.map(|j| j.set_velocity), now.map(|j| j.set_acceleration));
@@ -269,7 +269,7 @@ fn j06_refused_parameters_change_nothing() {
     let mut polynomial = vec![0.0f32; 24];
     polynomial[23] = f32::NEG_INFINITY;
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &floats(polynomial)), DataStatus::IncorrectValue);
-    // A table whose last joint has an axis that does not increase.
+    // Returns a table in which the velocities or temperatures of the last joint do not increase.
     let mut table: Vec<f32> = (0..6)
         .flat_map(|_| (0..20).map(|i| i as f32).chain((0..20).map(|i| i as f32)).chain((0..400).map(|_| 1.0)))
         .collect();

@@ -1,4 +1,5 @@
-//! A measurement is older than the command of the same tick. The measurement is compared with the set value of its own time (J-62).
+//! A measurement is older than the command of the same tick. The controller compares the measurement with the set value that was due at the
+//! time of the measurement (J-62).
 use crate::{plant, rig};
 
 use std::collections::VecDeque;
@@ -18,7 +19,7 @@ fn delayed(ticks: u8) -> Config {
     // The deviation that a wrong delay causes in an exact motion must not be considered a push.
     let mut config = Config { delay_ticks: ticks, torque_release: true, ..Config::avena() };
     if ticks > 3 {
-        // With the longest delays the gains need heavier joints (J-71).
+        // With the longest delays, the gains need joints with more inertia (J-71).
         config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 1.8);
     }
     config
@@ -46,7 +47,7 @@ fn there_and_back(ways: &[f64; 6], seconds: f64) -> Vec<RawPoint> {
 struct LateArm {
     arm: Plant,
     rig: Rig,
-    /// True positions of the last ticks, the newest first.
+    /// True positions of the last ticks, newest first.
     past: VecDeque<[f64; 6]>,
     late: usize,
 }
@@ -74,8 +75,8 @@ impl LateArm {
         self.arm.tick_seen_at(&mut self.rig, &self.past[self.late - 1]);
     }
 
-    /// Executes `points`. Returns for each joint the RMS of the difference between commanded and true position, and the RMS of the
-    /// commanded velocity.
+    /// Executes `points`. Returns two values for each joint: the RMS of the difference between commanded and true position, and the RMS of
+    /// the commanded velocity.
     fn follow(&mut self, points: &[RawPoint]) -> [(f64, f64); 6] {
         self.rig.upload(points, 10);
         self.rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
@@ -105,8 +106,8 @@ impl LateArm {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..Default::default() })]
 
-    /// If the delay setting is wrong by some ticks, the arm deviates by its motion in these ticks. With the right setting only a small part
-    /// of that remains.
+    /// If the delay setting is wrong by some ticks, the arm deviates by its motion in these ticks. With the right setting, only a small
+    /// part of the deviation remains.
     #[test]
     fn j62_the_true_position_follows_best_with_the_delay_that_the_answers_have(
         late in 1..=4u8,
@@ -127,8 +128,8 @@ proptest! {
     }
 }
 
-/// An arm that is exactly at its commanded position in each tick, or at the position to which a hand leads it. Its answers are at least two
-/// ticks old.
+/// Simulated arm that is exactly at its commanded position in each tick, or at the position to which a hand leads it. The answers of the
+/// arm are at least two ticks old.
 struct ExactArm {
     rig: Rig,
     here: [f64; 6],
@@ -161,7 +162,7 @@ impl ExactArm {
         now
     }
 
-    /// Runs ticks until `done`. Checks that the PID controller gives no torque in any of them.
+    /// Runs ticks until `done`. Checks that the torque of the PID controller is zero in every tick.
     fn run(&mut self, what: &str, led: f64, mut done: impl FnMut(&Rig) -> bool) {
         for tick in 0..5_000 {
             if done(&self.rig) {
@@ -195,7 +196,7 @@ impl ExactArm {
     }
 }
 
-/// Whenever a motion begins, continues or ends, an arm that follows exactly gets no torque from the PID controller.
+/// If an arm follows exactly, the torque of the PID controller is zero when a motion begins, continues or ends.
 #[test]
 fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
     const EXEC: FrameType = FrameType::TrajSetExecStatus;
@@ -238,7 +239,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
     const JOINT: usize = 1;
     for (late, velocity) in [(2, 0.6), (3, -0.4), (5, 1.1), (DELAY_MAX, -1.2)] {
         let mut arm = ExactArm::holding(late);
-        // A drive is slow to enable, and the joint begins to fall meanwhile.
+        // Enabling a drive takes long, and the joint begins to fall meanwhile.
         arm.rig.nodes[JOINT].slow_enable = true;
         arm.rig.press_stop(1);
         arm.rig.clear(true, 0x7F);
@@ -304,7 +305,8 @@ fn j43_j62_the_position_error_is_that_of_the_same_time() {
     }
 }
 
-/// The reported position error is the one that the control law uses. With a delay it belongs to a time that number of ticks ago.
+/// The reported position error is the one that the control law uses. With a delay, the error belongs to the time that is earlier by the
+/// number of delay ticks.
 #[test]
 fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     for delay in 0..=DELAY_MAX {
@@ -331,7 +333,8 @@ fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     }
 }
 
-/// Without a delay the control law is that of J-40 and J-41 bit for bit: it compares the set value of this tick with the measured position.
+/// Without a delay, the control law equals the law of J-40 and J-41 in every bit, because the set value of this tick is compared with the
+/// measured position.
 #[test]
 fn j62_without_a_delay_the_present_set_value_is_compared() {
     let config = delayed(0);
@@ -358,8 +361,8 @@ fn j62_without_a_delay_the_present_set_value_is_compared() {
     assert!(moved > 0.2, "{moved} rad/s");
 }
 
-/// The prediction for a lost measurement equals the measurement. For an arm that follows exactly, the PID controller gives no torque,
-/// whenever the loss occurs in a motion with corners of the velocity, and however old the answers are.
+/// The prediction for a lost measurement equals the measurement. For an arm that follows exactly, the torque of the PID controller is zero.
+/// The loss may occur at any time in a motion with corners of the velocity, and the answers may have any age.
 #[test]
 fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
     for late in [2, 4, DELAY_MAX] {
@@ -375,7 +378,7 @@ fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
             }
             assert_eq!((arm.rig.trajectory(), arm.rig.errors()), (TrajectoryState::Finish, 0));
         }
-        // The prediction uses the rate of the last 5 ms, which contain a corner until 4 ms after it.
+        // The prediction uses the rate of the last 5 ms, which contain a velocity corner until 4 ms after the corner.
         assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
     }
 }

@@ -1,5 +1,5 @@
-//! A Stop during an upload drops it. No part of the upload is executed, and jogging, teaching and the next upload are possible (J-30,
-//! J-58).
+//! A Stop during an upload drops the upload. The dropped upload is not executed, not even in part, and jogging, teaching and the next
+//! upload are possible (J-30, J-58).
 use crate::rig;
 
 use jtc_core::{ControllerState, TrajectoryState};
@@ -29,7 +29,7 @@ fn stops(rig: &Rig) -> Vec<DataStatus> {
 fn all_is_free(rig: &mut Rig, upload: bool) {
     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "nothing to execute");
     if upload {
-        // The next upload has other points, and must not contain any point of the earlier one.
+        // The next upload has other points, and must not contain any point of the earlier upload.
         let points: Vec<RawPoint> = vec![rest(0); 60];
         rig.upload(&points, 10);
         assert_eq!(rig.exec(ExecCommand::Execute), NoError);
@@ -106,7 +106,7 @@ fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     }
 }
 
-/// Segment 0 of an upload was received before the Stop, but not processed yet. The earlier trajectory stays.
+/// Segment 0 of an upload was received before the Stop, but not processed yet. The earlier trajectory stays in memory.
 #[test]
 fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     let mut rig = Rig::holding();
@@ -162,11 +162,11 @@ fn j30_a_pause_drops_no_upload() {
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
 }
 
-/// A host on a plain line cannot handle a refused segment. Therefore its upload is completed, but the Stop still takes effect: the
+/// A host on a plain line cannot handle a refused segment. Therefore the upload is completed, but the Stop still takes effect, so the
 /// trajectory is not executed.
 #[test]
 fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
-    // The Stop varies in its line, in the segment that is being processed, and in the ticks since that segment was sent.
+    // The test varies the line of the Stop, the segment that is being processed, and the ticks since this segment was sent.
     for line in [0, 1] {
         for at in 0..SEGMENTS {
             for ticks in [0, 1, 5, 19, 23] {
@@ -205,13 +205,13 @@ fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
     }
 }
 
-/// The opposite case: only a Stop during the upload prevents the trajectory of a plain host from being executed.
+/// In the opposite case, only a Stop during the upload prevents the execution of the trajectory of a plain host.
 #[test]
 fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
     for command in [None, Some(UrgentCommand::Pause), Some(UrgentCommand::Stop)] {
         let mut rig = Rig::holding();
         rig.plain = true;
-        // The command comes before the upload; a Pause also comes during the upload.
+        // The command comes before the upload. A Pause may also come during the upload.
         if let Some(command) = command {
             rig.urgent(1, command);
             rig.run(3);

@@ -1,4 +1,5 @@
-//! Joints are enabled only while the arm hardly moves. If a joint moves nevertheless, it comes to rest without a torque step (J-16).
+//! Joints are enabled only while the arm is almost at rest. If a joint moves nevertheless, the joint comes to rest without a torque step
+//! (J-16).
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -32,7 +33,7 @@ fn asked_to_enable(requests: &[Request]) -> bool {
         .any(|r| matches!(r, Request::ChangeFsm { target } if target[..6].contains(&Target::Enable)))
 }
 
-/// Returns a rig in Error that has no error to clear any more.
+/// Returns a rig in Error after all errors have been cleared.
 fn stopped(config: Config) -> Rig {
     let mut rig = Rig::new(config);
     rig.defaults();
@@ -45,7 +46,7 @@ fn stopped(config: Config) -> Rig {
 
 #[test]
 fn j16_no_joint_is_enabled_while_one_moves() {
-    // A drive that reports the true values; one that reports no velocity; one that reports the velocity but still the old position.
+    // Three kinds of drives: with true reports, with a reported velocity of zero, and with a true velocity but the old position.
     let reports: [Report; 3] = [|q, v| (q, v), |q, _| (q, 0.0), |_, v| (0.0, v)];
     for report in reports {
         for speed in [0.3, 1.5] {
@@ -106,7 +107,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         rig.nodes[JOINT].report.state = NodeState::ENABLED;
         let (start, mut last) = (rig.nodes[JOINT].report.position, 0.0);
         for tick in 0..900 {
-            // The arm moves as commanded. The controller receives its present answer two ticks after that command (J-62).
+            // The arm moves as commanded. The controller receives the present answer of the arm two ticks after the command (J-62).
             let t = rig.controller.telemetry().joints[JOINT];
             if t.set_velocity != 0.0 {
                 rig.nodes[JOINT].report.velocity = t.set_velocity;
@@ -127,7 +128,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         let t = rig.controller.telemetry().joints[JOINT];
         let way = t.set_position - start;
         assert_eq!(t.set_velocity, 0.0);
-        // The stop takes 200 ms, or as long as 3 rad/s² require.
+        // The stop takes 200 ms, or longer if a deceleration of 3 rad/s² requires more time.
         let seconds = f64::max(0.2, 1.5 * f64::abs(velocity) / 3.0);
         assert!(
             (way - 0.5 * seconds * velocity).abs() < 0.01,

@@ -1,4 +1,4 @@
-//! Encoders on a simulated arm that jump, slip, or have another scale than configured (J-35, J-66, J-69).
+//! Tests of a simulated arm with encoders that jump, slip, or have another scale than configured (J-35, J-66, J-69).
 use crate::plant::{LuGre, POSES, Plant, Random};
 use crate::rig::{Rig, floats, pieces};
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -33,7 +33,7 @@ fn cause(rig: &mut Rig) -> Option<StopCause> {
     rig.info().reactions.expect("reported").stop.map(|(cause, _)| cause)
 }
 
-/// A held arm does not follow an encoder that jumps: the jump leads to a held stop, and its cause is shown.
+/// A held arm does not follow an encoder that jumps. The jump causes a held stop, and the cause is shown.
 #[test]
 fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     let mut random = Random(35);
@@ -59,7 +59,7 @@ fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     }
 }
 
-/// An arm in motion does not follow the jump either. The arm comes to rest on its true path.
+/// An arm in motion also does not follow the jump. The arm comes to rest on its true path.
 #[test]
 fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     for (joint, size) in [(0, 0.01), (0, -0.2), (1, 0.006), (2, -0.02), (4, 0.1)] {
@@ -134,7 +134,7 @@ fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     }
 }
 
-/// A person who leads the arm does not feel the jump: Teaching ends, and the arm is held at its present position.
+/// A person who leads the arm does not feel the jump. Teaching ends, and the arm is held at its present position.
 #[test]
 fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -201,8 +201,8 @@ fn j35_without_a_window_nothing_is_compared() {
 /// another joint, and go back.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
-    // Each row: offsets of joints 2 and 4 from the true position, rad, each with its start time in ms; and the ticks whose answers are
-    // lost.
+    // Each row contains the offsets of joints 2 and 4 from the true position (rad), each with its start time (ms), and the ticks whose
+    // answers are lost.
     type Course = (&'static [(usize, f64, f64)], &'static [usize]);
     let courses: [Course; 7] = [
         (&[(0, 0.3, 0.0), (1, 0.02, 0.0)], &[]),
@@ -235,8 +235,8 @@ fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     }
 }
 
-/// An answer with a wrong position and a wrong speed is not a jump. Such an answer is not used, like a wrong position without a speed to
-/// compare it with.
+/// An answer with a wrong position and a wrong speed is not a jump. An answer with both errors is not used, like a wrong position without a
+/// speed for comparison.
 #[test]
 fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     for (position, velocity) in [(0.3, 1.9), (-0.3, 1.2), (0.02, -1.5)] {
@@ -259,8 +259,8 @@ fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     }
 }
 
-/// Drives have their own clocks. Near the boundary of a tick, an answer contains the reading of this millisecond or of the previous one.
-/// That is neither a jump nor another scale, even at full speed.
+/// Drives have their own clocks. Near the boundary of a tick, an answer contains the reading of this millisecond or of the previous
+/// millisecond. This difference is neither a jump nor another scale, even at full speed.
 #[test]
 fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     for seed in 0..6u64 {
@@ -303,7 +303,7 @@ fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
         rig.send(FrameType::TeachingModeEnable, &[]);
         arm.run(&mut rig, 500);
         assert_eq!(rig.state(), ControllerState::Teaching);
-        // Readings of the link's encoder while the motor is at rest: to and fro within 60 ms.
+        // Readings of the link's encoder, which moves to and fro within 60 ms while the motor is at rest.
         for k in 0..600 {
             let part = 0.5 - 0.5 * (f64::from(k) * core::f64::consts::TAU / 120.0).cos();
             for (node, breakaway) in rig.nodes.iter_mut().zip([18.0, 18.0, 16.0, 8.0, 8.0, 8.0]) {

@@ -1,5 +1,5 @@
-//! Bounds of friction from a host: all values of arms with such drives are accepted, and values that would throw an arm are refused (J-06,
-//! J-42).
+//! Tests of the bounds of friction from a host. All values of arms with these drives are accepted, and values that would throw an arm are
+//! refused (J-06, J-42).
 use crate::rig;
 
 use jtc_core::{Config, Friction, Parameters, TableOf};
@@ -71,7 +71,7 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     let reversed = known.map(|[a, b, c, d, e, f]| [f, e, d, c, b, a]);
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&reversed)), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::NoError);
-    // Friction of zero; noise around standstill; one direction only.
+    // The friction is zero, contains noise around standstill, or acts in only one direction.
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&[[0.0; 6]; 6])), DataStatus::NoError);
     for table in [
         table_of(-0.95, |_| 0.0),
@@ -145,7 +145,7 @@ fn j06_the_bounds_of_friction_are_settings() {
 #[test]
 fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     let limits = Config::avena().joints.map(|joint| joint.torque_max);
-    // Shares of the torque limit at 0.02 rad/s: 1.7 against the motion, and 0.78 along it.
+    // Shares of the torque limit at 0.02 rad/s are 1.7 against the motion and 0.78 along the motion.
     for shares in [
         [1.946984127, -12.050370370, 21.744197531, -10.161740153],
         [-1.017777778, 12.327407407, -22.332839506, 10.155720165],

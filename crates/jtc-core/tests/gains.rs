@@ -1,5 +1,5 @@
-//! Changing the gains while the arm is held, on a simulated arm. Gains that would drop the arm are refused, and gains that make it unstable
-//! are replaced by the earlier ones (J-71).
+//! Tests of changing the gains of a simulated arm while the arm is held. Gains that would drop the arm are refused, and gains that make it
+//! unstable are replaced by the earlier ones (J-71).
 use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, PidGains, error, joint_error};
 use jtc_wire::{DataStatus, FrameType, SettingValue, StopKind, StoreState};
@@ -99,7 +99,7 @@ fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     }
 }
 
-/// Gains that are in use on such arms, and the same gains on an arm for which they are not made.
+/// Gains that are used on these arms, and the same gains on an arm for which they are not suitable.
 #[test]
 fn j71_gains_in_use_are_taken_by_the_arm_they_are_for() {
     let stronger = of([
@@ -151,7 +151,7 @@ fn causes(rig: &mut Rig) -> u16 {
     rig.status().joints.iter().fold(0, |all, joint| all | joint.internal)
 }
 
-/// The swing has no external cause: the integral is too strong for the inertia, which the checks of the controller cannot detect in
+/// The swing has no external cause. The integral is too strong for the inertia, and the checks of the controller cannot detect this in
 /// advance. The arm swings within the two seconds of the trial, and the earlier gains are restored.
 #[test]
 fn j71_gains_that_make_the_arm_swing_are_taken_back() {
@@ -187,7 +187,8 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
     }
 }
 
-/// If a push overloads a joint while gains are on trial, these gains must not be kept. After the trial, a push does not affect the gains.
+/// If a push overloads a joint while gains are on trial, the controller must not keep these gains. After the trial, a push does not affect
+/// the gains.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     for (wait, taken_back) in [(600, true), (1_700, true), (2_300, false)] {
@@ -211,7 +212,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     }
 }
 
-/// A joint swings with a growing amplitude, far below its torque limit. Gains on trial are replaced by the earlier ones; gains that have
+/// A joint swings with a growing amplitude, far below its torque limit. Gains on trial are replaced by the earlier gains. Gains that have
 /// passed their trial are kept.
 #[test]
 fn j71_a_swing_that_grows_ends_the_trial() {
@@ -361,7 +362,8 @@ fn j71_teaching_does_not_end_a_trial() {
     assert_eq!(found(&rig), StopKind::Gains);
 }
 
-/// If Disable has kept parts that do not match, the arm is not stored: its joints are too light for its gains with the present settings.
+/// If the remaining parts do not match after Disable, the arm is not stored, because its joints have too little inertia for its gains with
+/// the present settings.
 #[test]
 fn j71_an_arm_that_would_be_refused_is_not_stored() {
     use FrameType::{Disable, SetSettings, StoreArm};
@@ -376,7 +378,7 @@ fn j71_an_arm_that_would_be_refused_is_not_stored() {
     assert_eq!(rig.ask(StoreArm, &[]), DataStatus::IncorrectValue);
 }
 
-/// Gains, model and settings that do not match are refused, whichever comes last, and change nothing. After Disable another arm can be
+/// If gains, model and settings do not match, the last of them to arrive is refused and has no effect. After Disable another arm can be
 /// uploaded in any order.
 #[test]
 fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
@@ -398,7 +400,7 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     assert_eq!(rig.ask(SetSettings, &rotors(0.05)), good);
     assert_eq!(rig.ask(PidParamUseDefault, &[]), bad);
     assert_eq!(rig.ask(ArmModelUseDefault, &[]), good);
-    // After Disable there is nothing to compare with, until gains and model have both been received again.
+    // After Disable, a comparison is not possible until gains and model have both been received again.
     assert_eq!(rig.ask(Disable, &[]), good);
     assert_eq!(rig.ask(PidParamUseDefault, &[]), good);
     assert_eq!(rig.ask(ArmModelUseDefault, &[]), bad);
@@ -413,7 +415,8 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     assert!((18..=20).contains(&ticks), "{ticks}");
 }
 
-/// Jerks the first joint of an arm without physics. Each jerk takes the torque to both limits, but is too short to overload the joint.
+/// Simulates jerks of the first joint of an arm without physics. Each jerk takes the torque to both limits, but is too short to overload
+/// the joint.
 fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     rig.follow = false;
     for pause in pauses_ms {

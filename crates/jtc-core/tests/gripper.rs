@@ -1,5 +1,5 @@
-//! The gripper is brought up in parallel with the arm. The gripper never takes the torque of the arm away, and never starts its pump by
-//! itself (J-14, J-23).
+//! The gripper is brought up in parallel with the arm. The gripper never removes the torque of the arm, and never starts its pump by itself
+//! (J-14, J-23).
 use crate::rig;
 
 use jtc_bus::{NodeState, Request};
@@ -41,7 +41,7 @@ fn pump(rig: &mut Rig, on: bool) {
     rig.run(2);
 }
 
-/// Runs, and checks that the arm is not disturbed: no error, no other state, and a Move in 19 of 20 ticks.
+/// Runs ticks and checks that the arm is not disturbed. The arm has no error and no change of state, and 19 of 20 ticks send a Move.
 fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     let from = rig.sent.len();
     for _ in 0..ticks {
@@ -99,7 +99,7 @@ fn j23_a_gripper_that_leaves_operation_enable_is_enabled_again_without_its_pump(
         rig.nodes[GRIPPER].report.state = NodeState::READY;
         undisturbed(&mut rig, 100, state);
         assert_eq!((rig.nodes[GRIPPER].report.state, rig.pump), (NodeState::ENABLED, false));
-        // A fault of the gripper is shown, and is cleared like a fault of any node.
+        // A fault of the gripper is shown, and is cleared like a fault of any other node.
         rig.nodes[GRIPPER].fault();
         undisturbed(&mut rig, 100, state);
         assert_eq!(rig.status().gripper.unwrap().state, NodeState::FAULT);
@@ -143,7 +143,7 @@ fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
         pump(&mut rig, true);
         assert!(rig.pump);
     }
-    // The pump does not start either after a joint has taken the controller back to Init.
+    // The pump also does not start after a joint has caused a return of the controller to Init.
     let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
     rig.nodes[2].report.state = NodeState::INIT;
@@ -160,7 +160,7 @@ fn j14_a_gripper_that_is_not_there_is_no_error_and_keeps_the_controller_in_init(
     assert_eq!((rig.state(), rig.errors()), (ControllerState::Init, 0));
     let status = rig.status();
     assert_eq!((status.can_error, status.can_current, status.node_init), (0, FLAG, 1 << GRIPPER));
-    // When the gripper appears, it is brought up like the other nodes.
+    // When the gripper begins to answer, it is brought up like the other nodes.
     rig.nodes[GRIPPER].silent = false;
     rig.run(200);
     assert_eq!((rig.state(), rig.status().can_current), (ControllerState::HoldPos, 0));
@@ -240,7 +240,8 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     );
 }
 
-/// A command that arrives while the gripper is brought up is executed afterwards. A command from before its reset is not.
+/// A command that arrives during the bring-up of the gripper is executed afterwards. A command from before the reset of the gripper is not
+/// executed.
 #[test]
 fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
     let mut rig = Rig::new(Config::avena());

@@ -259,9 +259,9 @@ fn moves(yields: &mut Yield, velocity: f64, ms: u16) -> f64 {
     yields.load()
 }
 
-/// Spring and damper have 40 N·m against a joint without a push. The joint is driven by its own load, so the load was a person who leaned
-/// on the arm. The load fades within a second, and returns if the joint sinks. If a hand leads the joint faster, or against its load, the
-/// load does not change.
+/// Spring and damper have 40 N·m against a joint without a push. The joint is driven by its own load, so the load is interpreted as a
+/// person who leaned on the arm. The load fades within a second, and returns if the joint sinks. If a hand leads the joint faster, or
+/// against its load, the load does not change.
 #[test]
 fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     let begun = || Yield::begin(false, false, 0.0, INERTIA, 40.0);

@@ -130,7 +130,7 @@ mod tests {
 
     const PRESSED: [bool; JOINTS] = [false, false, true, false, false, false];
 
-    /// A clock that is ramping to its normal rate.
+    /// Returns a clock that is ramping to its normal rate.
     fn at(rate: f64) -> PathClock {
         let mut clock = PathClock::start(1.0);
         clock.rate = rate;

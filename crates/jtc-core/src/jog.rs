@@ -320,7 +320,7 @@ mod tests {
         }
     }
 
-    /// Joint limits as imported from the UR5 and Z1 models, with wide position ranges.
+    /// Returns configurations with joint limits as imported from the UR5 and Z1 models, and with wide position ranges.
     fn arms() -> [Config; 3] {
         let avena = config();
         let with = |velocity: [f64; JOINTS], acceleration: f64| {

@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    /// A joint with a torque limit of 180 N·m.
+    /// Returns a joint with a torque limit of 180 N·m.
     fn limits() -> JointConfig {
         Config::avena().joints[1]
     }

@@ -269,7 +269,7 @@ fn j06_refused_parameters_change_nothing() {
     let mut polynomial = vec![0.0f32; 24];
     polynomial[23] = f32::NEG_INFINITY;
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &floats(polynomial)), DataStatus::IncorrectValue);
-    // Returns a table in which the velocities or temperatures of the last joint do not increase.
+    // In this table, an axis of the last joint does not increase.
     let mut table: Vec<f32> = (0..6)
         .flat_map(|_| (0..20).map(|i| i as f32).chain((0..20).map(|i| i as f32)).chain((0..400).map(|_| 1.0)))
         .collect();

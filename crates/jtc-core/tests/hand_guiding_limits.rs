@@ -1,4 +1,4 @@
-//! The limits of hand guiding (J-25): joints that are led too fast, lost answers, lifted loads, and clamps.
+//! Tests of the limits of hand guiding (J-25): joints that are led too fast, lost answers, lifted loads, and clamps.
 use jtc_core::{Config, ControllerState};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{FrameType, StopKind};
@@ -12,7 +12,7 @@ use crate::rig::Rig;
 struct Pushed {
     state: ControllerState,
     fastest: f64,
-    /// Speed of that joint when Teaching ended, rad/s.
+    /// Speed of the pushed joint when Teaching ended, rad/s.
     ended_at: f64,
 }
 
@@ -60,8 +60,8 @@ fn j25_a_joint_that_is_led_too_fast_is_held_and_not_released() {
     assert!(ended >= 4, "{ended}");
 }
 
-/// If a hand keeps pushing while the arm is held, the push is learned as a load. When the hand lets go, the learned load drives the joint a
-/// little, slowly, and fades.
+/// If a hand keeps pushing while the arm is held, the push is learned as a load. When the hand lets go, the learned load moves the joint
+/// slowly over a small distance, and fades.
 #[test]
 fn j68_a_load_that_was_a_hand_does_not_drive_a_joint_for_long() {
     for (arm, joint, share) in [
@@ -94,8 +94,8 @@ fn j68_a_load_that_was_a_hand_does_not_drive_a_joint_for_long() {
     }
 }
 
-/// Answers of a joint that a hand leads are lost. The torque of its springs fades, followed by damping and friction compensation, because
-/// the last speed is not valid any more. The torque makes no step.
+/// Answers of a joint that a hand leads are lost. The torque of the springs fades, followed by damping and friction compensation, because
+/// the last speed is not valid any more. The torque does not step.
 #[test]
 fn j25_the_torque_of_a_joint_that_does_not_answer_fades() {
     let base = ArmFile::avena();
@@ -168,7 +168,7 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     {
         let limit = arm.config.joints[joint].torque_max;
         let (mut plant, mut rig) = held(&arm, 1.0, 0.0, 1.0, pose(&arm), 1_500);
-        // A spring of 3,000 N·m/rad whose displacement gives that torque.
+        // A spring of 3,000 N·m/rad is displaced so that it causes the torque of the clamp.
         let end = plant.q[joint] + share * limit / 3_000.0;
         let clamp = |plant: &mut Plant| plant.push[joint] = 3_000.0 * (end - plant.q[joint]);
         for _ in 0..14_000 {
@@ -183,10 +183,10 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
             most = most.max(plant.push[joint].abs());
         }
         let about = format!("{} joint {} {share} of the limit", arm.name, joint + 1);
-        // With weak gains the clamp may have been detected as a push before.
+        // With weak gains, the controller may have detected the clamp as a push before.
         assert_eq!(rig.state(), ControllerState::Teaching, "{about}");
         assert!(most <= (share.abs() + 0.06) * limit, "{about}: {most} N·m");
-        // The clamp is opened, and the joint is led away from it by half a radian.
+        // The clamp is opened, and a hand leads the joint away from the clamp by half a radian.
         let to = plant.q[joint] - 0.5 * share.signum();
         plant.push[joint] = 0.0;
         for k in 0..3_000 {
@@ -206,7 +206,7 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     }
 }
 
-/// The arm hits a person while it comes to rest. After the impact, the joint presses with at most its share of the torque limit.
+/// The arm hits a person while the arm comes to rest. After the impact, the joint presses with at most its share of the torque limit.
 #[test]
 fn j25_an_arm_that_comes_to_rest_does_not_clamp_whom_it_meets() {
     for (arm, joint, way, payload) in [

@@ -1,4 +1,4 @@
-//! Loads in hand guiding (J-25): loads that are led to other poses, configured, removed or lifted, and arms with wrong parameters.
+//! Tests of loads in hand guiding (J-25): loads that are led to other poses, configured, removed or lifted, and arms with wrong parameters.
 use jtc_core::{ControllerState, Payload, settings};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
@@ -7,7 +7,7 @@ use crate::hand_guiding::{arms, farthest, fastest, held, highest_speed, pose, te
 use crate::plant::{ArmFile, LuGre, Plant, Random, loaded};
 use crate::rig::{Rig, raw, rest};
 
-/// The default arm, stretched out by joint 2.
+/// Pose of the default arm, stretched out by joint 2.
 fn at(q2: f64) -> [f64; 6] {
     [0.0, q2, 0.0, 0.0, 0.0, 0.0]
 }
@@ -19,7 +19,7 @@ fn give(plant: &mut Plant, rig: &mut Rig, mass: f64) {
     plant.run(rig, 1);
 }
 
-/// A hand leads a joint by `way` (rad) at `speed` (rad/s) while the other joints are free, and lets go.
+/// Simulates a hand that leads a joint by `way` (rad) at `speed` (rad/s) while the other joints are free, and then lets go.
 pub(crate) fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64) {
     let (from, ms) = (plant.q[joint], (way.abs() / speed * 1000.0) as usize);
     for k in 0..ms + 500 {
@@ -95,7 +95,7 @@ fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     }
 }
 
-/// A load of any cause was lowered (J-70), and the torque of the damper was learned. Then the load is removed.
+/// A joint lowered a load of any cause (J-70), and the torque of the damper was learned. Then the load is removed.
 #[test]
 fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_range() {
     let arm = ArmFile::avena();
@@ -143,7 +143,7 @@ fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_
     assert!(taught >= 10 && lowered >= 3, "{taught}, {lowered}");
 }
 
-/// Arms with rotors lighter than proposed do not swing, not even at the soft ends and above the tool speed limit.
+/// Arms with lighter rotors than proposed do not swing, even at the soft ends and above the tool speed limit.
 #[test]
 fn j25_an_arm_with_light_rotors_does_not_swing() {
     let mut ended = 0;
@@ -171,8 +171,8 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
             let about = format!("{} rotors {rotors} joint {}", arm.name, joint + 1);
             assert!(back < 0.4 && most < 1.8, "{about}: {back} rad/s against the hand, {most} rad/s");
             if rig.state() == ControllerState::HoldPos {
-                // The joint was too fast for the damping. The joint is now held by gains for five times the rotor inertia, which is not
-                // tested here.
+                // The joint was too fast for the damping. The joint is now held by gains for five times the rotor inertia, and this test
+                // does not cover the hold.
                 assert!(rotors < 0.5, "{about} is held");
                 ended += 1;
                 continue;
@@ -208,7 +208,7 @@ fn j25_a_payload_that_is_lifted_is_still_carried() {
             let (mut plant, mut rig) = held(&arm, 1.0, mass, 1.0, pose(&arm), 4_000);
             teach(&mut plant, &mut rig);
             lead(&mut plant, &mut rig, joint, way, speed);
-            // A knock that lasts 20 ms.
+            // The knock lasts 20 ms.
             for _ in 0..20 {
                 plant.push[joint] = 0.5 * arm.config.joints[joint].torque_max * way.signum();
                 plant.tick(&mut rig);
@@ -222,7 +222,7 @@ fn j25_a_payload_that_is_lifted_is_still_carried() {
     }
 }
 
-/// A small payload is configured in HoldPos. The rest of the load must be found before Teaching begins.
+/// A small payload is configured in HoldPos. The remaining load must be found before Teaching begins.
 #[test]
 fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.2), 4_000);
@@ -233,7 +233,7 @@ fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     assert!(way < 0.01 && speed < 0.05, "{way} rad, {speed} rad/s");
 }
 
-/// The file specifies friction, but the arm has none.
+/// The arm file specifies friction, but the arm has no friction.
 #[test]
 fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     for arm in [ArmFile::avena(), ArmFile::z1(), ArmFile::rough_ur5()] {
@@ -322,8 +322,8 @@ fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     assert!(most < 0.6 && worst < 0.2, "{most} rad/s, then {worst} rad/s");
 }
 
-/// A person leans on an arm whose rotors have a fifth of the proposed inertia, and lets go. The contact lasted long enough to be learned as
-/// a load.
+/// A person leans on an arm whose rotors have a fifth of the proposed inertia, and lets go. The contact lasted long enough, so the
+/// controller learned it as a load.
 #[test]
 fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     println!("seed 13");
@@ -382,7 +382,8 @@ fn j25_the_load_that_was_found_is_carried() {
     }
 }
 
-/// A payload that is not configured is put down. The arm rises slowly, until the controller detects that only the load drives it.
+/// A payload that is not configured is put down. The arm rises slowly until the controller detects that only the learned load drives the
+/// arm.
 #[test]
 fn j25_an_arm_whose_payload_is_put_down_rises_slowly_and_stops() {
     for (mass, friction) in [1.0, 3.0].into_iter().flat_map(|m| [0.7, 1.0, 1.3].map(|f| (m, f))) {

@@ -6,7 +6,7 @@ use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, model_body, pieces, rad, rest, segment_body};
 
-/// Returns the configuration without limits, except those under test.
+/// Returns the configuration with very high limits, except for the tested limits.
 fn roomy(mut config: Config, acceleration_max: f64) -> Config {
     for j in &mut config.joints {
         j.torque_max = 1e6;
@@ -56,7 +56,7 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
     rig.run(5);
     rig.nodes[0].report.velocity = 0.0;
-    // The request is refused until the arm that was led is at rest.
+    // The request is refused until the arm is at rest after hand guiding.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     rig.run(500);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
@@ -74,7 +74,7 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     assert_eq!(last.joints[0].set_position, rad(points.last().unwrap().position[0]));
 }
 
-/// A pause or a resume at any time of a valid motion keeps to the acceleration limit and ends at rest.
+/// A pause or a resume at any time of a valid motion stays within the acceleration limit and ends at rest.
 #[test]
 fn j33_pause_and_resume_keep_to_the_acceleration_limit() {
     let braking = pieces(0, &[(10.77, 13), (0.0, 60), (-10.77, 13)]);
@@ -267,7 +267,7 @@ fn j12_torque_is_taken_away_before_anything_else_is_sent() {
         .iter()
         .skip_while(|r| matches!(r, Request::Move { torque, .. } if *torque != [0.0; 6]));
     assert_eq!(*rest.next().unwrap(), Request::Move { torque: [0.0; 6], pump: false });
-    // Joints that are still enabled are disabled before the joint that fell back is configured.
+    // Joints that are still enabled are disabled before the configuration of the joint that has fallen back.
     let next = rest.find(|r| !matches!(r, Request::Move { .. })).unwrap();
     assert!(matches!(next, Request::ChangeFsm { .. }), "{next:?}");
 }
@@ -279,7 +279,7 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
         rig.run(ticks);
         rig
     };
-    // The ticks of the bring-up that send a frame other than Move: resets, configurations, changes of state.
+    // Ticks of the bring-up in which a reset, a configuration or a change of state is sent instead of a Move.
     let healthy = run(300).sent;
     let others: Vec<usize> =
         (0..300).filter(|&tick| !matches!(healthy[tick], Request::Move { .. })).collect();
@@ -345,7 +345,7 @@ fn j14_a_silent_node_is_seen_within_seven_frames() {
 
 #[test]
 fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
-    // For an arm on a wall, gravity acts on the links. The arm gets a model with heavier links.
+    // For an arm on a wall, gravity acts on the links sideways. The arm gets a model with heavier links.
     let mut rig = Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() });
     let mut model = jtc_core::Parameters::avena().model;
     model.links.iter_mut().for_each(|link| link.mass *= 1.2);
@@ -366,12 +366,13 @@ fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
 fn j43_torque_that_swings_between_its_limits_is_an_error() {
     for held_ms in [0, 1_000] {
         let swung = swings_until_error(held_ms);
-        // While a load may still be caught, the first half swing is taken for a load.
+        // While a load may still be caught, the controller interprets the first half swing as a load.
         assert!((10..=40 + 10 * usize::from(held_ms == 0)).contains(&swung), "{swung}");
     }
 }
 
-/// Returns the number of ticks of a swing between the limits until the error. The arm has been held for `held_ms` before.
+/// Returns the number of ticks from the start of a swing between the limits until the error. Before the swing, the arm was held for
+/// `held_ms`.
 fn swings_until_error(held_ms: usize) -> usize {
     let mut config = Config { torque_release: true, ..Config::avena() };
     config.joints[0].torque_max = 10.0;
@@ -382,7 +383,7 @@ fn swings_until_error(held_ms: usize) -> usize {
     rig.follow = false;
     let mut swung = 0;
     for k in 0..200 {
-        // 4 mrad at a Kp of 8000 is 32 N·m. The sign changes every 8 ms.
+        // An error of 4 mrad at a Kp of 8000 causes 32 N·m. The sign changes every 8 ms.
         rig.nodes[0].report.position = if (k / 8) % 2 == 0 { 4e-3 } else { -4e-3 };
         rig.tick();
         if rig.state() == ControllerState::Error {

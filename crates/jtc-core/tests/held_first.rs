@@ -1,4 +1,5 @@
-//! Teaching (J-25) and the approach to a path (J-34) begin only when the arm is held, even if it carries a load that the model lacks.
+//! Teaching (J-25) and the approach to a path (J-34) begin only when the arm is held, even if the arm carries a load that the model does
+//! not contain.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -9,7 +10,7 @@ use rig::{Rig, floats};
 
 const POSE: [f64; 6] = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
 
-/// An arm with `mass` kg that its model lacks, and its controller, before the joints are enabled.
+/// Returns an arm with `mass` kg that the model does not contain, and its controller, before the joints are enabled.
 fn carrying(mass: f64, factor: f64) -> (Plant, Rig) {
     let friction = LuGre::of_avena_times(factor);
     let arm = Plant::new(&loaded(Parameters::avena().model, mass), friction, POSE);
@@ -37,7 +38,7 @@ fn j25_teaching_waits_until_the_load_is_held() {
             rig.send(FrameType::TeachingModeEnable, &[]);
             arm.run(&mut rig, 3_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0), "after {after} ms");
-            // With a third of the friction of the model, the arm creeps under the rest of the load.
+            // With a third of the modelled friction, the arm creeps under the remaining load.
             let most = if factor == 1.0 { 0.03 } else { 0.1 * 3.0 };
             assert!(way(&arm) < most, "after {after} ms, friction times {factor}: {} rad", way(&arm));
         }
@@ -96,7 +97,7 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// The gains make a loop unstable although no external load swings. The catch must not tolerate this swing.
+/// The gains make a loop unstable although no external load swings. The controller must not tolerate this swing as part of a catch.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {

@@ -1,5 +1,5 @@
-//! A UR5 and a Z1 as imported, with proposed gains. Both arms are jogged (J-58) and begin paths (J-34) in random poses. Their loads are
-//! known, and no joint reaches its torque limit.
+//! Tests with a UR5 and a Z1 as imported, with proposed gains. Both arms are jogged (J-58) and begin paths (J-34) in random poses. The
+//! loads of the arms are known, and the joints do not reach their torque limits.
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};

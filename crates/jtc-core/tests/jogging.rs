@@ -1,4 +1,4 @@
-//! Jogs at the velocity limit, through the whole controller (J-58).
+//! Tests of jogs at the velocity limit with the whole controller (J-58).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState};
@@ -9,7 +9,7 @@ use rig::{Rig, floats};
 /// Number of random poses.
 const TRIALS: usize = 500;
 
-/// End of a jog while the joint still accelerates.
+/// Event that ends a jog while the joint still accelerates.
 #[derive(Clone, Copy, Debug)]
 enum End {
     Silence,
@@ -54,8 +54,8 @@ fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Resu
     Ok(())
 }
 
-/// Joint 1 of the shipped arm at 1.5 rad/s: a jog that ended between 599 and 695 ms once released the arm. Other joints and arms had the
-/// same fault.
+/// In an earlier version, a jog of joint 1 of the shipped arm at 1.5 rad/s released the arm if the jog ended between 599 and 695 ms. Other
+/// joints and arms also had this fault.
 #[test]
 fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_arm() {
     let fast = |velocity_max: f64, acceleration_max: f64| {
@@ -66,7 +66,7 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
         }
         config
     };
-    // The last two limits are not representable in the wire format. A client sends the next value above or below the limit.
+    // The last two limits are not representable in the wire format. A client sends the nearest value above or below the limit.
     for (config, first, last) in
         [(Config::avena(), 590, 700), (fast(3.15, 20.0), 735, 850), (fast(3.2, 20.0), 735, 850)]
     {
@@ -93,7 +93,7 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
     }
 }
 
-/// A Stop, a Pause, a released key and silence end a jog as a Stop ends a motion on the path: within 520 ms, even from the velocity limit.
+/// A Stop, a Pause, a released key or silence ends a jog within 520 ms, even at the velocity limit, like a Stop on the path.
 #[test]
 fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     for share in [0.1, 0.7, 1.0] {
@@ -160,8 +160,8 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
     }
 }
 
-/// A simulated arm with a load that the controller knows, in random poses, is jogged at any rate: one joint at its limit, or all joints. No
-/// torque reaches its limit, and the arm is at rest in time. If a jog is refused, little torque remains.
+/// A simulated arm with a load that the controller knows is jogged in random poses at any rate. Either one joint moves at its limit, or all
+/// joints move. No torque reaches its limit, and the arm is at rest in time. If a jog is refused, only a small torque remains.
 #[test]
 fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
     let seed = 11;
@@ -230,8 +230,8 @@ fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unload
     let hold = |q: [f64; 6]| plant::standing(&model, &q)[1];
     let moved =
         |q: [f64; 6], j: usize, way: f64| core::array::from_fn(|k| if k == j { q[k] + way } else { q[k] });
-    // In one pose the arm is stretched out above the horizontal; in the other it is bent below it, so that lowering reduces the load of
-    // joint 2.
+    // In the first pose, the arm is stretched out above the horizontal. In the second pose, the arm is bent below the horizontal, so that
+    // lowering reduces the load of joint 2.
     let (above, below) = ([0.0, 1.2, 0.2, 0.0, 0.0, 0.0], [0.0, 1.4, -1.6, 0.0, 0.0, 0.0]);
     let down = |q: [f64; 6]| -hold(q).signum();
     assert!(hold(moved(above, 1, 0.1 * down(above))).abs() > hold(above).abs());
@@ -268,8 +268,8 @@ fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unload
     }
 }
 
-/// A Stop on a path, or the end of a jog, is over when the next jog continues, even if a joint is touched meanwhile. This jog must not be
-/// taken for a stop that has failed.
+/// A Stop on a path, or the end of a jog, is completed when the next jog continues, even if a person touches a joint meanwhile. The
+/// controller must not interpret this jog as a failed stop.
 #[test]
 fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     let body = |rate: f32| floats([rate, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -289,7 +289,7 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
             rig.urgent(0, UrgentCommand::Stop);
             rig.until(600, |rig| rig.trajectory() == TrajectoryState::Stop);
         }
-        // This speed is below the one that releases the arm.
+        // This speed is below the speed that releases the arm.
         rig.nodes[4].report.velocity = 0.03;
         for tick in 0..1_500 {
             if tick == 400 {
@@ -307,7 +307,7 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
 }
 
 /// A key is held down and moves joint 2 of an arm with 3.5 or 4 kg outwards, until the joint stops by itself. No error occurs, and enough
-/// torque remains for the way back.
+/// torque remains for the motion back.
 #[test]
 fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     for (mass, seconds) in [(3.5, 20), (4.0, 20)] {
@@ -335,7 +335,7 @@ fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     }
 }
 
-/// Computing the margin of a jog takes time. Therefore only one jog is served per tick, whether it is refused or not.
+/// Computing the margin of a jog takes time. Therefore only one jog is processed per tick, whether the jog is refused or not.
 #[test]
 fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     let pose = [0.0, 1.2, 0.2, 0.0, 0.0, 0.0];
@@ -384,7 +384,7 @@ fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
 }
 
 /// Keys of several joints are pressed, changed and released in random poses. The flange never exceeds the tool speed limit, and a single
-/// joint reaches it. The speed is computed from the poses of the flange in consecutive ticks.
+/// joint reaches this limit. The speed is computed from the poses of the flange in consecutive ticks.
 #[test]
 fn j58_a_jog_keeps_to_the_tool_speed_limit() {
     const LIMIT: f64 = 0.25;

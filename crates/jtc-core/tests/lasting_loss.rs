@@ -12,7 +12,7 @@ const JOINT: usize = 1;
 /// Pattern of the lost answers of the joint.
 #[derive(Clone, Copy, Debug)]
 enum Loss {
-    /// One good answer followed by this number of lost ones, repeated for ever.
+    /// One good answer followed by this number of lost answers, repeated for ever.
     Periodic(u32),
     /// On average every second answer is lost at random, with at most four consecutive losses. The value is the seed.
     Random(u32),
@@ -29,7 +29,7 @@ const LOSSES: [Loss; 7] = [
 ];
 
 impl Loss {
-    /// Returns the pattern of the next `ticks` answers. `true`: the answer is lost.
+    /// Returns the pattern of the next `ticks` answers. `true` means that the answer is lost.
     fn pattern(self, ticks: u32) -> Vec<bool> {
         match self {
             Self::Periodic(lost) => (0..ticks).map(|k| k % (1 + lost) < lost).collect(),
@@ -52,8 +52,8 @@ fn arm(mass: f64, q: [f64; 6]) -> Plant {
     Plant::new(&loaded(Parameters::avena().model, mass), LuGre::of_avena_times(1.0), q)
 }
 
-/// The path accelerates to 0.25 rad/s in 0.2 s, keeps this speed for 2 s, and stops in 0.2 s. Its points contain no accelerations, so the
-/// loop has an error to correct.
+/// Returns a path that accelerates to 0.25 rad/s in 0.2 s, keeps this speed for 2 s, and stops in 0.2 s. The points of the path contain no
+/// accelerations, so the loop must correct an error.
 fn path() -> Vec<RawPoint> {
     let points = pieces(JOINT, &[(1.25, 20), (0.0, 200), (-1.25, 20)]);
     points.into_iter().map(|point| RawPoint { acceleration: [0; 6], ..point }).collect()
@@ -82,7 +82,8 @@ fn on_the_path(lost: &[bool]) -> f64 {
     worst
 }
 
-/// Holds an arm with 1 kg that the model lacks, and pushes it with 20 N·m for 100 ms. Returns the distance that it moves, rad.
+/// Holds an arm with 1 kg that the model does not contain, and pushes the arm with 20 N·m for 100 ms. Returns the distance that the arm
+/// moves, rad.
 fn pushed(lost: &[bool]) -> f64 {
     let mut arm = arm(1.0, [0.3, 0.8, -0.9, 0.4, 0.7, 0.2]);
     let mut rig = arm.holding(Config::avena());
@@ -194,7 +195,7 @@ fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
                 }
             }
             if dead {
-                // In the first tick the answer to the last Move before still arrives. Then five Moves are not answered.
+                // In the first tick, the answer to the previous Move still arrives. Then five Moves are not answered.
                 assert_eq!(seen, Some(5), "{start}");
                 assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
                 assert_eq!(rig.torque, [0.0; 6]);

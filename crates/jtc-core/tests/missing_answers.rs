@@ -1,4 +1,5 @@
-//! Missing answers, and answers with impossible positions. The torque does not step when they begin or end (J-35, J-63).
+//! Tests of missing answers, and of answers with impossible positions. The torque does not step when these faults begin or end (J-35,
+//! J-63).
 use crate::rig;
 
 use jtc_bus::Request;
@@ -12,10 +13,10 @@ const NODE_ERROR: u16 = error::EXTERNAL | error::EXTERNAL_JOINTS;
 /// Motion of the arm, with its speed in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Motion {
-    /// HoldPos, pushed at this velocity.
+    /// Motion in HoldPos, while the arm is pushed at this velocity.
     Held(f64),
     Operate(f64),
-    /// Teaching, led at this velocity.
+    /// Motion in Teaching, while a hand leads the arm at this velocity.
     Led(f64),
 }
 
@@ -37,7 +38,7 @@ enum Fault {
     Lost { ms: usize },
 }
 
-/// The path accelerates to a velocity in 0.2 s, keeps it for 0.6 s, and stops in 0.2 s.
+/// Returns a path that accelerates to a velocity in 0.2 s, keeps this velocity for 0.6 s, and stops in 0.2 s.
 fn path(velocity: f64) -> Vec<RawPoint> {
     pieces(JOINT, &[(5.0 * velocity, 20), (0.0, 60), (-5.0 * velocity, 20)])
 }
@@ -158,7 +159,7 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
         }
         rig.run(3);
         rig.nodes[JOINT].glitch = 0.3;
-        // An answer arrives one tick later. Four implausible answers are tolerated, and the fifth is an error.
+        // An answer arrives one tick later. Four implausible answers are tolerated, and the fifth implausible answer is an error.
         rig.run(5);
         assert_eq!((rig.state(), rig.errors()), (state, 0));
         assert!(rig.controller.telemetry().joints[JOINT].position.abs() < 1e-9);
@@ -175,7 +176,7 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
     }
 }
 
-/// The setting limits the number of consecutive answers of a joint that are not usable, whether missing or implausible.
+/// The setting limits the number of consecutive answers of a joint that are missing or implausible.
 #[test]
 fn j63_silence_and_implausible_answers_count_together() {
     for max in [3, 5, 20] {
@@ -189,7 +190,7 @@ fn j63_silence_and_implausible_answers_count_together() {
         }
         rig.tick();
         assert_eq!(rig.errors(), NODE_ERROR, "{max}");
-        // A good answer restarts the count.
+        // A usable answer restarts the count.
         let mut rig = Rig::holding_with(Config { missed_moves_max: max, ..Config::avena() });
         for tick in 0..500 {
             rig.nodes[JOINT].silent = tick % u32::from(max) != 0;

@@ -1,4 +1,5 @@
-//! Joints that move above their limit, with or without a command (J-35), and limits that the drives cannot reach (J-35, J-43).
+//! Tests of joints that move above their velocity limit, with or without a command (J-35), and of limits that the drives cannot reach
+//! (J-35, J-43).
 use crate::rig;
 
 use jtc_core::{Config, ConfigError, ControllerState, joint_error};
@@ -93,7 +94,7 @@ fn j35_an_arm_that_is_faster_than_its_drives_can_report_or_do_is_refused() {
     let trip = ConfigError::SpeedTrip { joint: 3, value: 1.2 * 1.6, limit: 1.8 };
     assert_eq!(config.check(), Err(trip));
     assert!(trip.to_string().contains("joint 3") && trip.to_string().contains("1.920"), "{trip}");
-    // Without the trip, the threshold may be as high as the full scale of the drives' velocity.
+    // If the trip of the drives is switched off, the threshold may be as high as the full scale of the reported velocity.
     config.joint_config_bits = 0x07;
     assert_eq!(config.check(), Ok(()));
     config.joints[2].velocity_max = 1.7;
@@ -112,7 +113,7 @@ fn j43_position_limits_outside_the_working_area_are_refused() {
         let error = ConfigError::Position { joint: 6, value, limit: 2.9905 };
         assert_eq!(config.check(), Err(error));
         assert!(error.to_string().contains("joint 6"), "{error}");
-        // If the drives do not keep to a working area, no such limit applies.
+        // If the drives do not monitor a working area, this limit does not apply.
         config.joint_config_bits &= !0x01;
         assert_eq!(config.check(), Ok(()));
     }

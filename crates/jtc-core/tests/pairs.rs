@@ -1,5 +1,5 @@
-//! Pairs of an activity of the controller and an event. Each pair must end in the state that docs/safety.md lists. `UPDATE_DOCS=1` updates
-//! the page.
+//! Tests of pairs that consist of an activity of the controller and an event. Each pair must end in the state that docs/safety.md lists.
+//! `UPDATE_DOCS=1` updates the page.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_dynamics::Payload;
 use jtc_wire::{ExecCommand, FrameType, UrgentCommand};
@@ -10,7 +10,7 @@ use crate::rig::{Rig, floats};
 
 /// Time after which the end state is checked, ms.
 const WATCH_MS: usize = 6_000;
-/// Silence that host supervision tolerates, ms. This silence is longer than the activities take to begin.
+/// Silence that host supervision tolerates, ms. The start of each activity takes less time than this silence.
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
 /// A simulated arm without brakes, and its controller.
@@ -197,7 +197,7 @@ fn gains(bench: &mut Bench) {
     bench.send(FrameType::PidParam, &floats(numbers));
 }
 
-/// Event: its name, its action, and `true` if it releases the arm.
+/// Event with its name, its action, and `true` if the event releases the arm.
 type Event = (&'static str, fn(&mut Bench), bool);
 const EVENTS: [Event; 16] = [
     ("nothing", |_| {}, false),

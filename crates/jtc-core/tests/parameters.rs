@@ -1,4 +1,5 @@
-//! Gains and models that are accepted, and the states in which they are. None of them may throw an arm that is held (J-06).
+//! Tests of the gains and models that are accepted, and of the states in which they are accepted. Accepted parameters must not throw a held
+//! arm (J-06).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -20,7 +21,7 @@ fn torques(rig: &Rig) -> [u64; 6] {
     rig.controller.telemetry().joints.map(|j| j.torque.to_bits())
 }
 
-/// Checks that the frame is refused, and that the arm is held bit for bit as without the frame.
+/// Checks that the frame is refused, and that the hold of the arm is identical in every bit to the hold without the frame.
 fn refused_without_a_trace(frame_type: FrameType, body: &[u8], what: &str) {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -73,7 +74,7 @@ fn j06_gains_in_use_are_taken() {
         [8000.0, 14000.0, 80.0, -120.0, 120.0],
         [4000.0, 24000.0, 60.0, -40.0, 40.0],
         [420.0, 160.0, 20.0, -10.0, 10.0],
-        // An integral that is switched off, and one that is fixed.
+        // One integral is switched off, and one integral has a fixed value.
         [8000.0, 14000.0, 80.0, 0.0, 0.0],
         [8000.0, 10.0, 80.0, 0.5, 0.5],
     ] {
@@ -145,14 +146,14 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
     };
     let mut rig = Rig::new(Config::avena());
     rig.run(100);
-    // The last of the three would end Init.
+    // The last of the three parameters would end Init.
     assert_eq!(rig.ask(frames[0].0, frames[0].1), DataStatus::NoError);
     assert_eq!(rig.ask(frames[4].0, frames[4].1), DataStatus::NoError);
     assert_eq!(rig.state(), ControllerState::Init);
     let mut rig = Rig::holding();
     check(&mut rig, ControllerState::HoldPos, DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
-    // First the integral gives back the load that was found with the last model.
+    // First, the integral releases the load that was found with the last model.
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     check(&mut rig, ControllerState::Teaching, DataStatus::NotAllowed);
     rig.ask(FrameType::TeachingModeDisable, &[]);
@@ -212,7 +213,7 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
     }
 }
 
-/// Returns an arm with a drive that takes long to enable. Execute has been sent.
+/// Returns an arm with a drive that takes long to enable, after an Execute was sent.
 fn waiting_for_a_drive() -> Rig {
     let mut rig = Rig::with_a_slow_drive(Config::avena());
     rig.run(50);
@@ -289,7 +290,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
         for (j, limits) in Config::avena().joints.iter().enumerate() {
             let torque = t.joints[j].torque;
             prop_assert!(torque.abs() <= limits.torque_max);
-            // The change is smooth over 100 ms: at most 1.5 times as steep as a straight line over the whole range.
+            // The change is smooth over 100 ms, and is at most 1.5 times as steep as a straight line over the whole range.
             let step = (torque - last[j]).abs();
             prop_assert!(step <= 2.0 * limits.torque_max * 0.015 + 0.1, "joint {}: {} N·m", j + 1, step);
             last[j] = torque;

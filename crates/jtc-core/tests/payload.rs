@@ -1,4 +1,5 @@
-//! A payload that the host sets (J-60): its blend into the torque, the states in which it is accepted, and how long it remains set.
+//! Tests of a payload that the host sets (J-60): the blend into the torque, the states that accept a payload, and the time for which the
+//! payload remains set.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -21,7 +22,7 @@ fn set(rig: &mut Rig, payload: &Payload) -> DataStatus {
     rig.ask(FrameType::SetSettings, &body)
 }
 
-/// Returns a rig that is held at `pose`, without physics: the joints are at their commanded positions.
+/// Returns a rig without physics that is held at `pose`. The joints are at their commanded positions.
 fn holding_at(pose: &[f64; 6]) -> Rig {
     let mut rig = Rig::new(Config::avena());
     for (node, q) in rig.nodes.iter_mut().zip(pose) {
@@ -139,7 +140,7 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
         let from = arm.q;
         arm.run(&mut rig, 3_000);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
-        // The load found is correct except for the friction.
+        // The found load is correct except for the friction.
         let most = was_found.iter().fold(0.0, |most: f64, found| most.max(found.abs()));
         let telemetry = rig.controller.telemetry();
         for j in 0..6 {
@@ -151,7 +152,7 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
     }
 }
 
-/// A small correction must not drop the rest of the load. The test sets half of the load found, and several corrections in succession.
+/// A small correction must not drop the remaining load. The test sets half of the found load, and several corrections in succession.
 #[test]
 fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
     for pose in [POSES[0], POSES[2]] {
@@ -173,12 +174,12 @@ fn j60_teaching_waits_until_the_payload_is_in_the_model() {
     let mut rig = holding_at(&POSES[0]);
     assert_eq!(set(&mut rig, &point_mass(1.0)), DataStatus::NoError);
     rig.send(FrameType::TeachingModeEnable, &[]);
-    // Teaching also waits until the integral has given back the torque that it had found for the payload, 3 s later.
+    // Teaching also waits until the integral has released the torque that it had found for the payload, 3 s later.
     let waited = rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     assert!((BLEND + 2_900..=BLEND + 3_100).contains(&waited), "{waited} ms");
 }
 
-/// This is also true for a paused path, because the model must not change on a path.
+/// An Execute after a Pause also waits for the blend, because the model must not change on a path.
 #[test]
 fn j60_an_execute_waits_until_the_payload_is_in_the_model() {
     let mut rig = Rig::holding();
@@ -245,7 +246,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
         assert_eq!(set(&mut rig, &bad), DataStatus::IncorrectValue, "{bad:?}");
         assert_eq!(rig.controller.config().payload, good);
     }
-    // A reduction of a payload that is too heavy is accepted. The payload is being blended out.
+    // If a payload is too heavy, a reduction of the payload is accepted. The payload is being blended out.
     rig.run(BLEND);
     rig.send(FrameType::TeachingModeEnable, &[]);
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
@@ -285,7 +286,7 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(rig.ask(FrameType::ArmModel, &body), DataStatus::NoError);
     rig.run(300);
     let model = rig.controller.telemetry().joints.map(|joint| joint.torque_model);
-    // The frame carries six digits.
+    // The frame contains values with a precision of six digits.
     assert!((0..6).all(|j| (model[j] - wanted[j]).abs() < 1e-3), "{model:?} {wanted:?}");
     assert_eq!(rig.controller.config().payload, payload);
     let arm = |config: &Config| settings::values(config, 0, true).collect::<Vec<_>>();
@@ -343,7 +344,7 @@ fn taught(arm: &mut Plant, rig: &mut Rig) {
     panic!("no Teaching: {:?}", rig.controller.telemetry());
 }
 
-/// If the load that the integral had found has just been set as the payload or in a new model, it is not carried twice. An arm that no hand
+/// If the found load of the integral has just been set as the payload or in a new model, the load is not carried twice. An arm that no hand
 /// leads keeps its position.
 #[test]
 fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
@@ -376,7 +377,7 @@ fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     }
 }
 
-/// A centre of mass without a mass is not a payload. Such a centre of mass does not reduce the load that Teaching carries.
+/// A centre of mass without a mass is not a payload, and does not reduce the load that Teaching carries.
 #[test]
 fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
     let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);

@@ -1,4 +1,5 @@
-//! Plain lines, on which no extension request was received: their hosts know only the protocol of existing devices (J-30, J-51).
+//! Tests of plain lines, on which no extension request was received. The hosts on these lines know only the protocol of existing devices
+//! (J-30, J-51).
 use crate::rig;
 
 use jtc_core::recorder::{Block, Log, Outcome, Recorder, Replay, SNAPSHOT_MS};
@@ -8,7 +9,7 @@ use rig::{Rig, point, rest, segment_body};
 
 const SEGMENT: FrameType = FrameType::Trajectory;
 
-/// A path of 4 s in which joint 1 follows a cosine and reaches 0.4 rad/s. Its points are 10 ms apart.
+/// Returns a path of 4 s in which joint 1 follows a cosine and reaches 0.4 rad/s. The points of the path are 10 ms apart.
 fn path() -> Vec<RawPoint> {
     let w = core::f64::consts::TAU / 4.0;
     (0..=400)
@@ -82,8 +83,8 @@ fn places() -> Vec<(&'static str, Rig)> {
     places
 }
 
-/// An existing proxy repeats a refused segment for ever, and forwards no other frame meanwhile. Therefore the segment stops the arm, and is
-/// accepted when the arm is at rest.
+/// An existing proxy repeats a refused segment for ever, and does not forward any other frame meanwhile. Therefore the segment stops the
+/// arm, and is accepted when the arm is at rest.
 #[test]
 fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
     for (n, (name, mut rig)) in places().into_iter().enumerate() {
@@ -168,7 +169,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         assert_eq!(rig.ask(SEGMENT, &segment), DataStatus::IncorrectValue, "{name}");
         assert_eq!(rig.state(), before, "{name}");
     }
-    // Paused, stopped and finished paths are replaced, as usual.
+    // Paused, stopped and finished paths are replaced as usual.
     for plain in [true, false] {
         let mut rig = moving(1_000);
         rig.exec(ExecCommand::Pause);
@@ -197,7 +198,7 @@ fn j30_j56_a_replay_stops_where_segment_0_on_a_plain_line_has_stopped() {
         rig.run(7);
     }
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-    // The log of the motion, up to the new points.
+    // Log of the motion up to the new points.
     let blocks: Vec<Block> = rig.recorder.as_ref().unwrap().blocks().copied().collect();
     let mut moving = Rig::holding();
     moving.upload(&path(), 10);
@@ -223,7 +224,7 @@ fn j51_numbers_above_6_are_6_on_a_plain_line() {
         rig.run(5);
         assert_eq!(rig.records().last().map(|record| record.data), Some(data), "a Stop with nothing to stop");
     }
-    // 8: the arm is not at the first point.
+    // Status 8 means that the arm is not at the first point.
     for plain in [true, false] {
         rig.plain = plain;
         rig.upload(&[rest(5_000); 3], 10);
@@ -232,7 +233,7 @@ fn j51_numbers_above_6_are_6_on_a_plain_line() {
     }
 }
 
-/// Segment `segment` of three.
+/// Returns segment `segment` of a trajectory with three segments.
 fn of_three(segment: u16) -> Vec<u8> {
     segment_body(9, segment, 3, 10, &[rest(5_000); 20])
 }
@@ -264,7 +265,7 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
             rig.plain = at(3);
             let data = rig.exec(ExecCommand::Stop);
             assert_eq!(data, in_words(at(3), NotAllowed), "{case}");
-            // The segments of an upload that has begun are forbidden in this state.
+            // In this state, segments of an upload that has already begun are not allowed.
             rig.plain = plain;
             assert_eq!(rig.ask(SEGMENT, &of_three(0)), NoError);
             rig.press_stop(1);
@@ -275,7 +276,7 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     }
 }
 
-/// If an upload is dropped, its client gets the data status that was decided by segment 0.
+/// If an upload is dropped, the line of segment 0 decides which data status the client gets.
 #[test]
 fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     let mut rig = Rig::holding();
@@ -341,7 +342,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
             config.joints[3].acceleration_max = 8.0;
             let mut rig = Rig::holding_with(config);
             rig.plain = true;
-            // An earlier good trajectory is not executed instead.
+            // The controller does not execute an earlier valid trajectory instead.
             rig.upload(&[rest(0); 60], 10);
             assert_eq!(uploaded(&mut rig, &points, segments), vec![DataStatus::NoError; segments], "{case}");
             assert_eq!(
@@ -377,7 +378,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     }
 }
 
-/// Segment 0 decides for the whole upload. The result of its check applies to every client that executes the trajectory.
+/// Segment 0 decides for the whole upload. The result of the check applies to every client that executes the trajectory.
 #[test]
 fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     let (_, points, error) = broken().remove(0);
@@ -396,7 +397,7 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
                 continue;
             }
             assert_eq!(rig.ask(SEGMENT, &body(2)), DataStatus::NoError);
-            // The answer is the same on both lines, and also for a client that knows all values: 6 means wrong content.
+            // The answer is 6 (wrong content) on both lines, also for a client that knows all values.
             for (line, plain) in [(0, true), (0, false), (1, true), (1, false)] {
                 rig.plain = plain;
                 rig.statuses.clear();
@@ -411,7 +412,7 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     }
 }
 
-/// Frames that are not a valid trajectory are refused on a plain line as well: wrong counts, order or step time.
+/// Frames that are not a valid trajectory are also refused on a plain line. The counts, the order or the step time is wrong.
 #[test]
 fn j30_j36_only_content_is_taken_on_a_plain_line() {
     use DataStatus::{
@@ -448,7 +449,7 @@ fn j36_j56_a_replay_knows_the_verdict_on_a_refused_trajectory() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
     rig.run(100);
     let blocks: Vec<Block> = rig.recorder.as_ref().unwrap().blocks().copied().collect();
-    // The log does not contain the points, but the result of their check.
+    // The log does not contain the points, but contains the result of the check of the points.
     let other = Rig::holding().controller;
     let mut last = None;
     let mut replay = Replay::new(Log::new(&blocks), other, None);

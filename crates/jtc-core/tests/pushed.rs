@@ -1,4 +1,4 @@
-//! Pushes, walls and loads that are too heavy (J-66, J-68, J-70): the arm yields and is still held.
+//! Tests of pushes, walls and loads that are too heavy (J-66, J-68, J-70). The arm yields and is still held.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error, joint_error};
@@ -6,7 +6,7 @@ use jtc_wire::{ExecCommand, FrameType, RawPoint};
 use plant::{ArmFile, LuGre, POSES, Plant, Random, heavier, loaded, standing};
 use rig::{Rig, floats, raw, segment_body};
 
-/// Returns a motion from one position to another in `seconds`, of 100 points.
+/// Returns a motion with 100 points from one position to another in `seconds`.
 pub(crate) fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
     let step = (seconds * 10.0).round() as u16;
     let seconds = f64::from(step) * 0.099;
@@ -35,7 +35,7 @@ pub(crate) fn begin(rig: &mut Rig, (points, step): &(Vec<RawPoint>, u16)) {
 
 const LIMITS: fn(usize) -> f64 = |joint| Config::avena().joints[joint].torque_max;
 
-/// Returns an arm without brakes that a rig has held for a while.
+/// Returns an arm without brakes that a rig has held for some time.
 fn held(model: &jtc_dynamics::ArmModel, friction: [LuGre; 6], pose: [f64; 6]) -> (Plant, Rig) {
     let mut arm = Plant::new(model, friction, pose);
     let mut rig = arm.holding(Config::avena());
@@ -48,7 +48,7 @@ fn fastest(arm: &Plant) -> f64 {
     arm.v.iter().fold(0.0, |fastest, v| v.abs().max(fastest))
 }
 
-/// Returns a pose of this arm within its ranges, rad, in which at most half of each torque limit holds it.
+/// Returns a pose of this arm within its position ranges, rad, in which at most half of each torque limit is needed to hold the arm.
 fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     loop {
         let pose = core::array::from_fn(|j| {
@@ -63,15 +63,15 @@ fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
 }
 
 /// Random pushes on an arm whose masses are wrong by 10 % and whose friction is wrong by 20 %. Each push lasts 50 ms to 1 s, and its torque
-/// is a `share` of 60 to 100 % of the torque that the joint has left.
+/// is a `share` of 60 to 100 % of the remaining torque of the joint.
 #[derive(Clone, Copy)]
 struct Pushes {
     seed: u64,
     moving: bool,
     share: f64,
-    /// The rotors' inertias as multiples of those in the arm's file.
+    /// Inertias of the rotors as multiples of the inertias in the arm file.
     rotors: f64,
-    /// Stiffness of elastic gears, N·m/rad; `None` for rigid gears.
+    /// Stiffness of elastic gears, N·m/rad. `None` for rigid gears.
     gears: Option<f64>,
 }
 
@@ -194,9 +194,10 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
     assert_eq!(MOVING.released(&ArmFile::avena()), 0);
 }
 
-/// Arms as they are imported. Their gains are weak, because their rotors were not measured. A push of 100 to 180 rad/s² takes such a joint
-/// to its over-speed within 12 ms, and the speed that its drive reports is 8 ms old. Without supervision of the speed, more than 80 of
-/// these 192 pushes release the arm; with supervision of the reported speed alone, 18 do.
+/// The arms are used as imported. The gains of these arms are weak, because the rotors were not measured. A push of 100 to 180 rad/s²
+/// accelerates a joint with weak gains to its over-speed within 12 ms, and the speed that its drive reports is 8 ms old. Without
+/// supervision of the speed, more than 80 of these 192 pushes release the arm. With supervision of the reported speed alone, 18 pushes
+/// release the arm.
 #[test]
 fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a_push() {
     let released =
@@ -205,8 +206,8 @@ fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a
     assert!(released.iter().flatten().sum::<usize>() <= 2, "{released:?}");
 }
 
-/// The rotor inertias are only proposals. If the rotors are half as heavy, or a third, the loop of a yielding joint is too stiff for them.
-/// The joint becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
+/// The rotor inertias are only proposals. If the true rotor inertias are a half or a third of the proposals, the loop of a yielding joint
+/// is too stiff. The joint becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
 #[test]
 fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     for (arm, rotors) in [ArmFile::ur5(), ArmFile::z1()].iter().flat_map(|arm| [(arm, 0.33), (arm, 0.5)]) {
@@ -216,8 +217,8 @@ fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     }
 }
 
-/// Elastic gears under the same pushes. The results are printed, and over-speed must be the only cause of a release. In arms without
-/// friction only the controller damps the gears, so some of them swing before the push.
+/// The arms with elastic gears get the pushes of the other tests. The results are printed, and over-speed must be the only cause of a
+/// release. In arms without friction, only the controller damps the gears, so some gears swing before the push.
 #[test]
 fn j66_j68_arms_with_elastic_gears_are_pushed() {
     let slick = [ArmFile::avena(), ArmFile::ur5(), ArmFile::z1()].map(|arm| (arm.slick(), 3e4));
@@ -242,8 +243,8 @@ fn j66_j68_arms_with_elastic_gears_are_pushed() {
     }
 }
 
-/// A person who pushes repeatedly, or to and fro, still gets the full opposing torque. This must not be taken for the swing of a joint that
-/// is lighter than in its file.
+/// A person who pushes repeatedly, or to and fro, still feels the full opposing torque. The controller must not interpret the push as the
+/// swing of a joint with less inertia than in the arm file.
 #[test]
 fn j68_a_joint_that_is_shaken_stays_held() {
     for (file, joint) in [(ArmFile::ur5(), 5), (ArmFile::z1(), 4), (ArmFile::avena(), 4)] {
@@ -300,7 +301,7 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 arm.tick(&mut rig);
                 noticed = noticed.or((rig.errors() != 0).then_some(k));
                 assert_ne!(rig.state(), ControllerState::Error, "{about}");
-                // A joint that bounces off the wall is braked by the controller; such ticks are not evaluated.
+                // If a joint bounces off the wall, the controller brakes the joint. Ticks with this braking are not evaluated.
                 if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 200) {
                     most = most.max((rig.torque[joint] - standing(&model, &arm.q)[joint]) * sign);
                 }
@@ -344,8 +345,8 @@ fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     assert!((arm.q[1] - there).abs() < 0.06 && fastest(&arm) < 0.01, "{} rad", arm.q[1] - there);
 }
 
-/// Loads of 90 to 110 % of a torque limit are lowered slowly, if needed with the whole limit against the motion, until the arm is in
-/// balance. The joint is never released.
+/// Loads of 90 to 110 % of a torque limit are lowered slowly until the arm is in balance. If needed, the whole torque limit acts against
+/// the motion. The joint is never released.
 #[test]
 fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     let model = |mass: f64| loaded(Parameters::avena().model, mass);
@@ -387,7 +388,7 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     }
 }
 
-/// An arm with 2 kg that is not configured is held with gains that are too weak, or that make the loop unstable.
+/// An arm with 2 kg that are not configured is held with gains that are too weak, or that make the loop unstable.
 #[test]
 fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     for times in [
@@ -414,8 +415,8 @@ fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     }
 }
 
-/// Random motions need 95 % of a torque limit according to the model. The true arms are heavier and have more friction, and none of them is
-/// released.
+/// Random motions need 95 % of a torque limit according to the model. The true arms are heavier and have more friction, and the controller
+/// does not release any arm.
 #[test]
 fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
     println!("seed 21");
@@ -429,7 +430,7 @@ fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
         for _ in 0..16 {
             let pose: [f64; 6] = core::array::from_fn(|j| POSES[0][j] + random.between(-0.5, 0.5));
             let to: [f64; 6] = core::array::from_fn(|j| pose[j] + random.between(-1.2, 1.2));
-            // The motion is as fast as 95 % of a torque limit or the velocity limit allow.
+            // The motion is as fast as 95 % of a torque limit and the velocity limit allow.
             let peak = |seconds: f64| {
                 (0..200)
                     .map(|i| {

@@ -1,12 +1,12 @@
-//! Reaction to each error (J-21, J-66, J-68, J-69). The arm yields or stops if the controller can still act; otherwise its torque is taken
-//! away. The table in docs/safety.md shows the results of these runs; `UPDATE_DOCS=1` updates it.
+//! Tests of the reaction to each error (J-21, J-66, J-68, J-69). The arm yields or stops if the controller can still act. Otherwise the
+//! torque of the arm is removed. The table in docs/safety.md shows the results of these runs; `UPDATE_DOCS=1` updates it.
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, TrajectoryState, error, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, StopKind};
 use rig::{Rig, floats, point, rad};
 
-/// Joint 5 moves from 0 to 0.4 rad and back, at rest at both ends.
+/// Returns a path in which joint 5 moves from 0 to 0.4 rad and back, at rest at both ends.
 fn path() -> Vec<RawPoint> {
     let n = 401;
     (0..n)
@@ -58,7 +58,7 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     let mut rig = bench(true);
     push(&mut rig, 0.097);
     rig.run(2);
-    // While a joint yields, the stop cannot be cleared; the other joints stop on the path.
+    // While a joint yields, the host cannot clear the stop, and the other joints stop on the path.
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
     rig.run(400);
     let t = rig.controller.telemetry();
@@ -77,7 +77,8 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     assert_eq!(rig.ask(FrameType::Jog, &floats([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])), DataStatus::NotAllowed);
     settle(&mut rig);
-    // Away from the paused point the path does not continue. Back at the point it continues, after an approach.
+    // If the arm is not at the paused point, the path does not continue. If the arm is back at this point, the path continues after an
+    // approach.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     push(&mut rig, 0.012);
     settle(&mut rig);
@@ -94,8 +95,8 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.controller.telemetry().joints[4].set_position, rad(path()[400].position[4]));
 }
 
-/// The torque falls within 10 ms to the torque of a weak spring. The torque never rises by a step on the way, and follows the joint
-/// wherever it is led.
+/// The torque falls within 10 ms to the torque of a weak spring. The torque never increases in a step meanwhile, and follows the joint to
+/// any position to which it is led.
 #[test]
 fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     let mut rig = bench(false);
@@ -115,11 +116,11 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
         last = t.torque;
         assert_eq!(rig.state(), ControllerState::HoldPos);
     }
-    // The spring is as stiff as is stable with the inertia of the joint.
+    // The spring has the highest stiffness that is stable with the inertia of the joint.
     assert!(last < -10.0, "it still holds against the push: {last} N·m");
 }
 
-/// A joint that is calm again after a push is held at its present position, without a step of its torque. After the third push it yields
+/// A joint that is calm again after a push is held at its present position, without a torque step. After the third push, the joint yields
 /// until the host clears the stop.
 #[test]
 fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides() {
@@ -135,7 +136,7 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
             assert!((torque - last).abs() < 250.0, "a step from {last} to {torque}");
             last = torque;
         }
-        // A held joint pulls towards its hold position; the spring of a yielding joint pulls back.
+        // A held joint pulls towards its hold position, and the spring of a yielding joint pulls the joint back.
         let yields = rig.controller.telemetry().joints[3].torque < -10.0;
         assert_eq!(yields, time == 3, "time {time}: {} N·m", rig.controller.telemetry().joints[3].torque);
     }
@@ -195,7 +196,7 @@ fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     assert!((cause.limit..10.0 * cause.limit).contains(&-cause.value), "{cause:?}");
 }
 
-/// A client acknowledges a held stop, but does not know that a jog key of another client is still pressed.
+/// A client clears a held stop, but does not know that a jog key of another client is still pressed.
 #[test]
 fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_cleared() {
     let mut rig = bench(false);
@@ -210,12 +211,13 @@ fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_
     held(&mut rig, 800);
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     held(&mut rig, 1_000);
-    // The key is released and pressed again.
+    // The operator releases the key and presses it again.
     rig.run(210);
     assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NoError);
 }
 
-/// While the arm brakes, it need not follow its path exactly. But a push away from the present point of the path is still detected.
+/// While the arm brakes, it does not need to follow its path exactly. However, a push away from the present point of the path is still
+/// detected.
 #[test]
 fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_brakes() {
     let mut rig = bench(true);

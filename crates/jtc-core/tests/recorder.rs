@@ -1,4 +1,4 @@
-//! The flight recorder in the rig: its contents, its stop conditions, and memory that is readable after any reset (J-56).
+//! Tests of the flight recorder in the rig: contents, stop conditions, and memory that is readable after any reset (J-56).
 use crate::rig;
 
 use std::collections::BTreeSet;
@@ -16,7 +16,7 @@ use rig::Rig;
 const BLOCKS: usize = 96;
 
 fn memory() -> [Vec<Block>; 2] {
-    // Pieces of different sizes with old contents, because memory contains random data at power-up.
+    // Memory pieces of different sizes with old contents, because memory contains random data at power-up.
     [vec![[0x4A46_0001; BLOCK_WORDS]; BLOCKS - 5], vec![[0xA5A5_5A5A; BLOCK_WORDS]; 5]]
 }
 
@@ -91,14 +91,14 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     assert_eq!(ticks.last(), Some(&(error + u64::from(AFTER_ERROR_MS))));
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "every tick once");
 
-    // Neither the end of the error, another error, nor the passing of time changes the log.
+    // The end of the error, another error, or the passing of time does not change the log.
     let before = blocks(&rig);
     rig.clear(true, 0x7F);
     rig.run(600);
     rig.press_stop(1);
     rig.run(1_000);
     assert_eq!((blocks(&rig), recorder(&rig).state()), (before.clone(), LogState::Error));
-    // A reset of any kind does not change it either.
+    // A reset of any kind also does not change the log.
     for failed in [false, true] {
         let memory = rig.recorder.take().unwrap().into_memory();
         rig.recorder = Some(Recorder::new(memory, failed));
@@ -112,7 +112,8 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     assert_eq!(recorder(&rig).state(), LogState::Recording);
 }
 
-/// An emergency stop that is pressed while the device starts is an error. The log of a later error must not be lost because of it.
+/// An emergency stop that is pressed while the device starts is an error. The log of a later error must not be lost because of this early
+/// error.
 #[test]
 fn j56_a_log_without_torque_gives_way_when_torque_comes_on() {
     let mut rig = recorded();
@@ -142,7 +143,7 @@ fn j56_a_reset_keeps_the_log_of_a_device_that_failed_and_begins_anew_otherwise()
     rig.recorder = Some(Recorder::new(memory, false));
     assert_eq!(recorder(&rig).state(), LogState::Recording);
     assert_eq!(recorder(&rig).blocks().count(), 0);
-    // Memory at power-up holds random data.
+    // Memory contains random data at power-up.
     for failed in [false, true] {
         let recorder = Recorder::new(self::memory(), failed);
         assert_eq!((recorder.state(), recorder.blocks().count()), (LogState::Recording, 0));
@@ -154,7 +155,7 @@ fn found(memory: &[Vec<Block>; 2]) -> Vec<Block> {
     Recorder::new(memory.clone(), true).blocks().copied().collect()
 }
 
-/// The data of a tick are valid when their last word is written, and not before.
+/// The data of a tick are valid after the last word of the tick was written, and not before.
 #[test]
 fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before() {
     const MAGIC: usize = 0;
@@ -175,7 +176,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
             .collect();
         assert!(changed.iter().any(|&(_, _, word)| word == COMMIT));
         let (ticks, snapshots) = contents(&found(&before));
-        // A tick that begins a block is long. Not all of its words are tested, only some.
+        // A tick that begins a block is long. The test uses only some of the words of this tick.
         for leave_out in (0..changed.len()).step_by(1 + changed.len() / 8) {
             let mut cut = before.clone();
             for (n, &(piece, block, word)) in changed.iter().enumerate() {
@@ -219,7 +220,7 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
             assert!(left.ends_with(&contents(&whole[first..]).0));
         }
     }
-    // Blocks that are missing at either end, and words that are not a log.
+    // Test data with blocks that are missing at either end, and with words that are not a log.
     for cut in 0..whole.len() {
         assert!(ticks.ends_with(&contents(&whole[cut..]).0));
         assert!(ticks.starts_with(&contents(&whole[..cut]).0));
@@ -239,7 +240,7 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     }
 }
 
-/// A page of the log as a host gets it.
+/// Returns a page of the log as a host gets it.
 fn page(rig: &mut Rig, block: u32, offset: u16) -> (LogState, u32, u16, u32, Vec<u8>) {
     let body: Vec<u8> = [&block.to_be_bytes()[..], &offset.to_be_bytes()].concat();
     rig.send_on(1, FrameType::GetLog, &body);
@@ -257,7 +258,7 @@ fn page(rig: &mut Rig, block: u32, offset: u16) -> (LogState, u32, u16, u32, Vec
     panic!("no answer");
 }
 
-/// The whole log, page by page.
+/// Returns the whole log, which is read page by page.
 fn fetched(rig: &mut Rig) -> Vec<Block> {
     let (mut block, mut bytes, mut all) = (0, Vec::new(), Vec::new());
     loop {
@@ -336,7 +337,7 @@ fn j56_j50_a_device_without_a_recorder_refuses_what_is_asked_of_one() {
 #[test]
 fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     let mut rig = holding();
-    // As many blocks as on the boards.
+    // The number of blocks is the number on the boards.
     rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     let begin = rig.controller.telemetry().tick;
     for n in 0..3_000u32 {
@@ -356,8 +357,8 @@ fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     assert!(since.windows(2).all(|pair| pair[1] - pair[0] <= 2 * u64::from(SNAPSHOT_MS)), "{snapshots:?}");
 }
 
-/// A payload is being blended into the model when a snapshot is taken. The replay continues the blend (J-60): from the next snapshot on
-/// each tick is equal bit for bit.
+/// A payload is being blended into the model when a snapshot is taken. The replay continues the blend (J-60). After the next snapshot, each
+/// tick is identical in every bit.
 #[test]
 fn j56_a_payload_on_its_way_is_replayed() {
     let mut rig = holding();
@@ -384,7 +385,7 @@ fn j56_a_payload_on_its_way_is_replayed() {
 #[test]
 fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     let mut rig = Rig::new(Config::avena());
-    // As many blocks as on the boards.
+    // The number of blocks is the number on the boards.
     rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::Init && rig.controller.telemetry().tick > 50);
@@ -401,7 +402,8 @@ fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     assert!(replayed(&rig).contains(&error));
 }
 
-/// In a replay, read requests also take their turns when a tick has further requests, although its controller has no recorder.
+/// In a replay, read requests are also processed in their order when a tick has further requests, although the controller of the replay has
+/// no recorder.
 #[test]
 fn j56_requests_beside_others_are_replayed_in_their_turns() {
     let get_log: Vec<u8> = [&LOG_NO_BLOCK.to_be_bytes()[..], &[0; 2]].concat();
@@ -453,7 +455,7 @@ fn storing(state: ControllerState, wait: usize) -> Rig {
 }
 
 /// A replay has no memory to store an arm, so it refuses the request at once. This is not reported as a difference of the controller, even
-/// with a snapshot in between. After the next snapshot everything is equal.
+/// with a snapshot in between. After the next snapshot, all outputs are equal.
 #[test]
 fn j56_j54_a_store_of_the_arm_is_not_a_difference() {
     for state in [ControllerState::Init, ControllerState::HoldPos] {

@@ -1,4 +1,4 @@
-//! The record of each frame, the order of records, and the frames that wait for others (J-04).
+//! Tests of the record of each frame, the order of records, and frames that wait for other frames (J-04).
 use crate::rig;
 
 use jtc_core::{ControllerState, RECORDS_MAX, TrajectoryState};
@@ -26,7 +26,7 @@ fn run_slowly(rig: &mut Rig, ticks: usize) {
     rig.status_free = true;
 }
 
-/// Runs until TES leaves Execute, at most this number of ticks, because path time slows down.
+/// Runs until the trajectory execution state leaves Execute, for at most this number of ticks, because path time slows down.
 fn stopped_within(rig: &mut Rig, ticks: usize) -> TrajectoryState {
     rig.until(ticks, |r| r.trajectory() != TrajectoryState::Execute);
     rig.trajectory()
@@ -66,7 +66,7 @@ fn j04_a_stop_acts_while_a_long_frame_is_executed() {
     let mut rig = moving();
     rig.exec(ExecCommand::Pause);
     rig.until(400, |r| r.trajectory() == TrajectoryState::Pause);
-    // A segment with many slices. During these the path is discarded.
+    // The segment needs many slices. During these slices, the path is discarded.
     let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
     rig.statuses.clear();
     rig.send(FrameType::FrictionTableUseDefault, &[]);
@@ -88,14 +88,14 @@ fn j04_a_stop_cancels_the_execute_before_it_and_not_the_one_after() {
         let mut rig = Rig::holding();
         rig.upload(&[rest(0); 50], 10);
         rig.statuses.clear();
-        // All of them arrive within one tick, the Execute on either line.
+        // All frames arrive within one tick, with an Execute on each line.
         rig.send_on(1, FrameType::TrajSetExecStatus, &[3]);
         rig.send(FrameType::TrajSetExecStatus, &[3]);
         rig.urgent(0, command);
         rig.run(20);
         assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Stop));
         let refused = exec_record(DataStatus::NotAllowed);
-        // The arm is at rest at the start. The state is the one after a Stop, not after a Pause.
+        // The arm is at rest at the start. The trajectory is in the state after a Stop, not in the state after a Pause.
         assert_eq!(rig.records(), [refused, refused, exec_record(data)]);
         // A later command is executed.
         rig.statuses.clear();
@@ -233,7 +233,7 @@ proptest! {
                 found[line].push(rig.statuses.last().unwrap().response.frame_type);
             }
         }
-        // The records of slowly sent frames have already come.
+        // The records of frames that were sent slowly have already arrived.
         let early = rig.records().len() - found[0].len() - found[1].len();
         prop_assert_eq!(early + found[0].len() + found[1].len(), expected[0].len() + expected[1].len());
         for line in 0..2 {

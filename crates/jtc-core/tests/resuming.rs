@@ -1,5 +1,5 @@
-//! Conditions and starting point of an Execute after a Pause (J-16, J-33, J-34), and the time limit of a teach request, which does not
-//! depend on how long the arm was held (J-25).
+//! Tests of the conditions and the starting point of an Execute after a Pause (J-16, J-33, J-34), and of the time limit of a teach request.
+//! This time limit does not depend on the time for which the arm was held (J-25).
 use crate::rig;
 
 use jtc_bus::NodeState;
@@ -52,7 +52,7 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     assert!(rig.controller.telemetry().point > paused.point + 2, "{} after {}", last, paused.point);
 }
 
-/// The time limit of a teach request runs from the command, not from the moment at which the arm was first held.
+/// The time limit of a teach request starts with the command, not when the arm was first held.
 #[test]
 fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     let mut rig = Rig::holding_with(Config { enable_timeout_ms: 600, ..Config::avena() });

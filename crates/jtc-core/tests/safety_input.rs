@@ -1,4 +1,4 @@
-//! The safety input with a ramp (J-22): all motion stops first, and then the torque is taken away.
+//! Tests of the safety input with a ramp (J-22). All motion stops first, and then the torque is removed.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, SettingValue};
 
@@ -16,7 +16,7 @@ fn speeds(bench: &Bench) -> (f64, f64) {
     (most(bench.arm.v), most(bench.rig.controller.telemetry().joints.map(|joint| joint.set_velocity)))
 }
 
-/// Returns the number of ticks until the torque is taken away.
+/// Returns the number of ticks until the torque is removed.
 fn released(bench: &mut Bench) -> usize {
     for k in 1..2_000 {
         bench.arm.tick(&mut bench.rig);
@@ -29,8 +29,8 @@ fn released(bench: &mut Bench) -> usize {
     panic!("the torque stays");
 }
 
-/// A pulse of 1 ms is sufficient. Commanded motion is at rest when the torque is taken away. A joint that yields or is led may move until
-/// the end of the ramp.
+/// A pulse of 1 ms is sufficient. Commanded motion is at rest when the torque is removed. A joint that yields, or that a hand leads, may
+/// move until the end of the ramp.
 #[test]
 fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     for (doing, begin) in UNDER_WAY {
@@ -45,7 +45,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
         println!("{doing}: from {before:.2} rad/s, {ms} ms, then {speed:.3} rad/s");
         assert!(ms <= 500, "{doing}: {ms} ms");
         match doing {
-            // Without a commanded motion, a stop would only keep the torque on for longer.
+            // Without a commanded motion, a stop would only delay the removal of the torque.
             _ if before == 0.0 && !operates && doing != "teaches" && doing != "slows down after a Stop" => {
                 assert_eq!(ms, 0, "{doing}")
             }
@@ -60,7 +60,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     }
 }
 
-/// Returns an arm that moves on a path, with this ramp. Its safety input has just become 0.
+/// Returns an arm that moves on a path, with this ramp. The safety input has just become 0.
 fn moving(ramp_ms: u16) -> Bench {
     let mut bench = Bench::holding(config(ramp_ms), 1.0, 0.0);
     bench.execute(1.0, 4.0);
@@ -71,13 +71,13 @@ fn moving(ramp_ms: u16) -> Bench {
     bench
 }
 
-/// The ramp is the longest time. Without a ramp the torque is taken away in the tick that reads 0.
+/// The ramp is the longest time until the torque is removed. Without a ramp, the torque is removed in the tick that reads 0.
 #[test]
 fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     for ramp_ms in [0, 1, 20, 100] {
         assert_eq!(released(&mut moving(ramp_ms)), 1 + usize::from(ramp_ms));
     }
-    // A fault of a drive or another error takes the torque away without waiting.
+    // A fault of a drive or another error removes the torque without waiting.
     let mut bench = moving(500);
     bench.run(50);
     bench.rig.nodes[3].fault();
@@ -85,7 +85,7 @@ fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     assert!(ticks < 20, "{ticks} ms");
 }
 
-/// If another cause takes the torque away meanwhile, the safety input is reported as well.
+/// If another cause removes the torque meanwhile, the safety input is also reported.
 #[test]
 fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     for reset in [false, true] {
@@ -104,7 +104,7 @@ fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     }
 }
 
-/// While drives are being enabled, the controller has no motion to stop.
+/// While drives are being enabled, the arm has no commanded motion that the controller could stop.
 #[test]
 fn j22_a_ramp_enables_no_drive() {
     let mut arm = Plant::new(&Parameters::avena().model, LuGre::of_avena_times(1.0), POSES[0]);
@@ -121,7 +121,7 @@ fn j22_a_ramp_enables_no_drive() {
     assert_eq!(rig.state(), ControllerState::Error);
 }
 
-/// No motion begins while the safety input stops the arm, even if it is 1 again.
+/// No motion begins while the safety input stops the arm, even if the input is 1 again.
 #[test]
 fn j22_nothing_begins_during_the_ramp() {
     let mut bench = moving(500);

@@ -1,4 +1,4 @@
-//! J-54: the two slots on a model of the flash, whose power can fail at and within any word.
+//! Tests of the two slots on a model of the flash (J-54). The power can fail before, during and after any word.
 use jtc_core::slots::{Action, Header, IMAGE_MAX, SLOTS, Slots, Storing, WORD, Word, newer};
 use proptest::prelude::*;
 
@@ -16,7 +16,7 @@ enum Cell {
     Unreadable,
 }
 
-/// The flash of the slots.
+/// Simulated flash of the slots.
 #[derive(Clone)]
 struct Flash([Vec<Cell>; SLOTS]);
 
@@ -66,7 +66,7 @@ impl Flash {
     /// Simulates a loss of power in the middle of an action.
     fn torn(&mut self, action: &Action, rng: &mut Chance) {
         match *action {
-            // Some words are erased, some are not, and some are erased partly.
+            // Some words are erased, some words are not erased, and some words are erased in part.
             Action::Erase { slot } => {
                 for cell in &mut self.0[slot] {
                     let before = match cell {
@@ -128,7 +128,7 @@ fn image(n: usize, seed: u64) -> Vec<u8> {
     (0..n).map(|_| rng.byte()).collect()
 }
 
-/// Many images are stored. The last one is found each time, and the one before stays in the other slot.
+/// Many images are stored. The last image is found each time, and the previous image stays in the other slot.
 #[test]
 fn j54_the_newest_image_is_found() {
     let mut flash = Flash::new();
@@ -152,7 +152,7 @@ fn an_image_that_is_too_long_changes_nothing() {
     assert_eq!(slots, Slots::new([Some(3), Some(2)]));
 }
 
-/// J-54: every bit of a slot matters. If one bit is wrong, the slot is not complete, and the other slot is used.
+/// J-54: every bit of a slot is checked. If one bit is wrong, the slot is not complete, and the other slot is used.
 #[test]
 fn j54_no_wrong_bit_is_accepted() {
     for length in [0, 1, 40, 300] {
@@ -173,8 +173,8 @@ fn j54_no_wrong_bit_is_accepted() {
     }
 }
 
-/// J-54: the power fails before, during and after every action on the flash, for the first stores and later ones. The old or the new image
-/// is complete afterwards, and the next store works normally.
+/// J-54: the power fails before, during and after every action on the flash, during the first stores and during later stores. The old or
+/// the new image is complete afterwards, and the next store works normally.
 #[test]
 fn j54_a_power_cut_leaves_one_whole_image() {
     for (stores, length) in [(0, 200), (1, 200), (2, 200), (3, 333), (4, 0), (5, 2000), (1, IMAGE_MAX)] {
@@ -228,7 +228,7 @@ fn j54_two_damaged_slots_are_no_image() {
     assert_eq!(flash.slots().current(), Some((0, 1)));
 }
 
-/// The CRC alone would detect an incomplete slot. Without a header it need not be computed.
+/// The CRC alone would detect an incomplete slot. Without a header, the CRC does not need to be computed.
 #[test]
 fn the_header_is_programmed_last() {
     let image = image(100, 1);
@@ -260,7 +260,7 @@ fn sequence_numbers_begin_again() {
     assert_eq!(Slots::new([Some(9), None]).next(), (1, 10));
 }
 
-/// The documented layout, with a CRC that was computed elsewhere (Python's `zlib.crc32`).
+/// Expected bytes of the documented layout, with a CRC that was computed independently (Python's `zlib.crc32`).
 #[test]
 fn the_header_is_the_documented_one() {
     let header = Header::new(b"arm", 0x0102_0304).expect("short").emit();
@@ -289,7 +289,7 @@ proptest! {
         prop_assert_eq!(flash.current(), None);
     }
 
-    /// If two sequence numbers are not 2³¹ apart, the newest is that of the image that was stored later.
+    /// If two sequence numbers are not 2³¹ apart, the newer number belongs to the image that was stored later.
     #[test]
     fn the_next_sequence_number_is_the_newest(found in any::<[Option<u32>; SLOTS]>()) {
         let mut slots = Slots::new(found);

@@ -1,4 +1,4 @@
-//! Errors and the return from them (sections 3 and 4).
+//! Tests of errors and of the return from errors (sections 3 and 4).
 use crate::rig;
 
 use jtc_bus::{Frame, NodeState, Request, Target, warning};
@@ -27,7 +27,7 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     // Clearing has no effect while the cause is present.
     rig.clear(true, 0x7F);
     assert_eq!(rig.state(), ControllerState::Error);
-    // The end of the cause alone has no effect either.
+    // The end of the cause alone also has no effect.
     rig.safety_input = true;
     rig.run(200);
     assert_eq!(rig.state(), ControllerState::Error);
@@ -52,7 +52,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     rig.clear(true, 0);
     assert_eq!(rig.state(), ControllerState::Error, "the node's fault is still there");
-    // The node ignores frames for a while.
+    // The node ignores frames for some time.
     rig.nodes[1].report.state = NodeState::FAULT_REACTION;
     rig.clear(true, 1 << 1);
     let from = rig.sent.len();
@@ -138,8 +138,8 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!(rig.state(), ControllerState::Error, "{name}");
             rig.plain = plain;
             let refused = if plain { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
-            // Three cases: the controller's errors alone; the same with a joint that has no error to clear; and the occurred errors, which
-            // are all current.
+            // The three cases are a clear of the controller's errors alone, a clear that also names a joint without an error, and a clear
+            // of the occurred errors, which are all current.
             assert_eq!(rig.clear(true, 0), refused, "{name}");
             assert_eq!(rig.clear(true, 0x01), refused, "{name}");
             assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), refused, "{name}");
@@ -181,10 +181,10 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
-    // The occurred errors behave alike: the first clear empties their word, the second one has no effect.
+    // The first clear of the occurred errors sets their word to zero, and the second clear has no effect.
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NotAllowed);
-    // A controller without errors refuses no clear.
+    // A controller without errors does not refuse any clear.
     let mut rig = Rig::holding();
     assert_eq!(rig.clear(true, 0x7F), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
@@ -208,7 +208,7 @@ fn j22_safety_input_acts_in_the_first_tick_and_output_follows_internal_errors() 
     assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6]);
     assert!(is_move(rig.sent.last().unwrap()), "the first frame after an error is Move");
     assert!(rig.last.safety_output, "an external error does not pull the output");
-    // An internal error sets the safety output to 0, and its bit is set.
+    // An internal error sets the safety output to 0, and the bit of the internal error is set.
     let mut rig = Rig::holding();
     rig.nodes[4].silent = true;
     rig.until(20, |r| r.state() == ControllerState::Error);
@@ -287,7 +287,7 @@ fn j12_one_broadcast_a_tick_and_other_frames_in_one_tick_of_four() {
 #[test]
 fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
     const OWN: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
-    // Every second tick is missed, in each state with torque.
+    // In each state with torque, every second tick is missed.
     for teaching in [false, true] {
         let mut rig = Rig::holding();
         if teaching {
@@ -359,7 +359,7 @@ fn j16_the_safety_line_counts_once_a_joint_is_configured() {
         assert_eq!(rig.errors(), 0);
     }
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // In Init, it is also an error of a configured joint.
+    // In Init, an active safety line is also an error if the joint is configured.
     let mut rig = Rig::new(Config::avena());
     rig.run(300);
     assert_eq!((rig.state(), rig.nodes[2].configured), (ControllerState::Init, true));
@@ -422,7 +422,7 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
-    // The error latches. Its bit is that of an internal error that comes neither from a joint nor from the bus.
+    // The error latches. The bit of this error belongs to internal errors that do not come from a joint or from the bus.
     let status = rig.status();
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);

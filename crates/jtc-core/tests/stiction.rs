@@ -1,4 +1,4 @@
-//! Holding joints with stiction, in which an integral can cause endless hunting (J-41).
+//! Tests of holding joints with stiction, in which an integral can cause endless hunting (J-41).
 use crate::{plant, rig};
 
 use jtc_core::{Config, Parameters, TrajectoryState};
@@ -8,7 +8,7 @@ use rig::{Rig, raw, segment_body};
 
 const POSE: [f64; 6] = [0.3, 0.8, -0.9, 0.4, 0.7, 0.2];
 
-/// Range of the observed values of one joint while it was held.
+/// Range of the observed values of one joint while the joint was held.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     low: f64,
@@ -46,8 +46,8 @@ fn sticky(ratio: f64, stribeck: f64, stiffness: f64, damping: f64) -> [LuGre; 6]
     core::array::from_fn(|j| LuGre { stribeck, stiffness, damping, ..LuGre::avena(j, ratio) })
 }
 
-/// Checks that every joint is quiet: at most the encoder's last bit toggles, which is 3.8 N·m of P and D on the large joints, and the joint
-/// is at the position at which the integral settles.
+/// Checks that every joint is quiet. At most the last bit of the encoder toggles, which causes 3.8 N·m of P and D torque on the large
+/// joints. The joint is at the position at which the integral settles.
 fn assert_quiet(arm: &mut Plant, rig: &mut Rig, what: &str) {
     for (j, (torque, position)) in watch(arm, rig, 6000).iter().enumerate() {
         let joint = j + 1;
@@ -79,7 +79,7 @@ fn j41_no_joint_hunts_or_buzzes_in_stiction() {
 }
 
 /// If the integral never stops changing, an error below the resolution of the encoder leads to a limit cycle. The simulation in these tests
-/// shows it.
+/// shows the limit cycle.
 #[test]
 fn j41_an_integral_that_is_never_held_hunts() {
     let mut arm =
@@ -100,7 +100,7 @@ fn j41_a_motion_ends_without_hunting() {
         let mut arm = Plant::new(&heavier(Parameters::avena().model, 1.1), friction, POSE);
         let mut rig = arm.holding(Config::avena());
         arm.run(&mut rig, 3000);
-        // A motion of 0.3 rad in 2 s and back.
+        // A motion moves the arm by 0.3 rad in 2 s and back.
         let points: Vec<_> = (0..=400).map(|i| point(&rig, f64::from(i) / 200.0)).collect();
         rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
         rig.send(FrameType::TrajSetExecStatus, &[3]);
@@ -118,7 +118,8 @@ fn j41_a_motion_ends_without_hunting() {
     }
 }
 
-/// Returns a point of a motion from the hold position: 0.3 rad out (`u` 0 to 1) and back (1 to 2), 2 s each.
+/// Returns a point of a motion from the hold position. The motion goes out by 0.3 rad (`u` from 0 to 1) and back (`u` from 1 to 2), in 2 s
+/// each.
 fn point(rig: &Rig, u: f64) -> RawPoint {
     let (u, back) = if u > 1.0 { (2.0 - u, -1.0) } else { (u, 1.0) };
     let way = 0.3 * u * u * u * (10.0 + u * (6.0 * u - 15.0));

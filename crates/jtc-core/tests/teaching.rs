@@ -1,4 +1,4 @@
-//! Teaching an arm that carries more or less than its model (J-25, J-44).
+//! Tests of Teaching with an arm that carries more or less than its model (J-25, J-44).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters};
@@ -7,7 +7,7 @@ use jtc_wire::FrameType;
 use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
 
-/// Returns how far a hand leads each joint from a pose, rad. No joint reaches a soft end.
+/// Returns the distance by which a hand leads each joint from a pose, rad. No joint reaches a soft end.
 fn led(pose: &[f64; 6]) -> [f64; 6] {
     let second = if pose[1] > 1.0 { -0.3 } else { 0.3 };
     [0.1, second, -0.3, 0.2, 0.3, 0.3]
@@ -17,7 +17,7 @@ fn model() -> ArmModel {
     Parameters::avena().model
 }
 
-/// Holds the arm for 4 s, then teaches it. Checks that the torque makes no steps.
+/// Holds the arm for 4 s, then teaches it. Checks that the torque does not step.
 fn taught(arm: &mut Plant, config: Config) -> Rig {
     let mut rig = arm.holding(config);
     arm.run(&mut rig, 4000);
@@ -35,7 +35,7 @@ fn without_steps(arm: &mut Plant, rig: &mut Rig, ticks: usize) {
         arm.tick(rig);
         let now = torque(rig);
         for j in 0..6 {
-            // A toggle of the encoder's last bit is 2.3 N·m of P and D. The motion of the arm adds to that.
+            // A toggle of the last bit of the encoder causes 2.3 N·m of P and D torque. The motion of the arm adds to this torque.
             assert!((now[j] - last[j]).abs() < 4.0, "joint {}: {} to {} N·m", j + 1, last[j], now[j]);
         }
         last = now;
@@ -50,7 +50,7 @@ fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     (0..6).map(|j| (arm.q[j] - from[j]).abs()).fold(0.0, f64::max)
 }
 
-/// A hand leads every joint by `way` rad in a second and lets go.
+/// Simulates a hand that leads every joint by `way` rad in a second and lets go.
 fn lead(arm: &mut Plant, rig: &mut Rig, way: [f64; 6]) {
     let from = arm.q;
     for k in 0..1300 {
@@ -72,7 +72,7 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
             let mut arm = Plant::new(&loaded(model(), 2.0), LuGre::of_avena_times(factor), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
-            // With a third of its friction the arm creeps, because of the load that the integral had not found.
+            // With a third of its friction, the arm creeps because of the load that the integral had not found.
             assert!(still < if factor == 1.0 { 0.002 } else { 0.1 * 3.0 }, "{still} rad at {pose:?}");
             lead(&mut arm, &mut rig, led(&pose));
             let led = drift(&mut arm, &mut rig, 3000);
@@ -93,7 +93,7 @@ fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
             lead(&mut arm, &mut rig, led(&pose));
             let led = drift(&mut arm, &mut rig, 3000);
             assert!(still < 0.002 && led < 0.005, "masses times {mass}: {still}, {led} rad from {pose:?}");
-            // A third of that friction still holds the arm at its first position. At other positions it may creep.
+            // A third of this friction still holds the arm at its first position. At other positions, the arm may creep.
             let mut arm = Plant::new(&heavier(model(), mass), LuGre::of_avena_times(0.3), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);

@@ -1,4 +1,4 @@
-//! The damping of Teaching, including light joints (J-25).
+//! Tests of the damping of Teaching, including light joints (J-25).
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -24,8 +24,8 @@ fn scaled(mass: f64, length: f64) -> ArmModel {
     model
 }
 
-/// Effect of the brake in the last 0.4 s of a push. A hand turns `joint` with `push` N·m for 0.6 s, against viscous friction only, and
-/// holds the other joints.
+/// Effect of the brake in the last 0.4 s of a push. A hand turns `joint` with `push` N·m for 0.6 s against viscous friction only, and holds
+/// the other joints.
 struct Braked {
     /// Highest speed, rad/s.
     fastest: f64,
@@ -37,7 +37,7 @@ fn braked(model: &ArmModel, rotor: f64, joint: usize, push: f64) -> Braked {
     braked_with(model, rotor, rotor, None, joint, push)
 }
 
-/// Like `braked`, but the controller gets another rotor inertia than the true one (kg·m²), and another damping (N·m·s/rad).
+/// Like `braked`, but the controller gets a wrong rotor inertia (kg·m²) and another damping (N·m·s/rad).
 fn braked_with(
     model: &ArmModel,
     given: f64,
@@ -97,7 +97,7 @@ fn j25_damping_does_not_drive_light_joints_to_and_fro() {
     for joint in 3..6 {
         for (push, damping) in [-1.5, 1.5].into_iter().flat_map(|p| [(p, None), (p, Some(1000.0))]) {
             let it = braked_with(&light, 0.05, 0.05, damping, joint, push);
-            // With the largest damping that it tolerates, a pushed joint swings only until it has reached its speed.
+            // With the highest damping that a joint tolerates, a pushed joint swings only until it has reached its speed.
             let most = if damping.is_some() { 6 } else { 0 };
             assert!(it.turns <= most, "joint {} at {push} N·m, {damping:?}: {}", joint + 1, it.turns);
             // The damping is at least 90 1/s times a fifth of 0.05 kg·m², plus the brake.
@@ -117,7 +117,7 @@ fn j25_the_wrists_of_the_default_arm_are_damped() {
     }
 }
 
-/// Drives have rotors even if the arm file gives no rotor inertia.
+/// Drives have rotors even if the arm file does not contain a rotor inertia.
 #[test]
 fn j25_a_joint_is_damped_where_no_rotor_inertia_is_given() {
     for joint in 3..6 {

@@ -109,7 +109,7 @@ fn j23_a_pump_is_switched_where_there_is_a_gripper_and_never_on_in_error() {
     }
 }
 
-/// Segment `segment` of a trajectory with two segments, for an arm at rest, with points 10 ms apart.
+/// Returns segment `segment` of a trajectory with two segments, for an arm at rest, with points 10 ms apart.
 fn body(segment: u8, points: usize) -> Vec<u8> {
     let mut body = [0, 1, 0, segment, 0, 2, 0, 10].to_vec();
     body.resize(body.len() + 36 * points, 0);

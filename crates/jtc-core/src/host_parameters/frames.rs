@@ -87,7 +87,7 @@ fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
     floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
 }
 
-/// Reads finite floats one after the other.
+/// Reader that returns finite floats one after the other.
 struct Reader<'a> {
     floats: &'a Floats<'a>,
     next: usize,

@@ -84,7 +84,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
     }
 }
 
-/// Writes bits into the ring.
+/// Writer of bits into the ring.
 pub(super) struct Writer<P, const N: usize> {
     ring: Ring<P, N>,
     /// Number of the open block. `None` before the first block.

@@ -1,4 +1,4 @@
-//! Arms for the simulation: the default arm, and arms that `jtc arm import` has created from their descriptions.
+//! Arms for the simulation: the default arm, and arms that `jtc arm import` has created from arm descriptions.
 use jtc_core::{Config, Friction, Parameters, PidGains};
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 use jtc_wire::{DataStatus, FrameType};
@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use super::{LuGre, Random, highest, loaded, shares_of};
 use crate::rig::{Rig, floats, model_body};
 
-/// An arm, with the data that its controller gets.
+/// Arm with the data that its controller gets.
 #[derive(Clone)]
 pub(crate) struct ArmFile {
     pub name: &'static str,
@@ -52,13 +52,13 @@ impl ArmFile {
         Self { polynomial: [[0.0; 6]; 6], ..self }
     }
 
-    /// Returns shares of its torque limits.
+    /// Returns the torques as shares of the torque limits of the arm.
     pub(crate) fn shares(&self, torque: &[f64; 6]) -> [f64; 6] {
         shares_of(torque, &self.config)
     }
 
-    /// Returns a pose inside the ranges, rad, and the torque that holds it. With a payload at the flange (kg), this torque is less than
-    /// `most` of each limit.
+    /// Returns a pose inside the position ranges, rad, and the torque that holds this pose. With a payload at the flange (kg), this torque
+    /// is less than the share `most` of each limit.
     pub(crate) fn pose(&self, random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
         let dynamics = Dynamics::new(&loaded(self.model, mass), self.config.gravity);
         loop {
@@ -73,7 +73,7 @@ impl ArmFile {
         }
     }
 
-    /// Returns the friction of its joints at the temperature of the rig, times `factor`. Stiction is 20 % higher than Coulomb friction.
+    /// Returns the friction of the joints at the temperature of the rig, times `factor`. Stiction is 20 % higher than Coulomb friction.
     pub(crate) fn friction(&self, factor: f64) -> [LuGre; 6] {
         self.polynomial.map(|c| {
             if c[0] == 0.0 && c[1] == 0.0 {
@@ -91,7 +91,7 @@ impl ArmFile {
         })
     }
 
-    /// Sends its parameters to the controller of a rig.
+    /// Sends the parameters of the arm to the controller of a rig.
     pub(crate) fn give(&self, rig: &mut Rig) {
         rig.send(FrameType::FrictionPolynomial, &floats(self.polynomial.iter().flatten().map(|c| *c as f32)));
         let gains = self.pid.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max]);

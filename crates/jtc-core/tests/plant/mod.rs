@@ -1,4 +1,4 @@
-//! A simulated physical arm that is connected to the [`Rig`]. The arm has rigid bodies, rotors, rigid or elastic gears, LuGre friction, and
+//! Simulated physical arm that is connected to the [`Rig`]. The arm has rigid bodies, rotors, rigid or elastic gears, LuGre friction, and
 //! drives with a coarse encoder and a delayed speed.
 
 use jtc_core::{Config, Parameters};
@@ -14,7 +14,7 @@ pub(crate) use arms::ArmFile;
 pub(crate) const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
 /// Step of the motor's encoder at the output side of the gear, rad. The drives measure the speed with this encoder.
 const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
-/// Integration steps per millisecond. The bristles are stiff, so there are many.
+/// Number of integration steps per millisecond. The bristles are stiff, so many steps are needed.
 const SUBSTEPS: usize = 20;
 const DT: f64 = 1e-3 / SUBSTEPS as f64;
 /// Inertia of the output side of an elastic gear, kg·m². The output side turns with the link.
@@ -22,7 +22,7 @@ const GEAR_OUTPUT: f64 = 0.01;
 /// Damping of an elastic gear per stiffness, s: N·m·s/rad for each N·m/rad.
 const GEAR_DAMPING: f64 = 5e-4;
 
-/// LuGre friction of a joint (Canudas de Wit et al. 1995): bristles that stick, then slip along Stribeck's curve.
+/// LuGre friction of a joint (Canudas de Wit et al. 1995), with bristles that stick first and then slip along Stribeck's curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LuGre {
     /// Friction torque while sliding slowly, N·m.
@@ -43,7 +43,7 @@ impl LuGre {
     pub(crate) const NONE: Self =
         Self { coulomb: 0.0, stiction: 0.0, stribeck: 1.0, stiffness: 0.0, damping: 0.0, viscous: 0.0 };
 
-    /// Returns the friction of the default arm's joint at the temperature of the rig, with this ratio of stiction to Coulomb friction.
+    /// Returns the friction of joint `j` of the default arm at the temperature of the rig, with this ratio of stiction to Coulomb friction.
     pub(crate) fn avena(j: usize, stiction: f64) -> Self {
         let jtc_core::Friction::Polynomial(polynomial) = Parameters::avena().friction else { panic!() };
         let c = polynomial[j];
@@ -84,8 +84,8 @@ impl LuGre {
     }
 }
 
-/// Elastic gears. Each is a spring and a damper between its motor and its link. The motors' angles and speeds are converted to the output
-/// side.
+/// Elastic gears. Each gear is a spring and a damper between its motor and its link. The motors' angles and speeds are converted to the
+/// output side.
 struct Gears {
     /// Stiffness, N·m/rad.
     stiffness: f64,
@@ -106,19 +106,19 @@ impl Gears {
 pub(crate) struct Random(pub u64);
 
 impl Random {
-    /// Evenly distributed from 0 to 1.
+    /// Returns a number that is evenly distributed from 0 to 1.
     pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Evenly distributed from `low` to `high`.
+    /// Returns a number that is evenly distributed from `low` to `high`.
     pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.next()
     }
 }
 
-/// Poses of the arm, rad: bent, stretched out (joint 2 cannot hold 4 kg there), and two more.
+/// Poses of the arm, rad: a bent pose, a stretched pose (in which joint 2 cannot hold 4 kg), and two other poses.
 pub(crate) const POSES: [[f64; 6]; 4] = [
     [0.3, 0.8, -0.9, 0.4, 0.7, 0.2],
     [0.0, 1.4, 0.2, 0.0, 0.0, 0.0],
@@ -126,12 +126,12 @@ pub(crate) const POSES: [[f64; 6]; 4] = [
     [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
 ];
 
-/// Returns the shares of the torque limits of the default arm.
+/// Returns the torques as shares of the torque limits of the default arm.
 pub(crate) fn shares(torque: &[f64; 6]) -> [f64; 6] {
     shares_of(torque, &Config::avena())
 }
 
-/// Returns the shares of the torque limits of the arm of `config`.
+/// Returns the torques as shares of the torque limits of the arm of `config`.
 pub(crate) fn shares_of(torque: &[f64; 6], config: &Config) -> [f64; 6] {
     core::array::from_fn(|j| torque[j].abs() / config.joints[j].torque_max)
 }
@@ -141,7 +141,7 @@ pub(crate) fn highest(shares: &[f64; 6]) -> f64 {
     shares.iter().fold(0.0, |most, share| share.max(most))
 }
 
-/// Like [`ArmFile::pose`], for the default arm.
+/// Returns a pose like [`ArmFile::pose`], for the default arm.
 pub(crate) fn pose(random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
     ArmFile::avena().pose(random, mass, most)
 }
@@ -157,11 +157,11 @@ pub(crate) struct Plant {
     pub rotor: [f64; 6],
     pub friction: [LuGre; 6],
     bristles: [f64; 6],
-    /// Elastic gears; `None` for rigid ones.
+    /// Elastic gears. `None` for rigid gears.
     gears: Option<Gears>,
     pub q: [f64; 6],
     pub v: [f64; 6],
-    /// External torque, of a hand or a collision, N·m.
+    /// External torque of a hand or a collision, N·m.
     pub push: [f64; 6],
     /// Speeds of the motors in the last 10 ms, rad/s.
     pub speeds: [[f64; 10]; 6],
@@ -221,8 +221,8 @@ impl Plant {
         }
     }
 
-    /// Returns this arm with elastic gears of `stiffness` N·m/rad, twisted by its load. The drives measure the position of the link and the
-    /// speed of the motor. Rotors and friction are on the motor side.
+    /// Returns this arm with elastic gears of `stiffness` N·m/rad, which are twisted by the load of the arm. The drives measure the
+    /// position of the link and the speed of the motor. Rotors and friction are on the motor side.
     pub(crate) fn elastic(mut self, stiffness: f64) -> Self {
         let load = self.dynamics.gravity_torque(&self.q);
         let q = core::array::from_fn(|j| self.q[j] + load[j] / stiffness);
@@ -241,8 +241,8 @@ impl Plant {
         rig
     }
 
-    /// Advances arm and rig by one millisecond. The controller measures the state of the previous tick, which does not depend on the torque
-    /// of this tick.
+    /// Advances the arm and the rig by one millisecond. The controller measures the state of the previous tick, which does not depend on
+    /// the torque of this tick.
     pub(crate) fn tick(&mut self, rig: &mut Rig) {
         rig.tick();
         self.step(rig);
@@ -311,8 +311,8 @@ impl Plant {
         self.ticks += 1;
     }
 
-    /// Returns the torque of joint `j` on its link, N·m, if its drive gives `drive`: the drive torque minus friction, or the torque of an
-    /// elastic gear. Also advances the motor of an elastic gear by one step.
+    /// Returns the torque of joint `j` on its link, N·m, if its drive has the torque `drive`. The result is the drive torque minus
+    /// friction, or the torque of an elastic gear. Also advances the motor of an elastic gear by one step.
     fn joint_torque(&mut self, j: usize, drive: f64, braked: bool) -> f64 {
         let speed = *self.motor_speed(j);
         let friction = self.friction[j].step(&mut self.bristles[j], speed, DT);
@@ -327,7 +327,7 @@ impl Plant {
         torque
     }
 
-    /// Returns the angles, rad, and speeds, rad/s, of the motors.
+    /// Returns the angles (rad) and speeds (rad/s) of the motors.
     pub(crate) fn motors(&self) -> ([f64; 6], [f64; 6]) {
         self.gears.as_ref().map_or((self.q, self.v), |gears| (gears.q, gears.v))
     }

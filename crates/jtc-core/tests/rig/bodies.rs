@@ -1,8 +1,8 @@
-//! Frames of a host and their bodies.
+//! Frames of a host, and the bodies of these frames.
 use jtc_dynamics::ArmModel;
 use jtc_wire::{FrameType, RawPoint, crc16};
 
-/// A frame with length and CRC.
+/// Returns a frame with length and CRC.
 pub(crate) fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     let n = body.len() + 6;
     let mut bytes = vec![0x9B, frame_type as u8, (n >> 8) as u8, n as u8];

@@ -1,4 +1,4 @@
-//! A rig without physics: the nodes answer at once, and the joints are at the positions that the test sets.
+//! Rig without physics. The nodes answer at once, and the joints are at the positions that the test sets.
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::recorder::{Block, Recorder};
@@ -128,7 +128,7 @@ impl Rig {
         Self::held_at(config, [0.0; 6])
     }
 
-    /// Returns a held rig in this pose, rad.
+    /// Returns a rig that is held in this pose, rad.
     pub(crate) fn held_at(config: Config, pose: [f64; 6]) -> Self {
         let mut rig = Self::new(config);
         rig.follow = false;
@@ -136,7 +136,7 @@ impl Rig {
             node.report.position = position;
         }
         rig.defaults();
-        // Runs until the load of the arm is known, because Teaching waits for that.
+        // Runs until the load of the arm is known, because Teaching waits until then.
         rig.run(700);
         assert_eq!(rig.state(), ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
         assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
@@ -204,7 +204,8 @@ impl Rig {
         });
     }
 
-    /// Adds a Stop or Pause that arrives on a line. The command takes effect in the next tick, and its frame waits after the others.
+    /// Adds a Stop or Pause that arrives on a line. The command takes effect in the next tick, and the frame of the command is queued after
+    /// the earlier frames.
     pub(crate) fn urgent(&mut self, line: usize, command: UrgentCommand) {
         self.urgent[line].push(command);
         self.send_on(line, FrameType::TrajSetExecStatus, &[ExecCommand::from(command) as u8]);
@@ -213,7 +214,7 @@ impl Rig {
         }
     }
 
-    /// Returns the number of events that are not done.
+    /// Returns the number of events that are not completed.
     pub(crate) fn waiting(&self) -> usize {
         self.host.len()
     }

@@ -1,7 +1,7 @@
-//! A node without physics.
+//! Simulated node without physics.
 use jtc_bus::{JointReport, NodeState};
 
-/// A node with its state machine, as it behaves on the bus.
+/// Node with the state machine that is visible on the bus.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Node {
     pub report: JointReport,
@@ -15,7 +15,7 @@ pub(crate) struct Node {
     pub stays_ready: bool,
     /// The node does not leave OperationEnable.
     pub stays_enabled: bool,
-    /// The node does not become enabled: it stays in the transition.
+    /// The node does not become enabled, because it stays in the transition.
     pub slow_enable: bool,
     pub configured: bool,
     pub resets: u32,

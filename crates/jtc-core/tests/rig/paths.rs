@@ -4,7 +4,8 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 
 use super::{Rig, segment_body};
 
-/// Returns a motion of a joint (0..5) in pieces of constant acceleration (rad/s², number of points 10 ms apart).
+/// Returns a motion of a joint (0..5) that consists of pieces with constant acceleration. Each piece has an acceleration (rad/s²) and a
+/// number of points 10 ms apart.
 pub(crate) fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
     let (mut p, mut v) = (0.0f64, 0.0f64);
     let mut points = vec![RawPoint::default()];
@@ -19,26 +20,26 @@ pub(crate) fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
     points
 }
 
-/// Returns a point that moves only one joint: rad, rad/s, rad/s².
+/// Returns a point that moves only one joint, with position (rad), velocity (rad/s) and acceleration (rad/s²).
 pub(crate) fn point(joint: usize, q: f64, v: f64, a: f64) -> RawPoint {
     let mut point = RawPoint::default();
     put(&mut point, joint, q, v, a);
     point
 }
 
-/// Sets a joint of a point: rad, rad/s, rad/s².
+/// Sets the position (rad), velocity (rad/s) and acceleration (rad/s²) of a joint in a point.
 pub(crate) fn put(point: &mut RawPoint, joint: usize, q: f64, v: f64, a: f64) {
     point.position[joint] = raw(q, 3.141592);
     point.velocity[joint] = raw(v, 6.283185);
     point.acceleration[joint] = raw(a, 12.566370);
 }
 
-/// Returns a value as an integer of the wire format. `scale` is the value of the largest integer.
+/// Returns a value as an integer in the wire format. `scale` is the value of the largest integer.
 pub(crate) fn raw(value: f64, scale: f64) -> i16 {
     (value / scale * 32767.0).round() as i16
 }
 
-/// Returns a point at rest: `raw` in every joint.
+/// Returns a point at rest with the position `raw` for every joint.
 pub(crate) fn rest(raw: i16) -> RawPoint {
     RawPoint { position: [raw; 6], ..RawPoint::default() }
 }

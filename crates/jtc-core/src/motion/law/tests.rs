@@ -63,7 +63,7 @@ impl Arm {
 
 const NONE: PidGains = PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: -1.0, int_max: 1.0 };
 
-/// The set values may also move in HoldPos, because a joint that comes to rest has a velocity.
+/// In HoldPos, velocity, acceleration and friction do not act even if the set values move while a joint comes to rest.
 #[test]
 fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_only() {
     for mode in MODES {

@@ -383,8 +383,8 @@ impl HostParameters {
         self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
     }
 
-    /// Checks or copies the table of one joint per tick. All tables are checked before the first one is copied, so that a refused table
-    /// changes nothing.
+    /// Checks or copies the table of one joint per tick. All tables are checked before the first table is copied, so that a refused table
+    /// does not change any value.
     fn take_tables(
         &mut self,
         table: impl Fn(usize) -> Result<TableOf<f32>, DataStatus>,

@@ -41,7 +41,8 @@ impl From<&RawPoint> for SetPoint {
     }
 }
 
-/// Largest increase of a value between two points due to rounding, in rad and rad/s. This amount is too small to matter for any limit.
+/// Largest increase of a value between two points due to rounding, in rad and rad/s. This increase is too small to be relevant for any
+/// limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// Returns a smooth value that rises from 0 to 1 with zero slope at both ends.

@@ -66,7 +66,7 @@ impl Inputs<'_> {
 /// Outputs of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs {
-    /// The frame of this tick (J-12); `None` in Start.
+    /// Frame of this tick (J-12). `None` in Start.
     pub bus: Option<Frame>,
     /// Level of the safety output: `true` means no error (J-22).
     pub safety_output: bool,

@@ -477,7 +477,7 @@ mod tests {
                     tick(&mut jog, &mut position, &config);
                     position[0] = position[0].min(0.0);
                 }
-                // A path stops from this speed within the time of the ramp, after half of the distance; a fast joint stops with its
+                // At this speed, a path stops within the time of the ramp, after half of the distance. A fast joint stops with its
                 // acceleration limit.
                 let hard = config.joints[0].acceleration_max;
                 let longest = 20 + config.ramp_ms.max((1_600.0 * share * fastest / hard) as u16);

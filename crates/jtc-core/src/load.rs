@@ -43,7 +43,7 @@ impl Load {
         if self.known { self.torque.into() } else { integral }
     }
 
-    /// Returns the load, N·m; zero before the load is known.
+    /// Returns the load, N·m. Returns zero before the load is known.
     pub(crate) fn known_torque(&self) -> f64 {
         self.torque.into()
     }
@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(load.torque(0.0), 0.0);
     }
 
-    /// A load that was lowered may be above the bound. Such a load does not jump back to the bound.
+    /// A load that was lowered may be above the bound. The lowered load does not jump back to the bound.
     #[test]
     fn j70_a_load_that_was_lowered_is_kept() {
         let mut load = Load::default();

@@ -390,8 +390,8 @@ impl Nodes {
     }
 
     /// Executes ClearCurrentErrors for the nodes in `mask`. Nodes with an error to clear are commanded to Init until the nodes follow. An
-    /// error that is only in the word of occurred errors is cleared only while the torque is off, because such an error is not a reason to
-    /// drop the arm. Returns `true` if any node has an error to clear.
+    /// error that is only in the word of occurred errors is not a reason to drop the arm, so this error is cleared only while the torque is
+    /// off. Returns `true` if any node has an error to clear.
     pub(crate) fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
         let mut any = false;

@@ -78,7 +78,7 @@ impl Ramp {
 }
 
 impl PathClock {
-    /// Creates a clock at point 0, for an arm at rest. Its rate is `pace` from the start.
+    /// Creates a clock at point 0, for an arm at rest. The rate of the clock is `pace` from the start.
     pub(crate) fn start(pace: f64) -> Self {
         Self { rate: pace, target: pace, ..Self::default() }
     }

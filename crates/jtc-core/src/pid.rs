@@ -51,8 +51,8 @@ impl Pid {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
-    /// Resets the state like [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral. This gives a bumpless transfer
-    /// from a state that had found this torque. If the integral has no gain or reaches its bounds, it contains less torque.
+    /// Resets the state like [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral. The result is a bumpless
+    /// transfer from a state that had found this torque. If the integral has no gain or reaches its bounds, it contains less torque.
     pub(crate) fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         self.keep(gains, torque);

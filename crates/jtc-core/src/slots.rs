@@ -18,8 +18,8 @@
 //! The header is written last, so a slot whose writing was interrupted has no header. After a loss of power, a word that was being
 //! programmed, or a sector that was being erased, may contain any data. The CRC detects this. All numbers are little-endian.
 //!
-//! This module does not access hardware: [`Storing`] returns the next action, and the owner of the flash executes it. A flash word can be
-//! programmed once after it was erased, which is sufficient for [`Storing`].
+//! This module does not access hardware. [`Storing`] returns the next action, and the owner of the flash executes this action. A flash word
+//! can be programmed once after it was erased, which is sufficient for [`Storing`].
 use core::cmp::Ordering;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};

@@ -166,7 +166,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.refused
     }
 
-    /// Refuses the other segments of an upload whose segment 0 was refused because of a Stop.
+    /// Refuses the later segments of an upload whose segment 0 was refused because of a Stop.
     pub(crate) fn refuse_rest(&mut self) {
         self.dropped = true;
     }

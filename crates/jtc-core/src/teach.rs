@@ -2,8 +2,8 @@
 //! friction, and soft ends.
 //!
 //! A hand leads the arm. When the hand lets go, the arm must stay in its pose. From the torques that HoldPos found, a mass at the flange is
-//! estimated and carried to other poses. The remaining torques fade while the arm is led ([`carried`]). Every motion is damped. A joint
-//! that is too fast for the damping ends Teaching ([`joint`]).
+//! estimated and carried to other poses. The remaining torques fade while a hand leads the arm ([`carried`]). Every motion is damped. A
+//! joint that is too fast for the damping ends Teaching ([`joint`]).
 mod carried;
 mod joint;
 
@@ -36,8 +36,8 @@ const GOES_S: f64 = 1.5;
 /// Time for which a joint must have sunk without a removed mass before the mass is added again, ms, and time constant of the return, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
-/// Speed above which a joint is considered led, rad/s. Distance of the fastest joint over which a torque that is not explained by a mass
-/// falls to a third, rad.
+/// Speed above which a joint is considered to be led by a hand, rad/s. Distance of the fastest joint over which a torque that is not
+/// explained by a mass falls to a third, rad.
 const LED: f64 = 0.02;
 const WAY: f64 = 0.3;
 

@@ -13,7 +13,8 @@ pub struct JointTelemetry {
     pub set_velocity: f64,
     /// Commanded acceleration, rad/s².
     pub set_acceleration: f64,
-    /// Position that was commanded for the time of the measurement, rad. The control law compares the measurement with it (J-62).
+    /// Position that was commanded for the time of the measurement, rad. The control law compares the measurement with this position
+    /// (J-62).
     pub due_position: f64,
     /// Measured position, rad.
     pub position: f64,

@@ -88,7 +88,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn work(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         match self.state {
             ControllerState::Start | ControllerState::Init | ControllerState::Error => {
-                // All other parts were reset when the state began.
+                // All other parts of the motion were reset when the state began.
                 self.motion.set.release(&self.nodes);
                 self.parameters.end_blend();
                 ([0.0; JOINTS], [0; JOINTS])

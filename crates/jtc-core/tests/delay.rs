@@ -223,7 +223,7 @@ fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
             });
             arm.rig.send(FrameType::TeachingModeDisable, &[]);
             arm.run("teaching ends", led, held);
-            // The joint has moved on, and comes to rest from there.
+            // The joint has moved further, and comes to rest from its present position.
             let from = arm.here[0];
             for _ in 0..400 {
                 arm.tick(0.0);
@@ -305,8 +305,8 @@ fn j43_j62_the_position_error_is_that_of_the_same_time() {
     }
 }
 
-/// The reported position error is the one that the control law uses. With a delay, the error belongs to the time that is earlier by the
-/// number of delay ticks.
+/// The reported position error is the position error that the control law uses. With a delay, the error belongs to the time that is earlier
+/// by the number of delay ticks.
 #[test]
 fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     for delay in 0..=DELAY_MAX {

@@ -9,8 +9,8 @@ use rig::Rig;
 
 const JOINT: usize = 1;
 
-/// Swings joint 1 in Error, after the cause of the error has ended and was cleared. `report` maps its true position and velocity to the
-/// reported ones.
+/// Swings joint 1 in Error, after the cause of the error has ended and was cleared. `report` maps the true position and velocity to the
+/// reported position and velocity.
 fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
     let start = rig.nodes[JOINT].report.position;
     for k in 0..ticks {
@@ -24,7 +24,7 @@ fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
     }
 }
 
-/// Maps a true position and velocity to the reported ones.
+/// Function that maps a true position and velocity to the reported position and velocity.
 type Report = fn(f64, f64) -> (f64, f64);
 
 fn asked_to_enable(requests: &[Request]) -> bool {

@@ -292,7 +292,8 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     }
 }
 
-/// A hand twists the gears of a taught arm before the motors start to turn. This must not be taken for a slipping encoder.
+/// A hand twists the gears of a taught arm before the motors start to turn. The controller must not interpret this twist as a slipping
+/// encoder.
 #[test]
 fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     for stiffness in [3_400.0, 10_000.0] {

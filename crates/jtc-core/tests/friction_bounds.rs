@@ -83,7 +83,7 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     }
 }
 
-/// The frame is refused, and the friction on a path is the same as without the frame.
+/// The frame is refused, and the friction on a path is the friction without the frame.
 fn refused_whole(what: &str, frame_type: FrameType, body: &[u8]) {
     let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
     assert_eq!(asked.ask(frame_type, body), DataStatus::IncorrectValue, "{what}");
@@ -105,7 +105,7 @@ fn j06_a_polynomial_that_would_throw_the_arm_is_refused_whole() {
         ("a huge negative cube", 3, -3e38),
         ("no number", 1, f64::NAN),
     ] {
-        // Only the last joint has a wrong value, but the other joints must not change either.
+        // Only the last joint has a wrong value, but the friction of the other joints must also not change.
         let mut body = good.map(|c| c.map(|c| 0.5 * c));
         body[5] = good[5];
         body[5][place] = value;

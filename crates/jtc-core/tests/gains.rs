@@ -1,5 +1,5 @@
-//! Tests of changing the gains of a simulated arm while the arm is held. Gains that would drop the arm are refused, and gains that make it
-//! unstable are replaced by the earlier ones (J-71).
+//! Tests of changing the gains of a simulated arm while the arm is held. Gains that would drop the arm are refused, and gains that make the
+//! arm unstable are replaced by the earlier gains (J-71).
 use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, PidGains, error, joint_error};
 use jtc_wire::{DataStatus, FrameType, SettingValue, StopKind, StoreState};
@@ -33,7 +33,7 @@ fn body(gains: &Gains) -> Vec<u8> {
     floats(gains.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max].map(|x| x as f32)))
 }
 
-/// Returns an arm without brakes, held at rest, with 2 kg that the model lacks.
+/// Returns an arm without brakes that is held at rest, with 2 kg that the model does not contain.
 fn held_with(friction: f64) -> (Plant, Rig) {
     let model = loaded(Parameters::avena().model, 2.0);
     let friction = if friction > 0.0 { LuGre::of_avena_times(friction) } else { [LuGre::NONE; 6] };
@@ -84,7 +84,8 @@ fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     }
 }
 
-/// Without an integral the position error must hold the load that the integral had found. This is accepted if the error is small.
+/// Without an integral the position error must hold the load that the integral had found. Gains without an integral are accepted if this
+/// error is small.
 #[test]
 fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     for (kp, expected) in [(1.0, DataStatus::NoError), (0.08, DataStatus::IncorrectValue)] {

@@ -160,7 +160,7 @@ fn j25_a_payload_that_is_lifted_slowly_is_still_carried() {
 }
 
 /// A clamp holds a joint away from its commanded position, with up to a quarter of its torque limit. When Teaching begins, only the part of
-/// this torque that was found is carried. The carried torque fades when the joint is led away.
+/// this torque that was found is carried. The carried torque fades when a hand leads the joint away.
 #[test]
 fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     for (arm, joint, share) in

@@ -69,7 +69,7 @@ fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// The arm is led over most of its range. The payload needs another torque in each pose.
+/// A hand leads the arm over most of its range. The payload needs another torque in each pose.
 #[test]
 fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     for (mass, from, way, speed) in [
@@ -281,7 +281,7 @@ fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     assert_eq!(rig.ask(FrameType::PidParamUseDefault, &[]), DataStatus::NoError);
 }
 
-/// Any payload up to 3 kg that is not configured is led from any pose to any other.
+/// A hand leads any payload up to 3 kg that is not configured from any pose to any other pose.
 #[test]
 fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     println!("seed 11");

@@ -361,7 +361,7 @@ fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
     assert!((last - 1.2 * before).abs() < 0.02 * before.abs(), "{before} to {last}");
 }
 
-/// A torque that alternates between its limits never stays long at one of them.
+/// A torque that alternates between its limits never stays long at one limit.
 #[test]
 fn j43_torque_that_swings_between_its_limits_is_an_error() {
     for held_ms in [0, 1_000] {

@@ -78,7 +78,7 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
 
-/// A drive is enabled seconds later than the others. Its load swings, and moves the loads of the other joints again.
+/// A drive is enabled seconds later than the other drives. The load of its joint swings, and moves the loads of the other joints again.
 #[test]
 fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     for late in [1, 2] {

@@ -1,5 +1,5 @@
-//! Answers of one joint are lost repeatedly, but never enough consecutive ones for an error. The position loop stays closed, and the arm
-//! behaves as if no answer were lost (J-14, J-63).
+//! Answers of one joint are lost repeatedly, but the number of consecutive lost answers is never sufficient for an error. The position loop
+//! stays closed, and the arm behaves as if no answer were lost (J-14, J-63).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
@@ -120,8 +120,8 @@ fn j63_a_push_is_answered_while_answers_are_lost_for_ever() {
     }
 }
 
-/// Returns the time until a joint that is blocked on the path is detected, ms, and the error of the position that the control law used
-/// until then, rad.
+/// Returns the time until a joint that is blocked on the path is detected, ms. Also returns the error of the position that the control law
+/// has used before the detection, rad.
 fn blocked(velocity: f64, lost: &[bool]) -> (usize, f64) {
     const FROM: usize = 200;
     let mut rig = Rig::holding();
@@ -195,7 +195,7 @@ fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
                 }
             }
             if dead {
-                // In the first tick, the answer to the previous Move still arrives. Then five Moves are not answered.
+                // In the first tick, the answer to the previous Move still arrives. After that, five Moves are not answered.
                 assert_eq!(seen, Some(5), "{start}");
                 assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
                 assert_eq!(rig.torque, [0.0; 6]);

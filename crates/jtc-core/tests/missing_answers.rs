@@ -105,7 +105,7 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     all
 }
 
-/// Returns the torque that the controller adds to that of the model, N·m.
+/// Returns the torque that the controller adds to the model torque, N·m.
 fn correction(joint: &JointTelemetry) -> f64 {
     joint.torque - joint.torque_model
 }
@@ -224,7 +224,7 @@ fn j14_five_unanswered_moves_are_a_receive_timeout() {
         let from = rig.sent.len();
         rig.until(30, |r| r.state() == ControllerState::Error);
         assert_eq!(rig.status().can_current, 1 << (8 + node));
-        // The answer to the last Move before the silence still arrives. Then five answers are missing.
+        // The answer to the last Move before the silence still arrives. After that, five answers are missing.
         let moves = rig.sent[from..].iter().take_while(|r| matches!(r, Request::Move { .. })).count();
         assert!(moves >= 5);
         let mut rig = Rig::holding();

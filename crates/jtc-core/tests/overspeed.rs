@@ -25,7 +25,7 @@ fn j35_a_joint_above_its_speed_for_5_ms_is_an_error_in_every_state_with_torque()
     for speed in [-1.85, 1.85] {
         for mut rig in powered() {
             rig.nodes[3].report.velocity = speed;
-            // The speed is reported one tick later. Then four consecutive ticks are above the limit.
+            // The speed is reported one tick later. After that, four consecutive ticks are above the limit.
             rig.run(5);
             assert_eq!(rig.errors(), 0, "{:?}", rig.state());
             rig.run(1);

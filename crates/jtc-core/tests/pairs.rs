@@ -20,8 +20,8 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// Returns a bench that holds an arm at rest. The true masses are `mass` times those of the model, and the arm
-    /// carries a `load` (kg) that the model lacks.
+    /// Returns a bench that holds an arm at rest. The true masses are `mass` times the model masses, and the arm carries a `load` (kg) that
+    /// the model does not contain.
     pub(crate) fn holding(config: Config, mass: f64, load: f64) -> Self {
         let model = loaded(heavier(Parameters::avena().model, mass), load);
         let mut arm = Plant::new(&model, LuGre::of_avena_times(1.0), POSES[0]);

@@ -62,7 +62,7 @@ fn j06_gains_that_would_throw_the_arm_are_refused_whole() {
     ] {
         let mut gains = good;
         gains[place] = value;
-        // Only the last joint has a wrong value, but the other joints must not change either.
+        // Only the last joint has a wrong value, but the gains of the other joints must also not change.
         let body = floats((0..6).flat_map(|j| if j == 5 { gains } else { [100.0, 0.0, 0.0, -1.0, 1.0] }));
         refused_without_a_trace(FrameType::PidParam, &body, &format!("{gains:?}"));
     }
@@ -81,7 +81,7 @@ fn j06_gains_in_use_are_taken() {
         let mut rig = Rig::holding();
         assert_eq!(rig.ask(FrameType::PidParam, &gains_body(gains)), DataStatus::NoError, "{gains:?}");
     }
-    // These gains are accepted for an arm with heavier joints.
+    // For an arm with more joint inertia, these gains are accepted.
     let mut config = Config::avena();
     config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 2.0);
     let mut rig = Rig::holding_with(config);
@@ -298,7 +298,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
     }
     if !accepted {
         quiet.run(300);
-        // The number of ticks until the record came may differ, but the position hold is the same.
+        // The number of ticks until the record came may differ, but the position hold does not differ.
         let (a, b) = (asked.controller.telemetry(), quiet.controller.telemetry());
         for j in 0..6 {
             prop_assert!((a.joints[j].torque_model - b.joints[j].torque_model).abs() < 1e-9);

@@ -1,5 +1,5 @@
 //! Tests of the reaction to each error (J-21, J-66, J-68, J-69). The arm yields or stops if the controller can still act. Otherwise the
-//! torque of the arm is removed. The table in docs/safety.md shows the results of these runs; `UPDATE_DOCS=1` updates it.
+//! torque of the arm is removed. The table in docs/safety.md shows the results of these runs. `UPDATE_DOCS=1` updates this table.
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, TrajectoryState, error, joint_error};

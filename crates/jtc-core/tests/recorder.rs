@@ -454,8 +454,8 @@ fn storing(state: ControllerState, wait: usize) -> Rig {
     rig
 }
 
-/// A replay has no memory to store an arm, so it refuses the request at once. This is not reported as a difference of the controller, even
-/// with a snapshot in between. After the next snapshot, all outputs are equal.
+/// A replay has no memory to store an arm, so it refuses the request at once. The replay does not report this refusal as a difference of
+/// the controller, even with a snapshot in between. After the next snapshot, all outputs are equal.
 #[test]
 fn j56_j54_a_store_of_the_arm_is_not_a_difference() {
     for state in [ControllerState::Init, ControllerState::HoldPos] {

@@ -16,7 +16,8 @@ const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Processes a segment (J-30, J-36). All points are checked before the first one is copied, so that a refused segment changes nothing.
+    /// Processes a segment (J-30, J-36). All points are checked before the first point is copied, so that a refused segment does not change
+    /// the trajectory.
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {

@@ -62,7 +62,7 @@ impl Found {
 pub(crate) struct Limited {
     /// Torque to command, N·m.
     pub torque: [f64; JOINTS],
-    /// Findings of this tick; `None` if no reaction is needed.
+    /// Findings of this tick. `None` if no reaction is needed.
     pub found: Option<[Found; JOINTS]>,
     /// Sag of the set positions of joints whose loads are being caught, rad. `None` if no set position has sagged.
     pub sag: Option<[f64; JOINTS]>,
@@ -141,7 +141,7 @@ impl Limiter {
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
             // Feedback torque that brakes a moving joint does not count as a push. Feedback torque on a joint at rest counts as a push.
             let brakes = || stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            // If an arm that a hand has led hits a person before it is at rest, the joint lags its set values.
+            // If an arm hits a person after hand guiding, before the arm is at rest, the joint lags its set values.
             let lags = || {
                 let set = set.point.velocity[j];
                 mode == ControlMode::Rest && feedback * set > 0.0 && v[j] * set.signum() < LAGS * set.abs()

@@ -126,7 +126,7 @@ impl SetValues {
         self.jog.is_some() || self.deceleration.iter().any(Option::is_some)
     }
 
-    /// Begins to hold the arm at its measured position. An arm that moves because a hand has led it first comes to rest within `length_ms`.
+    /// Begins to hold the arm at its measured position. An arm that still moves after hand guiding first comes to rest within `length_ms`.
     /// A moving arm is caught like a falling load.
     pub(crate) fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());

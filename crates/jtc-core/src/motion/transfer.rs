@@ -12,7 +12,7 @@ const FALL_MS: u16 = 10;
 /// Parts of the last torque that the next torque must continue without a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
-    /// All parts except the model.
+    /// All parts of the torque except the model torque.
     Correction,
     /// All parts.
     Everything,

@@ -6,8 +6,8 @@
 //! offset fades, so that missing and returning answers do not cause a step of the position or of the derivative of the position error. A
 //! *late* answer ([`Lateness`]) belongs to the time at which it was due. The late answer is compared with the prediction for that time, and
 //! the prediction continues from this answer. A late answer that is close to its prediction is used directly, like an answer in time. With
-//! an offset that fades in each tick, the position loop would contain a filter and would swing. The offset is not part of the prediction:
-//! the prediction depends only on answers and commands, so that the position loop stays closed even if many answers are lost.
+//! an offset that fades in each tick, the position loop would contain a filter and would swing. The offset is not part of the prediction.
+//! The prediction depends only on answers and commands, so that the position loop stays closed even if many answers are lost.
 mod history;
 mod jump;
 mod lateness;
@@ -70,7 +70,7 @@ pub(crate) struct Tick {
     pub expected: bool,
     /// The Move was acknowledged.
     pub asked: bool,
-    /// Number of answers in this tick. All except the last one were late.
+    /// Number of answers in this tick. All answers except the last answer were late.
     pub answers: u8,
     /// Commanded velocity, rad/s.
     pub commanded: f64,
@@ -151,7 +151,7 @@ pub(crate) struct Measurement {
     /// Part of the difference between prediction and answer that has not faded yet.
     position_offset: Fading,
     velocity_offset: Fading,
-    /// At least one of the offsets has not faded yet.
+    /// At least one offset has not faded yet.
     fading: bool,
 }
 

@@ -53,7 +53,7 @@ pub(crate) struct Node {
     pub(super) absent: bool,
     /// State that the node reported while its answers were ignored.
     pub(super) unasked: Option<NodeState>,
-    /// Number of answers since the last tick. All except the last one were late.
+    /// Number of answers since the last tick. All answers except the last answer were late.
     pub(super) answers: u8,
     /// The node misbehaved in this tick, because it left OperationEnable, was not enabled in time, or reported implausible positions.
     pub(super) misbehaved: bool,

@@ -258,7 +258,7 @@ impl Reference {
         }
     }
 
-    /// Writes all unusual inputs except those of the joint bus.
+    /// Writes all unusual inputs except the inputs of the joint bus.
     #[inline(never)]
     fn write_rest<S: BitSink>(&mut self, inputs: &Inputs<'_>, done: usize, to: &mut S) -> bool {
         to.put(inputs.safety_input.into(), 1);

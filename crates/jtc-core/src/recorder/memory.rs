@@ -338,7 +338,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
             let over = |word: u32| (word >> 1) >> (31 - fill);
             let words = [self.rest | a << fill, over(a) | b << fill];
             self.rest = over(b) | c << fill;
-            // Writes two words at once, unless one of them is the last word of the block.
+            // Two words are written at once, unless one of these words is the last word of the block.
             let place =
                 self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word..BLOCK_WORDS - 1));
             match place.and_then(|place| place.first_chunk_mut()) {

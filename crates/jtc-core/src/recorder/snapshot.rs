@@ -1,8 +1,8 @@
 //! State of the controller in a snapshot, with all values that affect the motion of the arm and the reports of the controller. The arm and
 //! the points of the trajectory are not included, because a log identifies both by their hashes.
 //!
-//! The state of the host link (waiting records, frames to send, progress of a long frame) is not included. A replay gives the same frames
-//! on the joint bus and the same states, but not the same bytes on the host lines.
+//! The state of the host link (waiting records, frames to send, progress of a long frame) is not included. A replay reproduces the frames
+//! on the joint bus and the states, but not the bytes on the host lines.
 use jtc_dynamics::Payload;
 use jtc_wire::RawPoint;
 
@@ -223,7 +223,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         extensions.jogs_refused_ms.write(to);
     }
 
-    /// Continues from a snapshot. This controller must have the recorded arm and, if the snapshot executes a trajectory, that trajectory.
+    /// Continues from a snapshot. The controller must have the recorded arm. If the snapshot executes a trajectory, the controller must
+    /// also have this trajectory.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         let Dynamic {
             state,

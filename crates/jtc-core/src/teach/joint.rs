@@ -114,7 +114,8 @@ pub(crate) struct TaughtTorque {
 pub(crate) struct Bears {
     /// Share of the load that the damping balances at [`SINKS`].
     pub balanced: f64,
-    /// Depth of the joint inside a soft end beyond the depth at the beginning of Teaching, rad. The sign is that of [`soft_end::depth`].
+    /// Depth of the joint inside a soft end beyond the depth at the beginning of Teaching, rad. The depth has the sign of
+    /// [`soft_end::depth`].
     pub compressed: f64,
 }
 
@@ -229,7 +230,7 @@ impl TaughtJoint {
         (torque, Bears { balanced, compressed })
     }
 
-    /// Returns the highest torque of the dry friction, N·m. This torque is less if the joint has friction of its own.
+    /// Returns the highest torque of the dry friction, N·m. This torque is lower if the joint itself has friction.
     fn breakaway(&self, limits: &JointConfig, config: &Config) -> f64 {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }

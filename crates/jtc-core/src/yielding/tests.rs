@@ -197,7 +197,7 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
     };
     // A torque of 20 N·m holds the joint up, so gravity pulls it down.
     assert_eq!(lowers_after(-0.3, 20.0), Some(1_667), "0.5 rad");
-    // A joint that is led down and up again has not sunk.
+    // If a hand leads a joint down and up again, the joint has not sunk.
     let mut led = Yield::begin(false, false, 0.0, INERTIA, 0.0);
     for k in 0..10_000 {
         let velocity = if k % 1_000 < 500 { -0.3 } else { 0.3 };

@@ -219,7 +219,7 @@ impl Rig {
         self.host.len()
     }
 
-    /// Returns the records so far, oldest first, except those of extensions.
+    /// Returns the records so far, oldest first, without the records of extensions.
     pub(crate) fn records(&self) -> Vec<Response> {
         self.statuses.iter().filter_map(Status::response).filter(|record| record.frame_type < 0x40).collect()
     }

@@ -1,12 +1,12 @@
 //! Determines the lateness of the answers of a joint (J-63).
 //!
 //! An answer does not identify its Move, but the answers of a node keep their order. So the lateness of the newest answer is the number of
-//! Moves that were sent after the Move of this answer. These are the *outstanding* Moves. A missing answer may be late or lost. A late
-//! answer cannot be distinguished from a lost answer until two answers come in one tick, because the first of the two answers was late. For
-//! a second after this *evidence*, unanswered Moves are counted as outstanding. The number of outstanding Moves is at most the highest
-//! number of late answers in one tick. Without evidence, unanswered Moves are counted as lost. Evidence may be wrong, because a frame that
-//! the bus repeats comes twice. A lost answer is detected later, because the count does not return to zero. The lowest count of a window is
-//! therefore subtracted.
+//! Moves that were sent after the Move of this answer. These later Moves are called *outstanding*. A missing answer may be late or lost. A
+//! late answer cannot be distinguished from a lost answer until two answers come in one tick, because the first of the two answers was
+//! late. For a second after this *evidence*, unanswered Moves are counted as outstanding. The number of outstanding Moves is at most the
+//! highest number of late answers in one tick. Without evidence, unanswered Moves are counted as lost. Evidence may be wrong, because a
+//! frame that the bus repeats comes twice. A lost answer is detected later, because the count does not return to zero. The lowest count of
+//! a window is therefore subtracted.
 use crate::bit_codec::bit_codec;
 
 /// Time for which evidence is valid, ms.

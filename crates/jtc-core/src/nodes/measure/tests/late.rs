@@ -126,7 +126,7 @@ fn motion() -> impl Strategy<Value = Motion> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// Once it is known that answers may be late, the position from a late answer differs from the real one only by encoder steps and by
+    /// When late answers have been detected, the position from a late answer differs from the real position only by encoder steps and by
     /// the error of the predicted rate. If the answer were used as if it came in time, the error would be its lateness times the speed, 3
     /// mrad.
     #[test]

@@ -1,9 +1,9 @@
 //! Slows down path time while a motion overloads a joint (J-75).
 //!
 //! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
-//! path needs less torque: the torque for inertia falls with the square of the rate. Therefore path time slows down as much as the joints
-//! at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its normal rate when no joint is
-//! at its torque limit any more.
+//! path needs less torque, because the torque for inertia falls with the square of the rate. Therefore path time slows down as much as the
+//! joints at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its normal rate when no
+//! joint is at its torque limit any more.
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 use crate::path::PathClock;
@@ -28,13 +28,13 @@ pub(crate) struct HoldBack {
     /// `restores` means that the path is returning to its normal rate. `stands_ms` is the time for which the path has been at rest.
     restores: bool,
     stands_ms: u16,
-    /// Ticks since the inertia was computed.
+    /// Number of ticks since the inertia was computed.
     since_ms: u16,
     /// Consecutive ticks in which a joint has been at its limit.
     pressed_ms: u16,
-    /// Ticks since a joint was last at its limit.
+    /// Number of ticks since any joint was at its torque limit.
     quiet_ms: u16,
-    /// Ticks of this run of the path in which the path was held back.
+    /// Number of ticks of this run of the path in which the path was held back.
     run_ms: u16,
     /// Mask of the joints that have been at their torque limits since the path was first held back.
     pressed: u8,

@@ -205,7 +205,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.teaching = false;
                 SliceOutcome::Done
             }
-            // J-23: the reset would take the torque from a moving arm.
+            // J-23: the reset would remove the torque from a moving arm.
             Command::ResetCanDevices { nodes }
                 if nodes & JOINTS_MASK != 0
                     && (jogging
@@ -355,7 +355,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Executes Execute, Pause or Stop (J-34).
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
-        // J-30: this also applies while joints are jogged.
+        // J-30: a Stop also drops the upload while joints are jogged.
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
         // A Stop or a Pause holds the arm. Therefore both commands also end Teaching, or cancel Teaching that has not begun yet.
         let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);

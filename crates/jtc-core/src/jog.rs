@@ -43,7 +43,7 @@ pub(crate) fn jerk(limits: &JointConfig) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jog {
     joints: [JointJog; JOINTS],
-    /// Ticks since the last command.
+    /// Number of ticks since the last command.
     silent_ms: u16,
     /// Clock of the jog.
     clock: PathClock,

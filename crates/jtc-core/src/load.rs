@@ -4,7 +4,7 @@ use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::limits::JointConfig;
 
-/// Ticks between two observations of the same joint. Each tick observes a single joint.
+/// Number of ticks between two observations of the same joint. Each tick observes a single joint.
 const PERIOD: f64 = crate::JOINTS as f64;
 /// Time constant of the low-pass filter, s.
 const TIME_S: f64 = 1.0;
@@ -15,7 +15,7 @@ const HIGHEST: f64 = 0.3;
 const APART: f64 = 0.1;
 /// Largest change of the integral, as a share of the torque limit, at which the joint is still considered held steadily.
 const STEADY: f64 = 0.03;
-/// Time of steady holding after which the integral is taken as the load, s.
+/// Time of steady holding after which the integral is considered the load, s.
 const STEADY_S: f64 = 10.0;
 
 /// The load of a joint.

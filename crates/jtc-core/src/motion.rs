@@ -115,8 +115,8 @@ impl Motion {
         }
     }
 
-    /// Ends Teaching. The arm comes to rest and is held there, and the integral takes over the load that Teaching carried. Moving joints
-    /// stop within `ramp_ms`. If the torque limits require it, they take longer, up to `stop_ms` (J-33).
+    /// Ends Teaching. The arm comes to rest and is held, and the integral takes over the load that Teaching carried. Moving joints stop
+    /// within `ramp_ms`. If the torque limits require it, they take longer, up to `stop_ms` (J-33).
     pub(crate) fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let mut length_ms = f64::from(config.ramp_ms);
         if nodes.velocities().iter().any(|v| moves(*v)) {

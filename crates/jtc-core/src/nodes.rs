@@ -38,7 +38,7 @@ pub(crate) struct Nodes {
     /// At least one joint is marked as absent (J-53).
     some_absent: bool,
     gripper_lost: bool,
-    /// Ticks for which every joint has been slow enough to be enabled (J-16).
+    /// Number of ticks for which every joint has been slow enough to be enabled (J-16).
     still_ms: u16,
     /// Number of ticks in which the drives must still rest after the torque was removed.
     rest_ms: u16,

@@ -20,7 +20,7 @@ pub(crate) struct PathClock {
     pub rate: f64,
     /// Change of `rate`, 1/s.
     pub slope: f64,
-    /// The target rate: 0, or the speed override (J-57).
+    /// Target rate, which is 0 or the speed override (J-57).
     target: f64,
     /// Number of ticks since standstill was requested.
     halting_ms: f64,
@@ -188,7 +188,7 @@ impl PathClock {
     /// that is possible within `bounds.easy`. If this would take too long, the clock uses `bounds.full`. In this case the rate may also
     /// rise again, if the available torque cannot prevent the arm from gaining speed.
     pub(crate) fn slow_down(&mut self, ramp_ms: f64, stop_ms: f64, bounds: &SlopeBounds) {
-        // In this function slopes are decelerations: positive towards standstill.
+        // In this function, slopes are decelerations, which are positive towards standstill.
         let (distance, now) = (self.rate, -self.slope);
         let ramp = Ramp::of(ramp_ms.min(0.8 * stop_ms));
         let wanted = ramp.next(now, distance);

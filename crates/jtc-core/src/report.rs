@@ -56,7 +56,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns `true` if a JtcStatus is due: at once for a response, otherwise once per period (J-04).
+    /// Returns `true` if a JtcStatus is due. A status is due at once for a response, and otherwise once per period (J-04).
     pub(crate) fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
         // The result is also computed while the line is busy, so that every tick does the same work.

@@ -22,7 +22,7 @@ pub const ABSENT: u8 = 16;
 /// Number of the setting for the position of an absent joint in the model (J-53).
 pub const ABSENT_POSITION: u8 = 17;
 
-/// Numbers of the payload settings (J-60): mass, centre of mass x y z, Ixx Ixy Ixz Iyy Iyz Izz.
+/// Numbers of the payload settings (J-60): the mass, the centre of mass (x, y, z), and the inertias Ixx, Ixy, Ixz, Iyy, Iyz and Izz.
 pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
 
 /// States in which a setting may be changed, in addition to Init and Error.
@@ -82,7 +82,7 @@ pub struct Setting {
 pub enum SettingError {
     /// The setting does not exist, or does not exist for this joint.
     Unknown {
-        /// Number of the setting.
+        /// Number of the refused setting.
         setting: u8,
         /// Number of the joint, from 1. The number is 0 for a setting of the arm.
         joint: u8,

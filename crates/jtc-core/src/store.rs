@@ -346,8 +346,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     pub(crate) fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
         let points = self.points.as_ref().get(..self.received).unwrap_or(&[]);
         let step_ms = f64::from(self.step.ms);
-        // The product may be rounded to a value just below a point that the time has reached. `as` saturates: a negative or NaN time gives
-        // point 0.
+        // The product may be rounded to a value just below a point that the time has reached. `as` saturates, so a negative or NaN time
+        // results in point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
         // The interpolation is also computed exactly at a point and at the last point, without any effect, so that every tick does the same

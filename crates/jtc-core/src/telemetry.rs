@@ -45,7 +45,8 @@ pub struct JointTelemetry {
 }
 
 impl JointTelemetry {
-    /// Returns the position error, rad: the position that was commanded for the time of the measurement, minus the measured position.
+    /// Returns the position error, rad. The error is the position that was commanded for the time of the measurement, minus the measured
+    /// position.
     pub fn position_error(&self) -> f64 {
         self.due_position - self.position
     }
@@ -54,7 +55,7 @@ impl JointTelemetry {
 /// Telemetry of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Telemetry {
-    /// Ticks since the start of the device.
+    /// Number of ticks since the start of the device.
     pub tick: u64,
     /// Controller state in this tick.
     pub state: ControllerState,
@@ -75,7 +76,7 @@ pub struct Telemetry {
 /// Values that a tick stores only for the telemetry.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observed {
-    /// Ticks since the start of the device.
+    /// Number of ticks since the start of the device.
     pub tick: u64,
     /// Commanded torques, N·m.
     pub torque: [f64; JOINTS],

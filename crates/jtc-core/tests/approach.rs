@@ -232,8 +232,8 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     }
 }
 
-/// A path may begin outside a limit if the arm is there (J-36). An arm inside the limits is not moved out to the path, however wide the
-/// start tolerance is.
+/// A path may begin outside a limit if the arm is at that position (J-36). For any start tolerance, an arm inside the limits is not moved
+/// beyond a limit to the path.
 #[test]
 fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     for (at, first, tolerance, answer) in [
@@ -346,7 +346,7 @@ fn j16_an_execute_does_not_wait_for_ever() {
     rig.defaults();
     rig.follow = false;
     rig.run(5);
-    // A joint swings in a hand, too fast to be enabled.
+    // A hand swings a joint too fast for enabling.
     let mut phase = 0.0f64;
     let mut swing = |rig: &mut Rig| {
         phase += 0.001;
@@ -376,7 +376,7 @@ fn j16_an_execute_does_not_wait_for_ever() {
     assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Stop, 0));
 }
 
-/// J-06: a model that is received before the positions are known is checked as soon as they are known.
+/// J-06: a model that is received before the positions are known is checked as soon as the positions are known.
 #[test]
 fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     let mut rig = Rig::new(Config::avena());

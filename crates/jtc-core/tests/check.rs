@@ -21,7 +21,7 @@ fn load(rig: &mut Rig, segment: u16, segments: u16, points: &[RawPoint]) -> Data
     rig.ask(FrameType::Trajectory, &segment_body(7, segment, segments, 100, points))
 }
 
-/// Returns the cause of the last refusal: point, joint, quantity.
+/// Returns the cause of the last refusal, which consists of the point, the joint and the quantity.
 fn why(rig: &Rig) -> Option<(u32, usize, Quantity)> {
     rig.controller.violation().map(|v| (v.point, v.joint, v.quantity))
 }

@@ -125,7 +125,7 @@ fn j43_the_torque_saturates_at_its_limit_for_a_while_at_most_and_j41_holds_the_i
 
 #[test]
 fn j42_polynomial_order_and_lengths() {
-    // The wire format has the highest index first: c3, c2, c1, c0.
+    // The wire format begins with the highest index, so the order is c3, c2, c1, c0.
     let mut rig = Rig::holding();
     let four = floats((0..6).flat_map(|_| [0.0, 0.0, 0.0, 5.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &four), DataStatus::NoError);
@@ -214,7 +214,7 @@ fn j25_leaving_teaching_in_motion_comes_to_rest() {
 
 #[test]
 fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
-    // The joint of the rig moves without torque, so the torque limit must not be reached.
+    // In the rig, the joint moves without torque, so the torque must not reach its limit.
     let mut config = Config::avena();
     config.joints[1].torque_max = 360.0;
     let limits = config.joints[1];

@@ -292,7 +292,7 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     }
 }
 
-/// A hand twists the gears of a taught arm before the motors start to turn. The controller must not interpret this twist as a slipping
+/// In Teaching, a hand twists the gears before the motors start to turn. The controller must not interpret this twist as a slipping
 /// encoder.
 #[test]
 fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {

@@ -18,7 +18,7 @@ fn tables() -> [Table; 6] {
     tables
 }
 
-/// Coefficients c0, c1.. in the wire format: the highest index first.
+/// Returns the coefficients c0, c1.. in the wire format, which begins with the highest index.
 fn wire<const N: usize>(joints: &[[f64; N]; 6]) -> Vec<u8> {
     floats(joints.iter().flat_map(|c| c.iter().rev().map(|c| *c as f32)))
 }

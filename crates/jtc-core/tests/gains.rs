@@ -205,7 +205,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
         let kind = if taken_back { StopKind::Gains } else { StopKind::Push };
         assert_eq!(found(&rig), kind, "after {wait} ms");
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
-        // A position error, from which the stiffness is measured.
+        // The stiffness is measured with this position error.
         arm.push[0] = 15.0;
         arm.run(&mut rig, 20);
         let expected = if taken_back { 8000.0 } else { 4000.0 };
@@ -287,7 +287,7 @@ fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(found(&rig), StopKind::Unstable, "{causes:#x}");
     assert!(farthest < 0.09, "{farthest} rad");
-    // The softer gains hold the arm: a touch causes no lasting swing.
+    // The softer gains hold the arm, and a touch does not cause a lasting swing.
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     arm.run(&mut rig, 2_000);
     arm.push[1] = 20.0;

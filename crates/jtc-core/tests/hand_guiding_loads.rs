@@ -53,8 +53,8 @@ fn j25_j60_a_payload_that_is_given_and_taken_away_leaves_no_load() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// A payload is found in a pose in which its full load acts on a joint, and configured in the upright pose, in which it causes no load. The
-/// payload is carried only once.
+/// A payload is found in a pose in which its full load acts on a joint. The payload is then configured in the upright pose, in which it
+/// does not cause a load. The payload is carried only once.
 #[test]
 fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.3), 4_000);

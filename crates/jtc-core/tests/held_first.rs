@@ -125,7 +125,7 @@ fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     }
 }
 
-/// A hand leads the stretched arm downwards, and teaching ends. Stopping the arm needs more than the torque limit for a while.
+/// A hand leads the stretched arm downwards, and teaching ends. For some time, stopping the arm needs more torque than the limit.
 #[test]
 fn j25_leaving_teaching_in_motion_is_no_error_where_the_torque_is_at_its_limit() {
     for speed in [0.4, 0.6, 0.8] {

@@ -150,7 +150,7 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
             let speed = rig.controller.telemetry().joints[0].set_velocity;
             assert!(ms < 520 || speed == 0.0, "{ms} ms: {speed} rad/s");
         }
-        // The command that ends a jog is accepted, and does not mean that a key is still pressed.
+        // The command that ends a jog is accepted, and does not count as a pressed key.
         rig.run(400);
         assert_eq!(rig.ask(FrameType::Jog, &body(0.0)), DataStatus::NoError);
         rig.run(110);
@@ -357,7 +357,7 @@ fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     }
 }
 
-/// With any model, a joint that is marked as absent holds nothing.
+/// With any model, a joint that is marked as absent does not hold any load.
 #[test]
 fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     let pose = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];

@@ -272,8 +272,8 @@ fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
     }
 }
 
-/// Checks that the arm is held during a change of parameters: without an error, without torque above the limits, and without a step. If the
-/// change is refused, nothing may change.
+/// Checks that the arm is held during a change of parameters without an error, without torque above the limits, and without a torque step.
+/// A refused change must not have any effect.
 fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseError> {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {

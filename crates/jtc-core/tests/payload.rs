@@ -344,8 +344,8 @@ fn taught(arm: &mut Plant, rig: &mut Rig) {
     panic!("no Teaching: {:?}", rig.controller.telemetry());
 }
 
-/// If the found load of the integral has just been set as the payload or in a new model, the load is not carried twice. An arm that no hand
-/// leads keeps its position.
+/// If the found load of the integral has just been set as the payload or in a new model, the load is not carried twice. An arm that is not
+/// led by a hand keeps its position.
 #[test]
 fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     for (mass, pose) in [(2.0, 0), (2.0, 1), (2.0, 2), (2.0, 3), (4.0, 0), (4.0, 3)] {

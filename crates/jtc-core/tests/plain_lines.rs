@@ -368,7 +368,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
                 }
             }
             assert!(rig.controller.violation().is_some_and(|v| v.joint == 3), "{case}");
-            // A Stop is answered as for any trajectory that is not executed. The next upload is possible.
+            // The response to a Stop is the response for any trajectory that is not executed. The next upload is possible.
             assert_eq!(rig.exec(ExecCommand::Stop), DataStatus::IncorrectValue);
             assert_eq!(uploaded(&mut rig, &vec![rest(0); 60], segments), vec![DataStatus::NoError; segments]);
             assert_eq!(rig.controller.violation(), None);

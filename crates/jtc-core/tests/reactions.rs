@@ -110,7 +110,7 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
         rig.nodes[3].report.velocity = 0.2;
         rig.tick();
         let t = rig.controller.telemetry().joints[3];
-        // The load that the integral had found is carried as well.
+        // The joint also carries the load that the integral had found.
         assert!((t.torque - t.torque_model - t.torque_i).abs() <= most + 1.0, "{k}: {t:?}");
         assert!((t.torque - last).abs() < 0.1 * most, "{k}: from {last} to {}", t.torque);
         last = t.torque;

@@ -66,7 +66,7 @@ fn contents(blocks: &[Block]) -> (Vec<u64>, Vec<u64>) {
     (ticks, snapshots)
 }
 
-/// Returns the ticks of a replay, after checking that none differs.
+/// Returns the ticks of a replay, after a check that the replay does not differ from the log.
 fn replayed(rig: &Rig) -> Vec<u64> {
     let blocks = blocks(rig);
     let hash = rig.controller.points_hash();

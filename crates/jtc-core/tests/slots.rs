@@ -273,7 +273,7 @@ fn the_header_is_the_documented_one() {
 const CRC_OF_PYTHON: u32 = 0x26B4_110F;
 
 proptest! {
-    /// For any content of the flash, loading neither panics nor accepts an image that was not stored.
+    /// For any content of the flash, loading does not panic and does not accept an image that was not stored.
     #[test]
     fn garbage_is_no_image(words in prop::collection::vec(any::<[u8; WORD]>(), 1..20), length in 0..700u32) {
         let mut flash = Flash::new();

@@ -25,7 +25,7 @@ fn j71_the_poses_are_within_the_limits_and_apart() {
         }
         assert!(poses[..n].iter().all(|other| other != pose), "pose {n}");
     }
-    // The poses fill the range of the first joint evenly: each quarter of the range has a quarter of the poses.
+    // The poses fill the range of the first joint evenly, so each quarter of the range contains a quarter of the poses.
     let (low, high) = config.position_range(0);
     for quarter in 0..4 {
         let inside = |q: f64| ((q - low) / (high - low) * 4.0) as i32 == quarter;
@@ -103,7 +103,7 @@ fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
 }
 
 proptest! {
-    /// New gains are blended in without a step, for any earlier gains: in a millisecond a gain changes by at most 1/200 of the difference.
+    /// For any earlier gains, new gains are blended in without a step. In a millisecond, a gain changes by at most 1/200 of the difference.
     #[test]
     fn j71_gains_come_in_over_half_a_second(factors in prop::array::uniform3(0.05..1.5f64), again_ms in 0..900u16) {
         let [before, second, third] = factors.map(scaled);

@@ -30,7 +30,7 @@ pub(crate) enum ControlMode {
     Hold,
     /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration are active.
     Follow,
-    /// Like `Follow`, while the arm approaches the path. The limits of the path do not apply, because the approach begins at the measured
+    /// Mode for the approach to the path, like `Follow`. The limits of the path do not apply, because the approach begins at the measured
     /// position.
     Approach,
     /// An arm that a hand has led comes to rest and is held. This mode is like `Hold`, with additional friction and inertia at the
@@ -116,7 +116,7 @@ impl ControlLaw {
         *loads = Default::default();
     }
 
-    /// Prepares a change of the control mode among HoldPos, Operate and Teaching. The transfer is bumpless: only the torque of the model
+    /// Prepares a change of the control mode among HoldPos, Operate and Teaching. The transfer is bumpless, so only the torque of the model
     /// may step (J-44).
     pub(crate) fn change_mode(&mut self) {
         self.transfer.change_mode();
@@ -128,7 +128,7 @@ impl ControlLaw {
         self.transfer.change_model();
     }
 
-    /// Prepares a change of the model while the arm is held. The transfer is bumpless: no torque may step.
+    /// Prepares a change of the model while the arm is held. The transfer is bumpless, so no torque may step.
     pub(crate) fn change_model(&mut self) {
         // The integral contains torque that was missing in the last model, and must release this torque.
         self.payload_comes();
@@ -367,10 +367,10 @@ impl ControlLaw {
         }
         let q = nodes.positions();
         let v = nodes.velocities();
-        // J-62: a measurement is compared with the set position that was due at its time.
+        // J-62: a measurement is compared with the set position for the time of the measurement.
         let due = set.due(config);
-        // J-40: uses the measured position, and the commanded velocity and acceleration in Operate (zero elsewhere). The model torque acts
-        // at the present time, so the commanded motion since the measurement is added to the measured position.
+        // J-40: the model uses the measured position, and the commanded velocity and acceleration in Operate (zero in other states). The
+        // model torque acts at the present time, so the commanded motion since the measurement is added to the measured position.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let any_yields = self.any_yields();
         let lowering = if any_yields {

@@ -207,8 +207,8 @@ impl Motion {
         })
     }
 
-    /// Returns the torques that hold the arm at `q` (rad): gravity plus the load found, or plus the integral if that sum is larger. While
-    /// the integrals release the torque of a payload that is now in the model, returns gravity alone.
+    /// Returns the torques that hold the arm at `q` (rad). Each torque is gravity plus the found load, or gravity plus the integral if this
+    /// sum is larger. While the integrals release the torque of a payload that is now in the model, returns gravity alone.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
         if self.law.unwinds_ms > 0 {

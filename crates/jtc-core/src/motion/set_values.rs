@@ -156,7 +156,7 @@ impl SetValues {
         !self.led
     }
 
-    /// Returns `true` while the arm comes to rest after a hand has led it.
+    /// Returns `true` while the arm comes to rest after hand guiding.
     pub(crate) fn is_led(&self) -> bool {
         self.led
     }

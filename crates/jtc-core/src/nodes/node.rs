@@ -187,7 +187,7 @@ impl Node {
         }
     }
 
-    /// Returns `true` if the node is configured and enabled, and must be neither cleared nor reset. For [`Goal::Enabled`], the controller
+    /// Returns `true` if the node is configured and enabled, and no clear and no reset is requested. For [`Goal::Enabled`], the controller
     /// then does not request a change from the node.
     pub(crate) fn wants_nothing_enabled(&self) -> bool {
         self.seen & self.configured & !self.reset & !self.clear & (self.report.state == NodeState::ENABLED)

@@ -73,7 +73,7 @@ pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
 /// Bits of the first word of a tick. Bit 0 is 0 for a tick and 1 for a snapshot.
 pub(super) mod head {
     pub(crate) const STATUS_FREE: u32 = 1 << 1;
-    /// The only inputs are answers.
+    /// The tick has no inputs except answers.
     pub(crate) const QUIET: u32 = 1 << 2;
     /// Each expected node has answered in order. Words with the distances of the joints follow.
     pub(crate) const ORDERED: u32 = 1 << 3;
@@ -336,8 +336,8 @@ fn begins_upload(frame: FrameRef<'_>) -> bool {
         && Segment::parse(frame.body()).is_some_and(|segment| segment.segment == 0)
 }
 
-/// Returns `true` if the bytes of the frame are recorded. Bytes of parameters are never recorded: parameters change the arm, and the
-/// snapshot after them identifies the arm.
+/// Returns `true` if the bytes of the frame are recorded. Bytes of parameters are never recorded, because parameters change the arm and the
+/// next snapshot identifies the changed arm.
 fn has_bytes(frame: FrameRef<'_>) -> bool {
     frame.bytes.len() <= HOST_BYTES && !changes_arm(frame.frame_type)
 }

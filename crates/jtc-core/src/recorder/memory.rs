@@ -68,7 +68,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
             let numbers =
                 blocks.filter(|block| block[head::MAGIC] == MAGIC).map(|block| block[head::SEQUENCE]);
             let next = numbers.filter(|number| below.is_none_or(|below| *number < below)).max()?;
-            // The block must also be at its position. Other blocks may be left from memory of another size.
+            // The block must also be at its position. Other blocks may remain from a memory with another size.
             if self.whole(next).is_some() {
                 return Some(next);
             }

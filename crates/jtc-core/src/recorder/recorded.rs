@@ -39,7 +39,7 @@ const EMPTY_SEGMENT: &[u8] = &[0; 14];
 pub enum RecordedKind {
     /// A valid frame with its bytes.
     Frame,
-    /// A valid frame whose bytes are not in the log, because it is too long, there were too many frames, or it contains parameters.
+    /// Valid frame whose bytes are not in the log, because the frame is too long or contains parameters, or too many frames arrived.
     Unrecorded,
     /// Damaged frame with its status.
     Bad(FrameStatus),

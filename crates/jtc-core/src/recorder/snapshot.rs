@@ -121,7 +121,7 @@ bit_codec!(Dynamic {
     jogs_refused_ms,
 });
 
-/// Snapshot: the state of the controller after a tick, as recorded in a log.
+/// Snapshot of the state of the controller after a tick, as recorded in a log.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     /// Identity of the device, the arm and the trajectory.

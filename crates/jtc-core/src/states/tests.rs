@@ -65,7 +65,7 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
 
 /// Returns the conditions that are possible in a state. Some conditions need a command that the host sends and the state accepts.
 fn possible(state: ControllerState) -> Vec<Conditions> {
-    // The host is not served in Start, so all parameters are missing there.
+    // In Start, host commands are not executed, so all parameters are missing.
     let start = state == ControllerState::Start;
     let teaching = !start
         && (state == ControllerState::Teaching

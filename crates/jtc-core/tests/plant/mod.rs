@@ -19,7 +19,7 @@ const SUBSTEPS: usize = 20;
 const DT: f64 = 1e-3 / SUBSTEPS as f64;
 /// Inertia of the output side of an elastic gear, kg·m². The output side turns with the link.
 const GEAR_OUTPUT: f64 = 0.01;
-/// Damping of an elastic gear per stiffness, s: N·m·s/rad for each N·m/rad.
+/// Damping of an elastic gear divided by its stiffness, s (N·m·s/rad for each N·m/rad).
 const GEAR_DAMPING: f64 = 5e-4;
 
 /// LuGre friction of a joint (Canudas de Wit et al. 1995), with bristles that stick first and then slip along Stribeck's curve.

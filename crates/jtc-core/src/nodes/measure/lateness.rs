@@ -11,7 +11,7 @@ use crate::bit_codec::bit_codec;
 
 /// Time for which evidence is valid, ms.
 const LASTS_MS: u16 = 1_000;
-/// Ticks within which the count must return to zero.
+/// Number of ticks in which the count must return to zero at least once.
 const WINDOW: u8 = 64;
 /// Highest lateness of an answer, ticks.
 const MOST: u8 = 7;
@@ -165,7 +165,7 @@ mod tests {
         }
     }
 
-    /// Ticks that were missed make an answer later.
+    /// Missed ticks increase the lateness of an answer.
     #[test]
     fn j63_an_answer_is_as_late_as_the_ticks_were_long() {
         for long in 1..=u32::from(MOST) {

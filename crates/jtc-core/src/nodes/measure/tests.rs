@@ -191,7 +191,7 @@ fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     assert!((joint.used().velocity - 0.1).abs() < 1e-9, "{:?}", joint.used());
 }
 
-/// A missing or unusable answer leaves a difference that fades. An answer that no Move has requested is not missing.
+/// A missing or unusable answer leaves a difference that fades. If no Move has requested an answer, the answer is not missing.
 #[test]
 fn j63_only_what_was_expected_or_came_can_be_missing() {
     for (lost, jumps) in [

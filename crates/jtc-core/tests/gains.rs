@@ -205,7 +205,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
         let kind = if taken_back { StopKind::Gains } else { StopKind::Push };
         assert_eq!(found(&rig), kind, "after {wait} ms");
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
-        // The stiffness is measured with this position error.
+        // A push causes a position error, from which the stiffness is measured.
         arm.push[0] = 15.0;
         arm.run(&mut rig, 20);
         let expected = if taken_back { 8000.0 } else { 4000.0 };

@@ -1,7 +1,8 @@
-//! Prints the time of each call: lines with a name and nanoseconds, which are the minimum of many batches of calls.
+//! Prints a name and the time in nanoseconds of each call: the minimum over many batches of calls.
 //!
-//! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, where FILE has an arm and its states as lines (see `lines/mod.rs`).
-//! `references/dynamics/anchors.py --ours` creates such a file, and measures this and other implementations.
+//! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, with a FILE that contains an arm and its states (format:
+//! `lines/mod.rs`). `references/dynamics/anchors.py --ours` creates this file and measures the times of this crate and of other
+//! implementations.
 mod lines;
 
 use std::hint::black_box;
@@ -24,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let d = dynamics.ok_or("there is no model in the file")?;
-    // Runs `$call` on every state. With `black_box` every result must be computed.
+    // Runs `$call` on every state. `black_box` prevents the compiler from removing the computation of a result.
     macro_rules! time {
         ($name:literal, |$state:ident| $call:expr) => {
             let least = least_ns(BATCHES, || {

@@ -1,14 +1,15 @@
 //! The arm in the form that the recursions use: modified Denavit-Hartenberg frames and base inertial parameters.
 //!
-//! Both leave the joint torques unchanged and save multiplications in each call:
+//! These frames and parameters do not change the joint torques, but need fewer multiplications in each call:
 //!
 //! * **Frames** (modified Denavit-Hartenberg: Craig, Introduction to Robotics). Each constant rotation between joints is Rz(a)·Rx(α)·Rz(b).
-//!   Rz(b) is added to the position of the joint, and Rz(a) to the frame before, so that Rx(α)·Rz(q + offset) remains: two plane rotations.
-//!   The origin of a frame is the point of its joint axis from which the vector to the next origin is perpendicular to the axis.
+//!   Rz(b) is added to the position of the joint, and Rz(a) becomes part of the previous frame. The remaining transform Rx(α)·Rz(q +
+//!   offset) needs only two plane rotations. The origin of a frame is the point of its joint axis from which the vector to the next origin
+//!   is perpendicular to the axis.
 //! * **Base (minimal) inertial parameters** (Gautier and Khalil, Direct calculation of minimum set of inertial parameters of serial robots,
 //!   1990). The part of a link's inertia that is symmetric about its joint axis (the mass, the first and the second moment along the axis)
-//!   moves in the same way whether it rotates with the link or not. This part is added to the link before, from the wrist to the base. Each
-//!   link keeps seven parameters, which do not include a mass.
+//!   has the same motion with or without the rotation of the link. This symmetric part is added to the previous link, one link after the
+//!   other from the wrist to the base. Each link keeps seven parameters, which do not include a mass.
 
 use crate::model::{ArmModel, JOINTS, Link, Origin, symmetric};
 use crate::payload::Payload;
@@ -17,27 +18,28 @@ use crate::rotation::{
 };
 use crate::trig::{angle, sin_cos};
 
-/// Largest distance of an angle in a joint origin from a multiple of a right angle, rad, at which the angle is replaced by that multiple.
-/// Models write π/2 with six digits, and the wire format uses f32.
+/// Largest difference (rad) between an angle of a joint origin and a multiple of π/2 at which the multiple replaces the angle. Many arm
+/// models write π/2 with six digits, and the wire format uses f32.
 const RIGHT_ANGLE_TOLERANCE: f64 = 2e-6;
-/// Sine or cosine of the angle between two axes that is treated as 0. Rounding leaves such values when right angles are multiplied.
+/// Sine or cosine of the angle between two axes that is treated as 0. Products of rotations by right angles contain such values because of
+/// rounding.
 const ALIGNED: f64 = 1e-12;
 
-/// Direction of a joint's axis relative to the axis of the joint before.
+/// Direction of a joint's axis relative to the axis of the previous joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Axes {
     /// Parallel, in the same or in the opposite direction: sin α = 0.
     Parallel,
     /// At a right angle: α = π/2. The parameters are chosen so that α is never negative.
     Perpendicular,
-    /// Any other direction, which saves no multiplication.
+    /// Any other direction; the recursion then saves no multiplications.
     Any,
 }
 
-/// Directions of the joint axes of an arm. The recursion is compiled for the shapes of most arms, without multiplications by 0 and 1, and
-/// for a general shape.
+/// Directions of the joint axes of an arm. The recursion is compiled separately for the shapes of most arms, without multiplications by 0
+/// and 1, and for a general shape.
 pub(crate) trait Shape {
-    /// Directions of the axes. The first one is not used, because gravity is given after the Rx(α) of the first joint.
+    /// Directions of the axes. The first direction is not used, because gravity is already expressed after the Rx(α) of the first joint.
     const AXES: [Axes; JOINTS];
 }
 
@@ -98,30 +100,31 @@ impl KnownShape {
     }
 }
 
-/// The modified Denavit-Hartenberg transform of a joint: frame k in frame k−1 is a shift by `p`, Rx(α), Rz(q + offset).
+/// The modified Denavit-Hartenberg transform of a joint; it gives frame k in frame k−1 as a shift by `p`, followed by Rx(α) and Rz(q +
+/// offset).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointTransform {
     /// sin α, which is not negative, and cos α.
     pub sin: f64,
     pub cos: f64,
-    /// Direction of the axis in the shape of the arm.
+    /// Direction of the joint axis, from the shape of the arm.
     pub axes: Axes,
-    /// Added to the joint's position, rad.
+    /// Angle added to the joint's position, rad.
     pub offset: f64,
-    /// Origin of frame k in frame k−1, m. Its z is 0 because of the choice of the origin of frame k−1. If the axes are parallel, its y is
-    /// also 0, because of the choice of the x axis of frame k−1.
+    /// Origin of frame k in frame k−1, m. The z coordinate is 0 because of the choice of the origin of frame k−1. If the axes are parallel,
+    /// the y coordinate is also 0, because of the choice of the x axis of frame k−1.
     pub p: [f64; 2],
 }
 
-/// The base inertial parameters of a link in its own frame. Mass, first moment along z and the integral of z² are zero, because they have
-/// been added to the link before.
+/// The base inertial parameters of a link in its own frame. Mass, first moment along z and the integral of z² are zero, because these
+/// values have been added to the previous link.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BaseInertialParameters {
     /// First moment of mass: integrals of x and y over the mass, kg·m.
     pub hx: f64,
     pub hy: f64,
-    /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike moments of inertia, each of them contributes to
-    /// the torque only with the acceleration of its own axis.
+    /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike a moment of inertia, a second moment contributes
+    /// to the torque only with the acceleration along its own axis.
     pub xx: f64,
     pub yy: f64,
     pub xy: f64,
@@ -129,7 +132,7 @@ pub(crate) struct BaseInertialParameters {
     pub yz: f64,
 }
 
-/// A joint frame of the model, relative to the frame before, for kinematics.
+/// A joint frame of the model, relative to the previous frame, for kinematics.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
     pub rotation: Mat3,
@@ -154,13 +157,14 @@ impl Inertia {
         about_com.placed(&from_rpy(rpy), xyz)
     }
 
-    /// Returns the inertia of a payload in the frame of the last link. `flange`: the flange in that frame.
+    /// Returns the inertia of a payload in the frame of the last link. `flange` is the placement of the flange in the frame of the last
+    /// link.
     fn of_payload(payload: &Payload, flange: &Placement) -> Self {
         let about_com = Self { mass: payload.mass, h: [0.0; 3], j: symmetric(&payload.inertia) };
         about_com.placed(&about_z(0.0, 1.0), &payload.com).placed(&flange.rotation, &flange.xyz)
     }
 
-    /// Returns the inertia in a frame in which the present frame has the origin `p` (m) and the rotation `r`.
+    /// Returns the inertia in a frame in which the current frame has the origin `p` (m) and the rotation `r`.
     fn placed(&self, r: &Mat3, p: &[f64; 3]) -> Self {
         let h = apply(r, &self.h);
         let mut j = congruent(r, &self.j);
@@ -210,13 +214,13 @@ pub(crate) struct Chain {
     /// Negative gravity after the Rx(α) of the first joint, m/s². Gravity has the effect of an upward acceleration of the base.
     pub base_acceleration: [f64; 3],
     pub placements: [Placement; 7],
-    /// First moments (`hx`, `hy`) of a massless arm with 1 kg at the flange, kg·m.
+    /// First moments (`hx`, `hy`) of a massless arm that carries 1 kg at the flange, kg·m.
     pub flange: [[f64; 2]; JOINTS],
     pub shape: KnownShape,
 }
 
 impl Chain {
-    /// Returns the transform of a joint. The direction of its axis is a constant of the shape.
+    /// Returns the transform of a joint. The direction of the joint axis is a constant of the shape.
     #[inline(always)]
     pub(crate) fn transform<S: Shape>(&self, k: usize) -> JointTransform {
         JointTransform { axes: S::AXES[k], ..self.transforms[k] }
@@ -233,8 +237,8 @@ impl Chain {
         let mut origins = [[0.0; 3]; JOINTS];
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
-            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). If the axes are parallel, any a is valid. The
-            // direction from one axis to the other is chosen.
+            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). If the axes are parallel, any a is valid. The code
+            // uses the direction from one axis to the other.
             let parallel = c[0][2].abs().max(c[1][2].abs()) < ALIGNED;
             let [x, y, _] = placements[k].xyz;
             let (cos_a, sin_a) = if parallel { unit(x, y) } else { unit(-c[1][2], c[0][2]) };
@@ -277,7 +281,7 @@ impl Chain {
     }
 }
 
-/// Returns the rotation of a joint origin, in which right angles are exact.
+/// Returns the rotation of a joint origin, with exact right angles.
 fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
     from_sines_cosines(&rpy.map(|angle| {
         let (sin, cos) = sin_cos(angle);
@@ -291,8 +295,8 @@ fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
     }))
 }
 
-/// Returns the base inertial parameters of links with this inertia in the frames of the chain. The part that is symmetric about a joint
-/// axis is added to the link before (Gautier and Khalil 1990).
+/// Returns the base inertial parameters of links with these inertias in the frames of the chain. The part of the inertia that is symmetric
+/// about a joint axis is added to the previous link (Gautier and Khalil 1990).
 fn regroup(
     bodies: &[Inertia; JOINTS],
     transforms: &[JointTransform; JOINTS],

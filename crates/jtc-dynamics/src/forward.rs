@@ -1,7 +1,8 @@
-//! The mass matrix by the composite-rigid-body algorithm, and the forward dynamics by its LDLᵀ factors (Featherstone, Rigid Body Dynamics
-//! Algorithms, 2008, chapter 6). The bias torques are computed by recursive Newton-Euler.
+//! Mass matrix, computed by the composite-rigid-body algorithm, and forward dynamics, computed from the LDLᵀ factors of the mass matrix
+//! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 6). The bias torques are computed by recursive Newton-Euler.
 
-// Matrix elements are named by their indices, as in the formulas. Unrolled loops over triangles contain empty cases.
+// Matrix elements are named by their indices, as in the formulas. Unrolled loops over a triangle of a matrix contain index pairs for which
+// nothing is computed.
 #![allow(clippy::needless_range_loop, clippy::absurd_extreme_comparisons)]
 
 use crate::chain::{AnyShape, BaseInertialParameters, Chain, JointTransform};
@@ -12,8 +13,8 @@ use crate::unroll::unroll;
 /// A square matrix over the joints.
 pub(crate) type JointMat = [[f64; JOINTS]; JOINTS];
 
-/// A composite rigid body: a link and all links after it. It is described by first and second moments of mass about the link's origin. Base
-/// inertial parameters do not include a mass: see [`crate::chain`].
+/// A composite rigid body: a link and all links after it. The composite is described by its first and second moments of mass about the
+/// link's origin. Base inertial parameters do not include a mass: see [`crate::chain`].
 #[derive(Clone, Copy)]
 struct Composite {
     h: [f64; 3],
@@ -25,7 +26,8 @@ struct Composite {
     yz: f64,
 }
 
-/// Rotates the plane part of a symmetric matrix by (s, c). Returns its two diagonal entries and its off-diagonal entry.
+/// Rotates the 2×2 plane part of a symmetric matrix by the angle with sine `s` and cosine `c`. Returns the two diagonal entries and the
+/// off-diagonal entry of the rotated part.
 #[inline(always)]
 fn rotate_plane(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
     let w = s * (a - b) + (c + c) * ab;
@@ -72,7 +74,7 @@ impl Composite {
     }
 }
 
-/// Returns the lower triangle of the mass matrix. The upper triangle is zero.
+/// Returns the lower triangle of the mass matrix. The upper triangle of the returned matrix is zero.
 #[inline(always)]
 fn lower(chain: &Chain, trig: &JointSinesCosines) -> JointMat {
     let mut m = [[0.0; JOINTS]; JOINTS];
@@ -110,16 +112,17 @@ pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
     m
 }
 
-/// Smallest pivot, relative to its diagonal entry, that is not treated as a rounding error.
+/// Smallest ratio of a pivot to its diagonal entry that is not treated as a rounding error.
 const PIVOT_MIN: f64 = 1.0e-14;
 
-/// Solves M·x = b for a symmetric positive definite M, given by its lower triangle. A joint whose pivot is zero or a rounding error gets 0.
+/// Solves M·x = b for a symmetric positive definite M, given by its lower triangle. The result is 0 for a joint whose pivot is zero or a
+/// rounding error.
 #[inline(always)]
 fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     let mut inverse = [0.0; JOINTS];
     unroll!(K in [0, 1, 2, 3, 4, 5] {
         let floor = m[K][K] * PIVOT_MIN;
-        // The rows above are finished. m[K][I] contains L·D, and becomes L.
+        // The rows above are complete. m[K][I] contains L·D and is replaced by L.
         unroll!(I in [0, 1, 2, 3, 4] {
             if I < K {
                 let scaled = m[K][I];
@@ -135,7 +138,7 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
             }
         });
         let reciprocal = 1.0 / m[K][K];
-        // A mask is used, to avoid a branch.
+        // A bit mask avoids a branch.
         let mask = u64::from(m[K][K] > floor).wrapping_neg();
         inverse[K] = f64::from_bits(reciprocal.to_bits() & mask);
     });

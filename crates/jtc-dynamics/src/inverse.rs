@@ -1,7 +1,7 @@
 //! Inverse dynamics: recursive Newton-Euler (Luh, Walker and Paul, On-line computational scheme for mechanical
 //! manipulators, 1980) in the frames and with the base inertial parameters of [`crate::chain`].
 
-// The indices are the same as in the formulas.
+// The variables have the same indices as in the formulas.
 #![allow(clippy::needless_range_loop)]
 
 use core::array::from_fn;
@@ -55,7 +55,7 @@ fn rx_back(t: &JointTransform, v: Vec3) -> Vec3 {
     }
 }
 
-/// Returns y and z of Rx(α)ᵀ·(0, 0, `z`).
+/// Returns the y and z components of Rx(α)ᵀ·(0, 0, `z`).
 #[inline(always)]
 fn axis_back(t: &JointTransform, z: f64) -> (f64, f64) {
     match t.axes {
@@ -80,7 +80,7 @@ fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
 /// Two vectors that are rotated together.
 pub(crate) type Pair3 = [[f64; 2]; 3];
 
-/// The same component of both vectors.
+/// One component of both vectors of a pair.
 type Pair = [f64; 2];
 
 #[inline(always)]
@@ -187,7 +187,7 @@ impl BaseInertialParameters {
     fn wrench(&self, m: &Motion, [ux, uy, uz]: &AccelerationMatrix) -> Wrench {
         let b = self;
         let force = |u: &Vec3| u[0] * b.hx + u[1] * b.hy;
-        // The integral of r × (acc + U·r) over the mass.
+        // Integral of r × (acc + U·r) over the mass.
         let nx = (uz[0] * b.xy + uz[1] * b.yy + m.acc[2] * b.hy) + ((uz[2] - uy[1]) * b.yz - uy[0] * b.xz);
         let ny = ((ux[0] - uz[2]) * b.xz + ux[1] * b.yz) - (uz[0] * b.xx + uz[1] * b.xy + m.acc[2] * b.hx);
         let nz = (uy[0] * b.xx - ux[1] * b.yy) + (uy[1] - ux[0]) * b.xy + (uy[2] * b.xz - ux[2] * b.yz);
@@ -196,7 +196,7 @@ impl BaseInertialParameters {
     }
 }
 
-/// Returns a wrench on frame k, expressed in frame k−1.
+/// Transforms a wrench on frame k into frame k−1.
 #[inline(always)]
 pub(crate) fn inwards(t: &JointTransform, (s, c): (f64, f64), wrench: &Wrench) -> Wrench {
     let mut v = rx_pair(t, &rz_pair(s, c, wrench));
@@ -211,8 +211,8 @@ pub(crate) fn inwards(t: &JointTransform, (s, c): (f64, f64), wrench: &Wrench) -
     v
 }
 
-/// Returns the wrench of each link alone for the motion `qd`, `qdd`. For the first link only the moment about its axis is computed, because
-/// the base carries the rest.
+/// Returns the wrench that each link alone needs for the velocities `qd` and accelerations `qdd`. For the first link only the moment about
+/// its axis is computed, because the base supports all other components.
 #[inline(always)]
 fn wrenches<S: Shape>(
     chain: &Chain,
@@ -261,7 +261,7 @@ pub(crate) fn inverse(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec
     }
 }
 
-/// Like [`inverse`], for an arm of one shape. Each shape has its own function, so that its machine code can be inspected.
+/// Like [`inverse`], compiled for one arm shape. Each shape has its own function, so that its machine code can be inspected.
 #[inline(never)]
 fn inverse_of<S: Shape>(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
     recursion::<S>(chain, &JointSinesCosines::new(chain, q), qd, qdd)
@@ -299,7 +299,7 @@ pub(crate) fn flange_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec
     static_torque(chain, trig, |k| chain.flange[k])
 }
 
-/// Returns the joint torques at rest for bodies with these first moments (kg·m).
+/// Returns the joint torques at rest for links with the given first moments (kg·m).
 #[inline(always)]
 fn static_torque(
     chain: &Chain,

@@ -8,7 +8,7 @@ use crate::trig::{sin_cos, sqrt};
 /// A pose in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Rotation matrix, row major. Its columns are the axes of the frame, expressed in the base frame.
+    /// Rotation matrix, row major. The columns of this matrix are the axes of the frame, expressed in the base frame.
     pub rotation: [[f64; 3]; 3],
     /// Origin in the base frame, m.
     pub position: [f64; 3],
@@ -35,7 +35,7 @@ pub(crate) fn forward_kinematics(chain: &Chain, q: &JointVec) -> [Pose; 7] {
 
 /// Returns the speed of the flange, m/s, at joint velocities `qd` (rad/s).
 pub(crate) fn flange_speed(chain: &Chain, q: &JointVec, qd: &JointVec) -> f64 {
-    // Velocity of the origin and angular velocity, each expressed in the present frame.
+    // Velocity of the origin and angular velocity, each expressed in the current frame.
     let (mut v, mut w) = ([0.0; 3], [0.0; 3]);
     for (k, place) in chain.placements.iter().enumerate() {
         let [x, y, z] = place.xyz;
@@ -57,7 +57,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns the product of a row of a rotation and a rotation.
+/// Returns the product of one row of a rotation matrix and another rotation matrix.
 fn row_product(row: &[f64; 3], m: &Mat3) -> [f64; 3] {
     let column = |k: usize| row[0] * m[0][k] + row[1] * m[1][k] + row[2] * m[2][k];
     [column(0), column(1), column(2)]

@@ -24,15 +24,15 @@ pub use trig::{SIN_COS_MAX, sin_cos, sqrt};
 
 /// An arm prepared for kinematics and dynamics: values that do not depend on the joint positions are precomputed.
 ///
-/// No function fails or panics. For a NaN, an infinite argument or a position whose magnitude is above [`SIN_COS_MAX`] the results are not
-/// valid, and usually NaN.
+/// The functions of this type never return an error and never panic. For a NaN, an infinite argument or a position whose magnitude is above
+/// [`SIN_COS_MAX`] the results are not valid, and usually NaN.
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     chain: chain::Chain,
 }
 
 impl Dynamics {
-    /// Prepares `model`. `gravity`: acceleration of gravity in the base frame, m/s²; (0, 0, −9.81) for an upright arm.
+    /// Prepares `model`. `gravity` is the acceleration of gravity in the base frame, m/s²; (0, 0, −9.81) for an upright arm.
     ///
     /// The model must have passed [`ArmModel::check`], otherwise the results are not valid.
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
@@ -40,7 +40,7 @@ impl Dynamics {
     }
 
     /// Like [`Dynamics::new`], with a `payload` at the flange, as if it were a part of the last link (J-60). The payload must have passed
-    /// [`Payload::check`]. The result of [`Dynamics::flange_torque`] does not contain the payload.
+    /// [`Payload::check`]. The result of [`Dynamics::flange_torque`] does not include the payload.
     pub fn with_payload(model: &ArmModel, gravity: [f64; 3], payload: &Payload) -> Self {
         Self { chain: chain::Chain::new(model, gravity, payload) }
     }
@@ -67,35 +67,35 @@ impl Dynamics {
         inverse::gravity_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
-    /// Returns the joint torques (N·m) that hold 1 kg at the origin of the flange at rest at the positions `q` (rad), without the arm
-    /// itself. They are the gravity force multiplied by the transposed Jacobian of the flange.
+    /// Returns the joint torques (N·m) that hold 1 kg at the origin of the flange at rest at the positions `q` (rad), without the weight of
+    /// the arm itself. These torques are the gravity force on 1 kg multiplied by the transposed Jacobian of the flange.
     pub fn flange_torque(&self, q: &JointVec) -> JointVec {
         inverse::flange_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
-    /// Returns the joint-space mass matrix (kg·m²) at the positions `q` (rad). It is symmetric and does not contain the rotors
-    /// (composite-rigid-body algorithm).
+    /// Returns the joint-space mass matrix (kg·m²) at the positions `q` (rad). The mass matrix is symmetric and does not contain the rotor
+    /// inertias (composite-rigid-body algorithm).
     pub fn mass_matrix(&self, q: &JointVec) -> [[f64; JOINTS]; JOINTS] {
         forward::mass_matrix(&self.chain, q)
     }
 
-    /// Returns the inertia (kg·m²) that each joint feels at the positions `q` (rad) while all other joints are free to move. This is the
-    /// least inertia that a torque on this joint alone accelerates. `rotor` is the same as in [`Dynamics::forward`]. The value is infinite
-    /// for a joint without inertia.
+    /// Returns the inertia (kg·m²) that acts on each joint at the positions `q` (rad) while all other joints are free to move. This is the
+    /// inertia that a torque on this joint alone accelerates, and the smallest possible value. `rotor` has the same meaning as in
+    /// [`Dynamics::forward`]. The value is infinite for a joint without inertia.
     pub fn felt_inertia(&self, q: &JointVec, rotor: &JointVec) -> JointVec {
         forward::felt_inertia(&self.chain, q, rotor)
     }
 
-    /// Like [`Dynamics::felt_inertia`], for one joint, counted from 0.
+    /// Like [`Dynamics::felt_inertia`], for one joint; `joint` counts from 0.
     #[inline(never)]
     pub fn felt_inertia_of(&self, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
         forward::felt_inertia_of(&self.chain, q, rotor, joint)
     }
 
-    /// Returns the joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m). `rotor`:
-    /// inertias of the rotors about their joint axes (kg·m²), which are added to the diagonal of the mass matrix.
+    /// Returns the joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m). `rotor`
+    /// contains the inertias of the rotors about their joint axes (kg·m²), which are added to the diagonal of the mass matrix.
     ///
-    /// A joint without inertia, whose pivot is zero or a rounding error, gets the acceleration 0.
+    /// A joint without inertia, whose pivot is zero or a rounding error, has the acceleration 0.
     pub fn forward(&self, q: &JointVec, qd: &JointVec, tau: &JointVec, rotor: &JointVec) -> JointVec {
         forward::forward(&self.chain, q, qd, tau, rotor)
     }

@@ -1,4 +1,4 @@
-//! The model of an arm (joint origins, link masses and inertias), and the check that it is physical.
+//! The model of an arm (joint origins, link masses and inertias), and the check that such a body can exist.
 
 use core::fmt;
 
@@ -10,7 +10,8 @@ pub const JOINTS: usize = 6;
 /// Values of the joints, base to wrist. The unit depends on the quantity.
 pub type JointVec = [f64; JOINTS];
 
-/// A frame relative to its parent, as in URDF: a translation by `xyz` (m), followed by the rotation Rz(yaw)·Ry(pitch)·Rx(roll) (rad).
+/// A frame relative to its parent frame, as in URDF. The frame results from a translation by `xyz` (m), followed by the rotation
+/// Rz(yaw)·Ry(pitch)·Rx(roll) (rad).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Origin {
     /// Translation in the parent frame, m.
@@ -22,7 +23,7 @@ pub struct Origin {
 /// A rigid link: mass, centre of mass, and inertia about the centre of mass. The link frame is the frame of the joint that moves the link.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Link {
-    /// Centre of mass (xyz, m) and orientation of the inertia frame (rpy, rad) in the link frame.
+    /// Centre of mass (`xyz`, m) and orientation of the inertia frame (`rpy`, rad), both in the link frame.
     pub origin: Origin,
     /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass in the frame of `origin`, kg·m².
     pub inertia: [f64; 6],
@@ -33,47 +34,47 @@ pub struct Link {
 /// The arm as rule J-40 and the ArmModel frame define it. Every joint rotates about the z axis of its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ArmModel {
-    /// `joints[i]`: the frame of link i+1 in the frame of link i, at position 0 of the joint. `joints[6]`: the fixed flange in the frame of
-    /// link 6.
+    /// `joints[i]` is the frame of link i+1 in the frame of link i, at position 0 of the joint. `joints[6]` is the frame of the fixed
+    /// flange in the frame of link 6.
     pub joints: [Origin; 7],
     /// `links[0]` is the base, which does not move.
     pub links: [Link; 7],
 }
 
-/// A number of an [`ArmModel`], within a joint or a link.
+/// Position of a number in a joint or link of an [`ArmModel`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Field {
-    /// Joint origin, translation (m): x, y, z, 0..3.
+    /// Component of the translation of a joint origin (m); index 0..3 for x, y, z.
     JointXyz(usize),
-    /// Joint origin, roll, pitch, yaw (rad), 0..3.
+    /// Component of the rotation of a joint origin (rad); index 0..3 for roll, pitch, yaw.
     JointRpy(usize),
-    /// Centre of mass of a link (m): x, y, z, 0..3.
+    /// Component of the centre of mass of a link (m); index 0..3 for x, y, z.
     LinkXyz(usize),
-    /// Orientation of a link's inertia frame: roll, pitch, yaw (rad), 0..3.
+    /// Component of the orientation of a link's inertia frame (rad); index 0..3 for roll, pitch, yaw.
     LinkRpy(usize),
-    /// Inertia of a link (kg·m²): Ixx, Ixy, Ixz, Iyy, Iyz, Izz, 0..6.
+    /// Component of the inertia of a link (kg·m²); index 0..6 for Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
     Inertia(usize),
     /// Mass of a link (kg).
     Mass,
 }
 
-/// Reason why a model is not physical (J-06).
+/// Reason why an arm model is not physically possible (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ModelError {
     /// A number is NaN or infinite.
     NotFinite {
-        /// Index of the joint or link that has `field`, 0..7.
+        /// Index of the joint or link that contains `field`, 0..7.
         index: usize,
         /// The number.
         field: Field,
-        /// Its value, in the unit of `field`.
+        /// Value of the number, in the unit of `field`.
         value: f64,
     },
     /// An angle is too large to be meaningful.
     AngleTooLarge {
-        /// Index of the joint or link that has `field`, 0..7.
+        /// Index of the joint or link that contains `field`, 0..7.
         index: usize,
         /// The number.
         field: Field,
@@ -98,16 +99,16 @@ pub enum ModelError {
     InertiaNegative {
         /// Link, 0..7.
         link: usize,
-        /// The smallest principal moment, kg·m²; the limit is 0.
+        /// Smallest principal moment, kg·m²; at least 0 is required.
         moment: f64,
     },
     /// A principal moment of a link with mass is larger than the sum of the other two, which is impossible.
     InertiaTriangle {
         /// Link, 0..7.
         link: usize,
-        /// The largest principal moment, kg·m².
+        /// Largest principal moment, kg·m².
         moment: f64,
-        /// The sum of the other two moments, kg·m², which is the limit.
+        /// Sum of the other two principal moments, kg·m²; this is the limit for `moment`.
         limit: f64,
     },
 }
@@ -195,18 +196,18 @@ impl ModelError {
     }
 }
 
-/// Largest angle in a model, rad. It is far above meaningful angles, and below [`crate::SIN_COS_MAX`].
+/// Largest angle in a model, rad. This limit is far above meaningful angles and below [`crate::SIN_COS_MAX`].
 const ANGLE_MAX: f64 = 1.0e6;
 /// Tolerance of the inertia limits, relative to the largest moment, because models are rounded to f32.
 const INERTIA_TOLERANCE: f64 = 1.0e-6;
 
 impl ArmModel {
-    /// Checks that the model is physical (J-06). All numbers must be finite, no mass may be negative, and links 1 to 5 must have a mass.
-    /// The inertia of every link with mass must be that of a possible body, up to the rounding of f32.
+    /// Checks that the arm model is physically possible (J-06). All numbers must be finite, no mass may be negative, and links 1 to 5 must
+    /// have a mass. The inertia of every link with mass must be physically possible, except for f32 rounding errors.
     ///
     /// # Errors
     ///
-    /// Returns the first number that fails, joints before links. See [`ModelError`].
+    /// Returns an error with the first invalid number; joints are checked before links. See [`ModelError`].
     pub fn check(&self) -> Result<(), ModelError> {
         for (index, joint) in self.joints.iter().enumerate() {
             finite(index, &joint.xyz, Field::JointXyz)?;
@@ -242,13 +243,14 @@ impl Link {
     }
 }
 
-/// Returns the principal moments of an inertia (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) in ascending order, and the tolerance of their limits.
+/// Returns the principal moments of an inertia (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) in ascending order, and the tolerance for the check of these
+/// moments.
 pub(crate) fn principal_moments_of(inertia: &[f64; 6]) -> ([f64; 3], f64) {
     let moments = principal_moments(&symmetric(inertia));
     (moments, INERTIA_TOLERANCE * moments[2].abs().max(moments[0].abs()))
 }
 
-/// Returns the matrix of Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
+/// Returns the symmetric matrix with the elements Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
 pub(crate) fn symmetric(&[xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> Mat3 {
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
 }

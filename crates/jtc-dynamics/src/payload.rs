@@ -1,4 +1,4 @@
-//! A body that is fixed to the flange, and the arm with this body (J-60).
+//! A body that is fixed to the flange, and the inertias of an arm with this body (J-60).
 
 use core::fmt;
 
@@ -16,7 +16,7 @@ pub struct Payload {
     pub inertia: [f64; 6],
 }
 
-/// Reason why a payload is not a possible body.
+/// Reason why a payload is not physically possible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PayloadError {
@@ -38,7 +38,7 @@ pub enum PayloadError {
     InertiaTriangle {
         /// The largest principal moment, kg·m².
         moment: f64,
-        /// The sum of the other two moments, kg·m², which is the limit.
+        /// Sum of the other two principal moments, kg·m²; this is the limit for `moment`.
         limit: f64,
     },
 }
@@ -70,11 +70,11 @@ impl Payload {
     /// No payload.
     pub const NONE: Self = Self { mass: 0.0, com: [0.0; 3], inertia: [0.0; 6] };
 
-    /// Checks that the payload is a possible body (J-60), with the requirements of [`crate::ArmModel::check`] for a link.
+    /// Checks that the payload is physically possible (J-60). The requirements are those of [`crate::ArmModel::check`] for a link.
     ///
     /// # Errors
     ///
-    /// Returns the first requirement that is not met.
+    /// Returns an error with the first requirement that the payload does not meet.
     pub fn check(&self) -> Result<(), PayloadError> {
         let numbers = core::iter::once(&self.mass).chain(&self.com).chain(&self.inertia);
         if numbers.into_iter().any(|number| !number.is_finite()) {
@@ -102,14 +102,15 @@ impl Payload {
     }
 }
 
-/// The part of an arm's dynamics that depends on masses: base inertial parameters of its links (Gautier and Khalil 1990), with the payload.
-/// The parameters are linear in the masses and in the first and second moments of the bodies. Therefore an interpolation between two
-/// physical arms with the same joints is also physical.
+/// Base inertial parameters of the links of an arm (Gautier and Khalil 1990), including the payload. All mass-dependent values of the arm's
+/// dynamics are in these parameters. The parameters are linear in the masses and in the first and second moments of the bodies. Therefore
+/// an interpolation between two physical arms with the same joints is also physical.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkInertias(pub(crate) [BaseInertialParameters; JOINTS]);
 
 impl LinkInertias {
-    /// Returns the parameters as numbers, for storing them. [`from_numbers`](Self::from_numbers) restores the same inertias.
+    /// Returns the inertial parameters as plain numbers, so that they can be stored. [`from_numbers`](Self::from_numbers) restores the same
+    /// inertias.
     pub fn numbers(&self) -> [[f64; 7]; JOINTS] {
         self.0.map(|BaseInertialParameters { hx, hy, xx, yy, xy, xz, yz }| [hx, hy, xx, yy, xy, xz, yz])
     }

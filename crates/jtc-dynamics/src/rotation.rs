@@ -1,4 +1,4 @@
-//! Rotation matrices, and the principal moments of a symmetric matrix: 3×3 algebra for preparation and kinematics.
+//! Rotation matrices, and the principal moments of a symmetric matrix; the precomputation and the kinematics use this 3×3 algebra.
 
 use crate::trig::{sin_cos, sqrt};
 
@@ -10,7 +10,7 @@ pub(crate) fn from_rpy(rpy: &[f64; 3]) -> Mat3 {
     from_sines_cosines(&rpy.map(sin_cos))
 }
 
-/// Like [`from_rpy`], from sines and cosines.
+/// Like [`from_rpy`], but takes the sines and cosines of the angles.
 pub(crate) fn from_sines_cosines(&[(sr, cr), (sp, cp), (sy, cy)]: &[(f64, f64); 3]) -> Mat3 {
     [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -40,17 +40,17 @@ pub(crate) fn congruent(m: &Mat3, s: &Mat3) -> Mat3 {
     product(&product(m, s), &transpose(m))
 }
 
-/// Returns Rz(s, c) as a matrix.
+/// Returns the rotation about z with sine `s` and cosine `c` as a matrix.
 pub(crate) fn about_z(s: f64, c: f64) -> Mat3 {
     [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
 }
 
-/// Returns Rx(s, c) as a matrix.
+/// Returns the rotation about x with sine `s` and cosine `c` as a matrix.
 pub(crate) fn about_x(s: f64, c: f64) -> Mat3 {
     [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]
 }
 
-/// Returns `(x, y)` as a unit vector, or `(1, 0)` if the vector has no direction.
+/// Returns `(x, y)` as a unit vector, or `(1, 0)` if the direction of the vector is undefined.
 pub(crate) fn unit(x: f64, y: f64) -> (f64, f64) {
     let largest = x.abs().max(y.abs());
     if largest == 0.0 || !largest.is_finite() {
@@ -61,8 +61,8 @@ pub(crate) fn unit(x: f64, y: f64) -> (f64, f64) {
     (x / length, y / length)
 }
 
-/// Returns the eigenvalues of a symmetric matrix of finite numbers in ascending order (Jacobi rotations). The 8 sweeps are far more than
-/// convergence needs.
+/// Returns the eigenvalues of a symmetric matrix of finite numbers in ascending order (Jacobi rotations). The function does 8 sweeps, far
+/// more than are necessary for convergence.
 pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
     let [[mut xx, mut xy, mut xz], [_, mut yy, mut yz], [_, _, mut zz]] = *m;
     let scale = [xx, xy, xz, yy, yz, zz].iter().fold(0.0f64, |a, v| a.max(v.abs()));
@@ -81,7 +81,8 @@ pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
     [low.min(zz) * scale, low.max(high.min(zz)) * scale, high.max(zz) * scale]
 }
 
-/// Rotates in the plane of `a` and `b`, so that their product `ab` becomes zero. `ac` and `bc` rotate with the plane.
+/// Rotates in the plane of `a` and `b`, so that their off-diagonal element `ab` becomes zero. The elements `ac` and `bc` are rotated in the
+/// same way.
 fn eliminate(a: f64, b: f64, ab: f64, ac: f64, bc: f64) -> (f64, f64, f64, f64, f64) {
     let half = 0.5 * (b - a);
     let root = sqrt(half * half + ab * ab);

@@ -3,21 +3,21 @@
 //! A table contains sine and cosine of 128 directions. The values of the nearest direction are rotated by the remaining angle. This angle
 //! is at most π/128, so that short polynomials suffice.
 
-/// Number of directions in the table per turn, a power of two.
+/// Number of directions per full turn in the table; a power of two.
 const DIRECTIONS: usize = 128;
 /// Reciprocal of the angle between two directions, 1/rad.
 const PER_RAD: f64 = 20.371832715762604;
 /// The angle between two directions, π/64, in two parts. The first has 28 significant bits, so that its product with a number of
 /// steps below 2^25 is exact.
 const STEP: [f64; 2] = [0.049087385181337595, 3.100292436501689e-11];
-/// 1.5·2^52. Adding it rounds to an integer, and leaves that integer in the low bits of the sum.
+/// 1.5·2^52. Adding this constant rounds a number to an integer and leaves this integer in the low bits of the sum.
 const ROUND: f64 = 6755399441055744.0;
-/// (sin r − r)/r³ as a polynomial in r², minimax on |r| ≤ π/128 (error of sin below 3e-17).
+/// Coefficients of the minimax polynomial in r² for (sin r − r)/r³ on |r| ≤ π/128 (error of sin below 3e-17).
 const SIN: [f64; 2] = [-0.1666666666295987, 0.00833315540165295];
-/// (cos r − 1 + r²/2)/r⁴ as a polynomial in r², minimax on |r| ≤ π/128 (error of cos below 7e-20).
+/// Coefficients of the minimax polynomial in r² for (cos r − 1 + r²/2)/r⁴ on |r| ≤ π/128 (error of cos below 7e-20).
 const COS: [f64; 2] = [0.0416666666614692, -0.001388865603520279];
 
-/// Sines of the directions of the first quarter of a turn, rounded to the nearest number.
+/// Sines of the directions of the first quarter of a turn, rounded to the nearest f64.
 const QUARTER: [f64; DIRECTIONS / 4 + 1] = [
     0.0,
     0.049067674327418015,
@@ -54,7 +54,7 @@ const QUARTER: [f64; DIRECTIONS / 4 + 1] = [
     1.0,
 ];
 
-/// Sine and cosine of each direction.
+/// Sine and cosine of each direction in the table.
 static TABLE: [[f64; 2]; DIRECTIONS] = table();
 
 const fn table() -> [[f64; 2]; DIRECTIONS] {
@@ -67,7 +67,7 @@ const fn table() -> [[f64; 2]; DIRECTIONS] {
     table
 }
 
-/// Returns the sine of a direction, from the corresponding direction in the first quarter.
+/// Returns the sine of direction `k`, computed from the corresponding direction in the first quarter.
 const fn direction_sin(k: usize) -> f64 {
     let (half, quarter) = (DIRECTIONS / 2, DIRECTIONS / 4);
     let in_half = k % half;
@@ -75,34 +75,35 @@ const fn direction_sin(k: usize) -> f64 {
     if k % DIRECTIONS < half { sin } else { -sin }
 }
 
-/// Largest magnitude of an argument of [`sin_cos`], rad. Above it the result is NaN.
+/// Largest magnitude of an argument of [`sin_cos`], rad. Above this limit, both results are NaN.
 pub const SIN_COS_MAX: f64 = 1.0e9;
 
 /// Returns sine and cosine of `x` (rad).
 ///
-/// The absolute error of each is at most 2^-52 (2.3e-16) for |x| ≤ 1e6. Above that it grows to half the spacing of numbers around `x`.
-/// Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions, whatever `x` is.
+/// The absolute error of sine and cosine is at most 2^-52 (2.3e-16) for |x| ≤ 1e6. For larger |x| the error grows to half the spacing of
+/// f64 numbers around `x`. Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions, whatever
+/// `x` is.
 #[inline(always)]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * PER_RAD + ROUND;
     let [sin, cos] = TABLE[rounded.to_bits() as usize % DIRECTIONS];
-    // NaN for infinities, and if the reduction leaves no valid digits.
+    // `k` is NaN for an infinite `x`, and if the range reduction leaves no valid digits.
     let k = if x.abs() <= SIN_COS_MAX { rounded - ROUND } else { f64::NAN };
     let r = (x - k * STEP[0]) - k * STEP[1];
     let z = r * r;
-    // sin r, and cos r − 1.
+    // `s` is sin r, and `c` is cos r − 1.
     let s = r + (r * z) * (SIN[0] + z * SIN[1]);
     let c = z * (z * (COS[0] + z * COS[1]) - 0.5);
     (sin + (cos * s + sin * c), cos + (cos * c - sin * s))
 }
 
 /// Returns the square root of a finite `x` ≥ 0 by Newton's method, with a relative error of at most 2^-52. Returns 0 for a NaN, for
-/// negative numbers, and for numbers below the normal range. The function needs five divisions.
+/// negative numbers, and for numbers below the normal range. The computation needs five divisions.
 pub fn sqrt(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return 0.0;
     }
-    // Halving the exponent gives the root within 6 %. Each step squares the relative error.
+    // Halving the exponent gives a first estimate of the root with an error below 6 %. Each Newton step squares the relative error.
     let mut y = f64::from_bits((x.to_bits() >> 1) + (1023 << 51));
     for _ in 0..5 {
         y = 0.5 * (y + x / y);
@@ -110,7 +111,8 @@ pub fn sqrt(x: f64) -> f64 {
     y
 }
 
-/// Returns the angle in (−π, π] of a direction that is given by its sine and cosine. It is used for preparation, not in the tick.
+/// Returns the angle in (−π, π] of a direction that is given by its sine and cosine. The function is used for precomputation, and never in
+/// the tick.
 pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     use core::f64::consts::{FRAC_PI_2, PI};
     let mut angle = if cos >= sin.abs() {
@@ -120,7 +122,7 @@ pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     } else {
         FRAC_PI_2.copysign(sin)
     };
-    // Each step reduces the error e (at first below π/4) to e − sin e.
+    // Each step changes the error e, which is below π/4 at first, to e − sin e.
     for _ in 0..6 {
         let (s, c) = sin_cos(angle);
         angle += sin * c - cos * s;

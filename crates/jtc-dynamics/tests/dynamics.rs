@@ -52,13 +52,14 @@ fn rotation(o: &Origin) -> Mat3 {
     product(&about(2, o.rpy[2]), &product(&about(1, o.rpy[1]), &about(0, o.rpy[0])))
 }
 
-/// Returns an angle of a joint origin. An angle within 2 µrad of a multiple of a right angle is replaced by that multiple.
+/// Returns the angle that the crate uses for an angle of a joint origin. An angle within 2 µrad of a multiple of a right angle is replaced
+/// by that multiple.
 fn squared(angle: f64) -> f64 {
     let quarters = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     if (angle - quarters).abs() <= 2e-6 { quarters } else { angle }
 }
 
-/// Returns the frames of the links, directly from the definition: Trans·Rz(yaw)·Ry(pitch)·Rx(roll)·Rz(q).
+/// Computes the frames of the links directly from the definition Trans·Rz(yaw)·Ry(pitch)·Rx(roll)·Rz(q).
 fn frames(model: &ArmModel, q: &JointVec) -> Vec<(Mat3, [f64; 3])> {
     let mut at = (about(0, 0.0), [0.0; 3]);
     let mut all = Vec::new();
@@ -72,7 +73,7 @@ fn frames(model: &ArmModel, q: &JointVec) -> Vec<(Mat3, [f64; 3])> {
     all
 }
 
-/// Computes mass matrix and gravity torque from the energies alone, with Jacobians of the centres of mass in the base frame.
+/// Computes the mass matrix and the gravity torque only from the energies, with Jacobians of the centres of mass in the base frame.
 fn by_energy(model: &ArmModel, gravity: [f64; 3], q: &JointVec) -> ([JointVec; JOINTS], JointVec) {
     let frames = frames(model, q);
     let (mut mass, mut torque) = ([NONE; JOINTS], NONE);
@@ -158,7 +159,7 @@ proptest! {
         prop_assert!(close(&d.inverse(&q, &NONE, &NONE), &d.gravity_torque(&q), largest(&whole).max(1.0), 1e-13));
     }
 
-    /// The velocity torques are quadratic: doubling the velocities makes them four times as large.
+    /// The velocity torques are a quadratic function: twice the velocities cause four times the torques.
     #[test]
     fn j40_velocity_torque_is_quadratic(model in arms::model(), q in arms::vector(3.2), qd in arms::vector(3.0)) {
         let d = Dynamics::new(&model, [0.0; 3]);
@@ -166,7 +167,7 @@ proptest! {
         prop_assert!(close(&two, &one.map(|t| 4.0 * t), largest(&two), 1e-13));
     }
 
-    /// The power of the velocity torques is half the change of the mass matrix: ½·qdᵀ·Ṁ·qd.
+    /// The power of the velocity torques is ½·qdᵀ·Ṁ·qd, in which Ṁ is the time derivative of the mass matrix.
     #[test]
     fn j40_power_is_the_change_of_the_kinetic_energy(
         model in arms::model(), q in arms::vector(3.2), qd in arms::vector(2.0)
@@ -196,7 +197,8 @@ proptest! {
             t.iter_mut().zip(rotor).zip(back).for_each(|((t, r), a)| *t += r * a);
             t
         };
-        // The torques are compared, because an almost weightless wrist may turn a rounding error into an acceleration.
+        // The test compares torques instead of accelerations, because in an almost massless wrist a rounding error can cause a large
+        // acceleration.
         prop_assert!(close(&again, &torque, largest(&torque), 1e-10));
     }
 
@@ -230,8 +232,8 @@ proptest! {
     }
 }
 
-/// Values of the existing device's arm, computed by another program. In that program gravity has the opposite direction (the arm hangs),
-/// and joint 3 is 10 mm higher.
+/// Expected values for the arm of the existing device, computed by another program. In that program gravity has the opposite direction, as
+/// for a hanging arm, and joint 3 is 10 mm higher.
 #[test]
 fn j40_gravity_torque_of_the_default_arm_hanging() {
     let mut model = arms::avena();
@@ -266,7 +268,8 @@ fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     }
 }
 
-/// Compares with the inertia of all joints, and with the distance between the positions at two close times.
+/// Compares the felt inertia with the mass matrix of all joints, and the flange speed with the distance between two positions at close
+/// times.
 #[test]
 fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
     let mut random = random_from(11);
@@ -299,7 +302,7 @@ fn skew(k: usize) -> Origin {
     Origin { xyz: [0.1 + 0.02 * k, 0.2 - 0.03 * k, 0.1 * k], rpy: [0.3 + 0.2 * k, -0.4, 0.5 * k] }
 }
 
-/// Returns random numbers from 0 to 1, from a seed.
+/// Returns a generator of random numbers from 0 to 1 with the given seed.
 fn random_from(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -316,7 +319,7 @@ fn j40_rpy_turns_about_fixed_axes_x_then_y_then_z() {
     assert!(close(pose.rotation.as_flattened(), wanted.as_flattened(), 1.0, 1e-15));
 }
 
-/// π/2 and π with six digits or rounded to f32 are treated as the exact angles. Angles with a larger difference are not.
+/// π/2 and π with six digits or rounded to f32 are treated as the exact angles. An angle with a larger difference is not changed.
 #[test]
 fn j06_j40_angles_next_to_a_right_angle_are_right_angles() {
     let poses = |rpy: [f64; 3]| {
@@ -345,7 +348,7 @@ fn j40_the_flange_is_placed_by_the_seventh_joint() {
     assert!(close(&poses[6].position, &along, 1.0, 1e-15));
 }
 
-/// With the drives' rotors, the energy stays constant during a free fall of one second (RK4 at 1 ms).
+/// With rotor inertias, the energy of the arm stays constant during a free fall of one second (RK4 at 1 ms).
 #[test]
 fn j40_free_fall_keeps_the_energy() {
     let model = arms::avena();
@@ -395,7 +398,8 @@ fn j40_a_joint_without_inertia_stays_finite() {
 }
 
 proptest! {
-    /// The felt inertia is the largest inertia that can be subtracted from the joint before the arm has a motion without kinetic energy.
+    /// The felt inertia is the largest inertia that can be subtracted from the joint. If more is subtracted, the arm has a motion without
+    /// positive kinetic energy.
     #[test]
     fn j71_the_inertia_that_a_joint_feels_is_all_that_can_be_taken_from_it(
         model in arms::model(),

@@ -81,7 +81,7 @@ fn j06_a_link_without_mass_may_have_any_inertia() {
 fn j06_inertia_must_be_positive_semidefinite() {
     for link in 0..7 {
         let mut model = arms::avena();
-        // The moments are 3, 1 and −1. The product in the plane of y and z makes the last one negative.
+        // The principal moments are 3, 1 and −1. The off-diagonal element Iyz makes the last moment negative.
         model.links[link].inertia = [3.0, 0.0, 0.0, 1.0, 2.0, 1.0];
         let Err(ModelError::InertiaNegative { link: at, moment }) = model.check() else {
             panic!("link {link}")
@@ -95,7 +95,7 @@ fn j06_inertia_must_be_positive_semidefinite() {
 fn j06_inertia_must_hold_the_triangle_inequality() {
     for link in 0..7 {
         let mut model = arms::avena();
-        // The moments are 1, 1 and 3. The axis of the largest moment is not an axis of the frame.
+        // The principal moments are 1, 1 and 3. The axis of the largest moment is not an axis of the frame.
         model.links[link].inertia = [2.0, 1.0, 0.0, 2.0, 0.0, 1.0];
         let Err(ModelError::InertiaTriangle { link: at, moment, limit }) = model.check() else {
             panic!("link {link}")
@@ -126,7 +126,7 @@ fn j06_angles_without_a_meaning_are_refused() {
     );
 }
 
-/// The error contains the largest allowed angle.
+/// The error message contains the largest allowed angle.
 #[test]
 fn j06_an_angle_at_the_limit_is_accepted() {
     let mut model = arms::avena();
@@ -142,8 +142,8 @@ fn j06_an_angle_at_the_limit_is_accepted() {
     }
 }
 
-/// A body at the limit is still valid after its numbers have been rounded to f32, as in the frame. With a deviation a hundred times as
-/// large, the body is not valid. Both are true for light and heavy bodies.
+/// A body at the limit is still valid after its numbers have been rounded to f32, as in the ArmModel frame. A body with a deviation 100
+/// times as large as this rounding is not valid. The test checks light and heavy bodies.
 #[test]
 fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
     let off = f64::from(f32::EPSILON);
@@ -196,8 +196,8 @@ fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// The inertia of point masses is accepted in every orientation. It is refused if more is subtracted from a moment than the masses
-    /// provide.
+    /// The inertia of point masses is accepted in every orientation. The inertia is refused if the value subtracted from a moment is larger
+    /// than the contribution of the masses.
     #[test]
     fn j06_what_points_of_mass_make_is_accepted(
         points in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 1..6)
@@ -212,7 +212,7 @@ proptest! {
         let mut model = arms::avena();
         model.links[4].inertia = inertia;
         prop_assert_eq!(model.check(), Ok(()));
-        // The trace is twice the sum of the second moments, so this is more than any axis has.
+        // The trace is twice the sum of the second moments, so `too_much` is larger than the second moment of any axis.
         let too_much = 0.6 * (inertia[0] + inertia[3] + inertia[5]) + 1e-3;
         model.links[4].inertia[0] += too_much;
         model.links[4].inertia[3] -= too_much;

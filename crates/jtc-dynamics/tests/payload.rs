@@ -1,4 +1,4 @@
-//! A payload at the flange (J-60): comparison with the same body as a link and with energies, and impossible bodies.
+//! A payload at the flange (J-60): comparison with the same body as a link, comparison with energies, and rejection of impossible bodies.
 use crate::arms;
 
 use std::f64::consts::FRAC_PI_2;
@@ -8,13 +8,13 @@ use proptest::prelude::*;
 
 const DOWN: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// Bodies that consist of point masses, which can represent any rigid body.
+/// Random payloads that consist of point masses, which can represent any rigid body.
 fn payload() -> impl Strategy<Value = Payload> {
     let point = (0.01..2.0f64, prop::array::uniform3(-0.3..0.3f64));
     prop::collection::vec(point, 1..6).prop_map(|points| of_points(&points))
 }
 
-/// Returns mass, centre of mass, and inertia about the centre of mass, from their definitions.
+/// Computes the mass, the centre of mass and the inertia about the centre of mass from their definitions.
 fn of_points(points: &[(f64, [f64; 3])]) -> Payload {
     let mass: f64 = points.iter().map(|(m, _)| m).sum();
     let com = std::array::from_fn(|i| points.iter().map(|(m, p)| m * p[i]).sum::<f64>() / mass);
@@ -34,7 +34,7 @@ fn close(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-11 * scale)
 }
 
-/// Returns a point of the flange frame in the base frame, by forward kinematics.
+/// Transforms a point from the flange frame into the base frame by forward kinematics.
 fn point(dynamics: &Dynamics, q: &JointVec, p: [f64; 3]) -> [f64; 3] {
     let flange = dynamics.forward_kinematics(q)[6];
     std::array::from_fn(|i| flange.position[i] + (0..3).map(|k| flange.rotation[i][k] * p[k]).sum::<f64>())
@@ -63,7 +63,8 @@ fn alone(model: &ArmModel, payload: &Payload) -> ArmModel {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Torques are linear in the bodies: the sum is the torque of the arm, plus the torque of the payload on joints without mass.
+    /// Torques are linear in the masses of the bodies: the total torque is the torque of the arm, plus the torque of the payload on joints
+    /// without mass.
     #[test]
     fn j60_a_payload_adds_the_torques_of_a_link_that_it_would_be(
         model in arms::model(), payload in payload(), gravity in prop::array::uniform3(-10.0..10.0f64),
@@ -81,7 +82,7 @@ proptest! {
         prop_assert_eq!(both.flange_torque(&q), arm.flange_torque(&q));
     }
 
-    /// The potential and kinetic energy of the points of the payload are differentiated numerically.
+    /// The potential and kinetic energy of the points of the payload are computed and differentiated numerically.
     #[test]
     fn j60_a_payload_adds_the_energies_of_its_points(
         model in arms::model(), points in prop::collection::vec((0.01..2.0f64, prop::array::uniform3(-0.3..0.3f64)), 1..5),
@@ -110,7 +111,7 @@ proptest! {
         prop_assert!((half(&both) - half(&arm) - kinetic).abs() < 1e-6 * kinetic.max(1.0), "{kinetic} J");
     }
 
-    /// Between two payloads the arm is a weighted sum of both arms, which equals an arm with the weighted sum of both bodies.
+    /// An interpolation between an arm with two payloads equals the arm with the interpolated payload.
     #[test]
     fn j60_the_way_between_two_payloads_is_straight(
         model in arms::model(), a in payload(), b in payload(), share in 0.0..=1.0f64,

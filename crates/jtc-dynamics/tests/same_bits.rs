@@ -1,9 +1,10 @@
-//! Results are equal bit for bit on every processor and at every optimisation level (J-40), so that a PC can replay a board's recording.
+//! The results of the crate are equal bit for bit on every processor and at every optimisation level (J-40), so that a PC can replay a
+//! board's recording.
 use crate::arms;
 
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 
-/// Returns numbers in (−1, 1), which are the same on every machine (xorshift).
+/// Returns numbers in (−1, 1), with the same sequence on every machine (xorshift).
 fn random(state: &mut u64) -> f64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -11,7 +12,7 @@ fn random(state: &mut u64) -> f64 {
     (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// A hash of bits.
+/// A hash of the bits of results.
 struct Sum(u64);
 
 impl Sum {
@@ -24,8 +25,8 @@ impl Sum {
     }
 }
 
-/// Compares a hash of the bits of all results for 1 000 states. Fused multiply-add, another order of operations or another polynomial
-/// changes the hash. Then the number below must be updated on purpose, and old recordings can no longer be replayed.
+/// Compares a hash of the bits of all results for 1 000 arm states. Fused multiply-add, another order of operations or another polynomial
+/// changes the hash. After such a change, a developer must update the number below, and old recordings can no longer be replayed.
 #[test]
 fn j40_results_are_the_same_bits_everywhere() {
     let d = Dynamics::new(&arms::avena(), [0.0, 0.0, -9.81]);
@@ -43,7 +44,8 @@ fn j40_results_are_the_same_bits_everywhere() {
     assert_eq!(sum.0, 0x700f_d817_6e8b_cbd5, "{:#018x}", sum.0);
 }
 
-/// Like the test above, for arms with any angles. A host may upload any model, and recordings with it must be replayable as well.
+/// Like the test above, for arms with random angles. A host may upload any arm model, and recordings with that model must also be
+/// replayable.
 #[test]
 fn j40_every_arm_is_made_ready_to_the_same_bits() {
     let mut seed = 2;

@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, so that only one program must be linked. Each file here is a module of it.
+//! All tests of the crate in one test program, which shortens linking. Each file of this directory is a module of the program.
 mod arms;
 mod dynamics;
 mod model_check;

@@ -2,7 +2,7 @@
 use jtc_dynamics::{SIN_COS_MAX, sin_cos};
 use proptest::prelude::*;
 
-/// The documented bound, 2^-52.
+/// Documented error bound of the sine and cosine, 2^-52.
 const BOUND: f64 = f64::EPSILON;
 
 fn error(x: f64) -> f64 {

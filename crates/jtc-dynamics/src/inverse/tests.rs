@@ -8,7 +8,7 @@ use super::*;
 use crate::model::{ArmModel, Link, Origin};
 use crate::payload::Payload;
 
-/// Arms whose axes have the directions of a shape, with any rolls and yaws. Some neighbouring joints have the same axis.
+/// Arms whose axes have the directions of a shape, with random roll and yaw angles. Some neighbouring joints have the same axis.
 fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
     let right = || prop::sample::select(std::vec![FRAC_PI_2, -FRAC_PI_2, 1.570796, -1.5707974]);
     let straight = || prop::sample::select(std::vec![0.0, PI, -PI, 3.141592, 1e-6]);
@@ -31,7 +31,8 @@ fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
     })
 }
 
-/// Checks that the recursion for a shape gives the same values as the general one. It omits only multiplications by known zeros and ones.
+/// Checks that the recursion for a shape gives the same values as the general one. The recursion for a shape omits only multiplications by
+/// known zeros and ones.
 fn same<S: Shape>(model: &ArmModel, shape: KnownShape, q: &JointVec, qd: &JointVec, qdd: &JointVec) {
     let chain = Chain::new(model, [0.3, -0.2, -9.81], &Payload::default());
     assert_eq!(chain.shape, shape);
@@ -57,7 +58,7 @@ proptest! {
     }
 }
 
-/// Axes that are nearly parallel, nearly at a right angle, or neither.
+/// Axes that are nearly parallel, nearly at a right angle, or in another direction.
 #[test]
 fn j40_an_arm_of_another_shape_is_any() {
     for bend in [0.3, 2.1e-6, FRAC_PI_2 + 2.1e-6] {

@@ -26,7 +26,7 @@ fn triple(scale: f64) -> impl Strategy<Value = [f64; 3]> {
     prop::array::uniform3(-scale..scale)
 }
 
-/// Random angles. Many of them are equal or close to angles of real arms.
+/// Random angles. Many of the random angles are equal or close to angles of real arms.
 fn rpy() -> impl Strategy<Value = [f64; 3]> {
     use std::f64::consts::{FRAC_PI_2, PI};
     let special = prop::sample::select(vec![0.0, FRAC_PI_2, -FRAC_PI_2, PI, 1.570796, 3.141592, 1.0e-9]);
@@ -37,7 +37,7 @@ fn origin(reach: f64) -> impl Strategy<Value = Origin> {
     (prop_oneof![4 => triple(reach), 1 => Just([0.0; 3])], rpy()).prop_map(|(xyz, rpy)| Origin { xyz, rpy })
 }
 
-/// A link with the inertia of a box of random size that is partly hollow.
+/// A link with the inertia of a box of random size and with a random hollow part.
 fn link() -> impl Strategy<Value = Link> {
     (origin(0.3), prop::array::uniform3(0.02..0.5f64), 0.2..9.0f64).prop_map(|(origin, [x, y, z], mass)| {
         let (x, y, z) = (mass * x * x, mass * y * y, mass * z * z);

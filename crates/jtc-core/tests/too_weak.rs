@@ -8,7 +8,7 @@ use rig::Rig;
 
 const POSE: [f64; 6] = [0.0, 0.6, 0.0, 0.0, 0.0, 0.0];
 
-/// The torque limit of joint 2 suffices to hold the arm upright, but only for four fifths of its load in `POSE`.
+/// The torque limit of joint 2 suffices to hold the arm upright, but in `POSE` it is only 80 % of the required torque.
 fn weak() -> Config {
     let mut config = Config::avena();
     let gravity = Dynamics::new(&Parameters::avena().model, config.gravity).gravity_torque(&POSE);
@@ -51,7 +51,7 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
     }
 }
 
-/// The check that an arm can be held is done when the arm must be held, not while a hand moves it before.
+/// The controller checks that the torque limits can hold the arm when it must hold the arm, and not earlier, while a hand moves the arm.
 #[test]
 fn j06_the_model_is_judged_where_init_ends() {
     let mut rig = Rig::new(weak());

@@ -72,7 +72,8 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &vec![rest(0); 1501]), TooManyPoints);
     assert_eq!(traj(&mut rig, 1, 0, 1, 0, &p), IncorrectStepTime);
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-    // The store is filled to its last point. A further point is refused, but segment 0 of another trajectory replaces all of them.
+    // The test fills the segment store up to its last point. The controller refuses a further point, but segment 0 of another trajectory
+    // replaces all stored points.
     for s in 0..8 {
         assert_eq!(traj(&mut rig, 9, s, 9, 1, &vec![rest(0); 1500]), NoError);
     }
@@ -139,7 +140,7 @@ fn j31_first_and_last_point_are_commanded_exactly_and_the_index_counts_milliseco
     assert_eq!((t.trajectory, t.point), (TrajectoryState::Finish, 1000));
     assert_eq!(t.joints[2].set_position, rad(points[40].position[2]));
     rig.run(500);
-    // J-33: after Finish the last point is held.
+    // J-33: after Finish, the controller holds the last point.
     assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(rig.controller.telemetry().joints[2].set_position, rad(points[40].position[2]));
     assert_eq!(rig.controller.telemetry().point, 1000);
@@ -165,7 +166,7 @@ fn j33_pause_and_resume_follow_the_path() {
     let mut rig = Rig::holding();
     let points = motion(301, 10);
     rig.upload(&points, 10);
-    // The undisturbed run gives the position of joint 5 as a function of the position of joint 2.
+    // The trajectory without a pause gives the position of joint 5 as a function of the position of joint 2.
     rig.exec(ExecCommand::Execute);
     let mut path = Vec::new();
     while rig.trajectory() != TrajectoryState::Finish {
@@ -175,7 +176,7 @@ fn j33_pause_and_resume_follow_the_path() {
             path.push((t.joints[2].set_position, t.joints[5].set_position));
         }
     }
-    // Repeats the run with a pause.
+    // Executes the same trajectory again with a pause.
     let mut rig = Rig::holding();
     rig.move_along(&points, 1400);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
@@ -187,7 +188,7 @@ fn j33_pause_and_resume_follow_the_path() {
         let near = |p: &(f64, f64)| (p.0 - x).hypot(p.1 - y) < 5e-4;
         assert!(near(&path[i]) || near(&path[i - 1]), "({x}, {y}) is off the path");
         assert!(t.point >= last.point && t.point <= last.point + 1, "the index is monotone");
-        // The velocity does not step: it changes by at most the effect of 12.6 rad/s² in a tick, plus a step of the int16 grid.
+        // The velocity does not jump: in one tick it changes by at most the effect of 12.6 rad/s², plus one step of the int16 resolution.
         let dv = (t.joints[2].set_velocity - last.joints[2].set_velocity).abs();
         assert!(dv < 0.0126 + 0.0004, "step of {dv} rad/s");
     };
@@ -245,7 +246,8 @@ fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
 
 #[test]
 fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
-    // Every joint moves at 1 rad/s, from rest to rest. A ramp of 200 ms would need 7.5 rad/s², which this configuration does not allow.
+    // Every joint moves at 1 rad/s; it starts and ends at rest. A ramp of 200 ms would need 7.5 rad/s², which this configuration does not
+    // allow.
     let n = 151;
     let speed = |i: i32| (0.04 * f64::from(i.min(n - 1 - i))).min(1.0);
     let mut way = 0.0;
@@ -290,7 +292,7 @@ fn j34_commands_follow_the_table() {
             rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
         }
         if trajectory == TrajectoryState::Finish {
-            // A second run would need a closed path, so the joints are put back to the start.
+            // A second execution would need a closed path, so the test moves the joints back to the start.
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
         rig
@@ -358,7 +360,7 @@ fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
     rig.move_along(&motion(100, 10), 301);
     rig.exec(ExecCommand::Pause);
     rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
-    // A person leans on the arm, first a little and then too much.
+    // A person pushes the arm, first weakly and then too strongly.
     rig.follow = false;
     for (push, answer) in [(0.022, DataStatus::StartPositionMismatch), (-0.004, DataStatus::NoError)] {
         for _ in 0..20 {

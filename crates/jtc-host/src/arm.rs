@@ -52,29 +52,29 @@ mod urdf {
     }
 }
 
-/// File of the default arm, as delivered.
+/// File of the default arm, as delivered with the program.
 pub const AVENA_TOML: &str = include_str!("../../../arms/avena.toml");
 
 /// Selection of the arm in a robot description with more than six joints.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ArmChoice {
-    /// Names of the six moving joints, base to wrist. `None` if the description has exactly six.
+    /// Names of the six moving joints, base to wrist. `None` if the description has exactly six moving joints.
     pub joints: Option<Vec<String>>,
-    /// Flange link. Only joints on the path to this link are considered. `None` selects the frame that is fixed to the last
-    /// joint.
+    /// Flange link. Name of the last link of the arm: only joints on the path to this link are considered. `None` selects the flange, which
+    /// is fixed to the last joint.
     pub tip: Option<String>,
 }
 
-/// Arm of a robot description, and those values of the description for which an arm has no field.
+/// Arm from a robot description, with those values of the description for which [`Arm`] has no field.
 struct Described {
     arm: Arm,
-    /// Acceleration of gravity in the base frame, m/s². In the description z points upwards.
+    /// Acceleration of gravity in the base frame, m/s². In the robot description, z points upwards.
     gravity: [f64; 3],
     /// Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint.
     friction: [[f64; 2]; JOINTS],
 }
 
-/// Arm with all numbers of its file.
+/// Arm with all values of its arm file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
     /// Name of the arm.
@@ -89,22 +89,21 @@ pub struct Arm {
     pub model: ArmModel,
     /// Limits and rotor inertia, base to wrist.
     pub joints: [JointConfig; JOINTS],
-    /// For each joint, base to wrist: `true` if the file gives the rotor inertia. If not, the rotor inertia in `joints` is
-    /// 0.
+    /// For each joint, base to wrist: `true` if the file contains the rotor inertia. Otherwise the rotor inertia in `joints` is 0.
     pub rotors_given: [bool; JOINTS],
     /// Acceleration of gravity in the base frame, m/s². `None`: the controller's setting is used.
     pub gravity: Option<[f64; 3]>,
-    /// Controller settings from the `[settings]` table of the file.
+    /// Controller settings from the `[settings]` table of the arm file.
     pub others: Vec<SettingValue>,
     /// Gains.
     pub pid: Option<[PidGains; JOINTS]>,
-    /// Friction polynomial, c0..c5 ascending.
+    /// Friction polynomial, coefficients c0 to c5.
     pub polynomial: Option<[[f64; 6]; JOINTS]>,
     /// Friction tables.
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
-    /// Named joint positions, rad. Poses are not sent to a controller and are not part of a hash.
+    /// Named joint positions, rad. Poses are not sent to a controller and are not part of the hash of an arm.
     pub poses: Poses,
-    /// Values that the loader did not carry over, or filled in.
+    /// Warnings about values of the file that the loader ignored or filled in.
     pub warnings: Vec<Warning>,
     /// Source of each number.
     pub sources: Sources,
@@ -116,12 +115,12 @@ impl Arm {
         Self::from_toml(AVENA_TOML).expect("the delivered arm file is good: tests read it")
     }
 
-    /// Loads an arm from a TOML or URDF file; the content decides the format.
+    /// Loads an arm from a TOML or URDF file; the content of the file determines the format.
     ///
     /// # Errors
     ///
-    /// Returns an error with the place if the file cannot be read, its format is unknown, or its numbers do not describe an arm
-    /// of these drives.
+    /// Returns an error with the position in the file if the file cannot be read, its format is unknown, or these drives cannot move the
+    /// arm with these numbers.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| e.in_file(path))
@@ -131,7 +130,7 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error with the place if the format is unknown, or the numbers do not describe an arm of these drives.
+    /// Returns an error with the position in the text if the format is unknown, or if these drives cannot move an arm with these numbers.
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let arm = if is_xml(text) { Self::from_urdf(text)? } else { Self::from_toml(text)? };
         arm.checked()
@@ -155,12 +154,12 @@ impl Arm {
         urdf::read(text, choice).map(|described| described.arm)
     }
 
-    /// Imports an arm from a URDF file; `choice` selects the arm. Missing values are proposed by [`RULES`] and marked.
+    /// Imports an arm from a URDF file; `choice` selects the arm. The [`RULES`] propose missing values, which are marked in the arm.
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read, is not a valid URDF, does not determine the six joints, or does not describe
-    /// an arm of these drives.
+    /// Returns an error if the file cannot be read, is not a valid URDF, does not determine the six joints, or describes an arm that these
+    /// drives cannot move.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::import_text(&text, choice).map_err(|e| e.in_file(path))
@@ -185,14 +184,14 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error with the place if the file cannot be read or its format is unknown.
+    /// Returns an error with the position in the file if the file cannot be read or its format is unknown.
     pub fn load_unchecked(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let arm = if is_xml(&text) { Self::from_urdf(&text) } else { toml_form::read(&text) };
         arm.map_err(|e| e.in_file(path))
     }
 
-    /// Returns the arm, or an error if its numbers do not describe an arm of these drives.
+    /// Returns the arm, or an error if these drives cannot move an arm with these numbers.
     fn checked(self) -> Result<Self, FileError> {
         self.is_physical()?;
         Ok(self)
@@ -205,7 +204,7 @@ impl Arm {
     /// Returns an error with the first invalid number of the model or of the limits.
     pub fn is_physical(&self) -> Result<(), FileError> {
         self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
-        // J-35, J-43: rejects limits that the drives cannot keep, or at which the drives stop by themselves.
+        // J-35, J-43: rejects limits that the drives cannot respect, or at which the drives stop without a command.
         self.config().check().map_err(|e| {
             let name =
                 e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
@@ -221,20 +220,20 @@ impl Arm {
         format!("arm model, {kind} {name}")
     }
 
-    /// Returns the controller settings for this arm. Values that the arm does not give are those of the default arm, except
-    /// that an unknown rotor inertia is 0.
+    /// Returns the controller settings for this arm. Values that are missing in the arm are taken from the default arm, but an unknown
+    /// rotor inertia is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
         let mut config =
             Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default };
         for value in &self.others {
-            // An out-of-range value is skipped. The file readers reject such values.
+            // The code skips an out-of-range value. The file readers reject such values.
             let _ = settings::apply(&mut config, *value);
         }
         config
     }
 
-    /// Returns the friction compensation: the polynomial, or else the table.
+    /// Returns the friction compensation: the polynomial if the arm has one, otherwise the table.
     pub fn friction(&self) -> Option<Friction> {
         let polynomial = self.polynomial.map(Friction::Polynomial);
         polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table(**t)))
@@ -245,7 +244,7 @@ impl Arm {
         ParameterSet { friction: self.friction(), pid: self.pid, model: Some(self.model) }
     }
 
-    /// Returns the controller parameters for this arm. Values that the arm does not give are those of the default arm.
+    /// Returns the controller parameters for this arm. Values that are missing in the arm are taken from the default arm.
     pub fn parameters(&self) -> Parameters {
         let default = Parameters::avena();
         Parameters {
@@ -279,8 +278,7 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a controller setting that has no key of its own in an arm file, so that the file lists it in
-/// `[settings]`.
+/// Returns `true` for a controller setting without its own key in an arm file; the file lists such a setting in `[settings]`.
 fn has_no_key(setting: &Setting) -> bool {
     setting.of_arm() && !setting.of_joint() && !setting.name.starts_with("gravity_")
 }

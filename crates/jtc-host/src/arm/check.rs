@@ -1,5 +1,5 @@
-//! Check of an arm: it must be physical and complete, its drives must hold it, and its numbers must be within the range of
-//! the controller. The check lists all findings, not only the first.
+//! Check that an arm is physically possible and complete, that its drives can hold it, and that all values are within the range of the
+//! controller. The check lists all findings.
 
 mod borne;
 mod limits;
@@ -17,26 +17,26 @@ pub use self::stability::RotorMargins;
 use super::source::JOINT_KEYS;
 use super::{Arm, PoseError, Source};
 
-/// Finding of the check of an arm.
+/// Finding from the check of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmFinding {
-    /// Subject: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
+    /// Subject of the finding: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
     /// `unit`, `pose` or `proposed`.
     pub code: &'static str,
-    /// Severity (the controller refuses a problem), description, cause and advice.
+    /// Severity, description, cause and advice. The controller refuses an arm with a finding of the severity problem.
     #[serde(flatten)]
     pub finding: Finding,
     /// Joint, if the finding is about one joint.
     pub joint: Option<Joint>,
     /// Key in the arm file, if the finding is about one key.
     pub name: Option<&'static str>,
-    /// The value, in `unit`.
+    /// Value that was checked, in `unit`.
     pub value: Option<f64>,
     /// Limit for the value, in `unit`.
     pub limit: Option<f64>,
     /// Unit of value and limit.
     pub unit: Option<&'static str>,
-    /// Pose in which the finding holds, rad.
+    /// Pose to which the finding applies, rad.
     pub pose_rad: Option<[f64; JOINTS]>,
 }
 
@@ -75,7 +75,7 @@ pub struct Holding {
     pub joint: Joint,
     /// Greatest magnitude of the gravity torque over all positions, N·m.
     pub torque_nm: f64,
-    /// The joint's torque limit, N·m.
+    /// Torque limit of the joint, N·m.
     pub limit_nm: f64,
     /// Pose with this gravity torque, rad.
     pub pose_rad: [f64; JOINTS],
@@ -84,11 +84,11 @@ pub struct Holding {
 /// Result of the check of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Checked {
-    /// All findings, the worst first.
+    /// All findings, the most severe first.
     pub findings: Vec<ArmFinding>,
     /// Gravity torque of each joint; empty if the numbers of the arm do not allow the computation.
     pub holding: Vec<Holding>,
-    /// Tolerated factors of the rotor inertias, relative to the file; `None` if the gains are not stable or not given.
+    /// Tolerated factors of the rotor inertias, relative to the file; `None` if the gains are unstable or missing.
     pub rotor_margins: Option<RotorMargins>,
 }
 
@@ -100,7 +100,7 @@ impl Checked {
 }
 
 impl Arm {
-    /// Checks the arm. Returns all that an operator must know before the parameters are sent to a controller.
+    /// Checks the arm. Checks the arm and returns all findings that an operator must know before the parameters are sent to a controller.
     pub fn check(&self) -> Checked {
         let mut findings = Vec::new();
         self.find_limits(&mut findings);
@@ -122,7 +122,7 @@ impl Arm {
         Checked { findings, holding, rotor_margins }
     }
 
-    /// Returns `joint 2 (shoulder)`, or only the number if the joint's name is its number.
+    /// Returns `joint 2 (shoulder)`, or only the number if the joint is named by its number.
     fn titled(&self, joint: Joint) -> String {
         let name = &self.joint_names[joint.index()];
         if name.replace('_', " ") == joint.to_string() {
@@ -142,8 +142,8 @@ impl Arm {
     }
 
     fn find_model(&self, findings: &mut Vec<ArmFinding>) {
-        // The check of a model ends at the first fault. So each joint and link is checked alone, with valid values for all
-        // others.
+        // The check of a model ends at the first fault. So the code checks each joint and link separately, with valid values for all other
+        // parts.
         let good = Arm::avena().model;
         for index in 0..=JOINTS {
             let mut joint = ArmModel { links: good.links, ..good };
@@ -173,7 +173,7 @@ impl Arm {
             ModelError::NotFinite { value, .. } => ("a typing error", value, None),
             _ => ("a typing error", f64::NAN, None),
         };
-        // The text gives the number of the part; the finding gives its name.
+        // The error text contains the number of the part; the finding contains the name of the part.
         let text = error.to_string();
         let problem = text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem);
         let what = format!("{}: {problem}", self.name_of_part(error).trim_start_matches("arm model, "));
@@ -218,7 +218,7 @@ impl Arm {
         }
     }
 
-    /// Finds limits outside the range of their setting (J-53).
+    /// Finds limits outside the valid range of the controller setting (J-53).
     fn find_settings(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let config = self.config();
         for joint in Joint::ALL.into_iter().filter(|joint| !faulty.contains(joint)) {
@@ -241,8 +241,8 @@ impl Arm {
         }
     }
 
-    /// Finds gains, friction and masses that are out of bounds. Leaves out the joints in `faulty`: their friction would be
-    /// checked against invalid limits.
+    /// Finds gains, friction and masses that are out of bounds. Skips the joints in `faulty`, because the friction of these joints would be
+    /// compared with invalid limits.
     fn find_bounds(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let (set, bounds) = (self.parameter_set(), self.config().parameter_bounds);
         let beyond = |joint: Option<Joint>, name, e: OutOfBounds| {
@@ -323,7 +323,7 @@ impl Arm {
         });
     }
 
-    /// Adds a finding for each key of joints that comes from `source`.
+    /// Adds a finding for each joint key whose value comes from `source`.
     fn find_keys(
         &self,
         findings: &mut Vec<ArmFinding>,

@@ -1,4 +1,4 @@
-//! Loader for all file formats with parameters, and for directories of such files.
+//! Loader for parameter files of all formats, and for directories of parameter files.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::csv::{self, Table};
 use super::{Arm, Change, ParameterSet, Warning, is_xml};
 use crate::file::{FileError, read_text};
 
-/// Friction compensation to use if a file has both.
+/// Selection of the friction compensation if a file has a table and a polynomial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrictionChoice {
     /// The polynomial.
@@ -23,9 +23,9 @@ pub enum FrictionChoice {
 /// Parameters from files and directories.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterFile {
-    /// The whole arm, if a file describes one.
+    /// Complete arm, if one of the files describes an arm.
     pub arm: Option<Arm>,
-    /// Friction polynomial, c0..c5 ascending.
+    /// Friction polynomial, coefficients c0 to c5.
     pub polynomial: Option<[[f64; 6]; JOINTS]>,
     /// Friction tables.
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
@@ -33,9 +33,9 @@ pub struct ParameterFile {
     pub pid: Option<[PidGains; JOINTS]>,
     /// Kinematics and masses.
     pub model: Option<ArmModel>,
-    /// Files that were read, with the parameter that each file gave.
+    /// Files that were read, each with the parameter that was read from it.
     pub sources: Vec<(PathBuf, &'static str)>,
-    /// Values that the loader did not carry over, filled in or left out.
+    /// Warnings about values that the loader ignored or filled in.
     pub warnings: Vec<Warning>,
 }
 
@@ -44,14 +44,14 @@ impl ParameterFile {
     ///
     /// # Errors
     ///
-    /// Returns an error with the place if a file cannot be read or has no parameters in a known format.
+    /// Returns an error with the position if a file cannot be read or has no parameters in a known format.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         Self::load_all(std::slice::from_ref(&path.to_owned()))
     }
 
-    /// Reads files and directories together. If two contain the same parameter, the later one is used. A parameter with
-    /// one file for each joint is used only if `paths` lists all six files or their directory. So no joint gets the numbers of
-    /// another joint, and no file is read that the user did not mean.
+    /// Reads several files and directories into one set of parameters. If two files contain the same parameter, the value of the later file
+    /// is used. A parameter with one file for each joint is used only if `paths` lists all six files or their directory. This rule ensures
+    /// that no joint receives the values of another joint, and that only files intended by the user are read.
     ///
     /// # Errors
     ///
@@ -72,8 +72,8 @@ impl ParameterFile {
         Ok(all)
     }
 
-    /// Parses the text of one table. The table of a single joint is used for all six joints, so that its numbers are
-    /// checked.
+    /// Parses the text of one parameter table. The table of a single joint is copied to all six joints, so that the check covers its
+    /// values.
     #[cfg(any(test, feature = "fuzzing"))]
     pub(crate) fn parse_table(text: &str) -> Result<Self, FileError> {
         let mut all = Self::default();
@@ -215,7 +215,7 @@ fn is_arm(text: &str) -> bool {
     is_xml(text) || text.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
-/// Tables of single joints, collected until the tables of all six joints are present.
+/// Collection of single-joint tables until all six joints have a table.
 #[derive(Default)]
 struct JointTables {
     friction: PerJoint<TableOf<f32>>,
@@ -287,8 +287,7 @@ impl<T> PerJoint<T> {
     }
 }
 
-/// Splits a file name: `PidParamJoint3.csv` gives `PidParamJoint`, joint 4 and `.csv`. The numbers in these names start at
-/// 0.
+/// Splits a file name: `PidParamJoint3.csv` gives `PidParamJoint`, joint 4 and `.csv`. The joint numbers in these file names start at 0.
 fn split_name(path: &Path) -> Option<(String, Joint, String)> {
     let name = path.file_name()?.to_string_lossy().into_owned();
     let (head, tail) = name.split_once("Joint")?;

@@ -1,4 +1,4 @@
-//! Tables of numbers in the formats of existing programs: friction tables, friction polynomials, gains, arm model.
+//! Tables of numbers in the file formats of existing programs: friction tables, friction polynomials, gains, arm model.
 
 use jtc_core::{JOINTS, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
@@ -6,14 +6,14 @@ use jtc_wire::Joint;
 
 use crate::file::{FileError, Place, number, number_rows, rows};
 
-/// Parameter that a table of numbers holds.
+/// Parameter from a table of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Table {
     /// Friction table of one joint.
     Friction(Box<TableOf<f32>>),
     /// Friction tables of all joints.
     FrictionAll(Box<[TableOf<f32>; JOINTS]>),
-    /// c0..c5 of all joints.
+    /// Friction polynomials of all joints, c0 to c5.
     Polynomial([[f64; 6]; JOINTS]),
     /// Gains of one joint.
     Pid(PidGains),
@@ -138,7 +138,7 @@ fn polynomial(all: &[(usize, Vec<f64>)]) -> Result<Table, FileError> {
     let reversed = |c: &Vec<f64>| c.iter().rev().copied().collect::<Vec<f64>>();
     let wrong: Vec<usize> = (0..all.len()).filter(|i| !plausible(&all[*i].1)).collect();
     let turned = wrong.iter().filter(|i| plausible(&reversed(&all[**i].1))).count();
-    // Most rows are plausible only if they are read from right to left.
+    // Most rows are plausible only if their coefficients are read from right to left.
     if turned * 2 > all.len() {
         let (line, row) = (all[wrong[0]].0, &all[wrong[0]].1);
         let problem = format!(

@@ -1,9 +1,8 @@
-//! Differences between an arm file and the settings of a controller. Friction, gains and arm model can be sent. Limits,
-//! gravity and rotor inertia are settings of the controller.
+//! Differences between an arm file and the settings of a controller. A host can send friction, gains and the arm model to a controller.
+//! Limits, gravity and rotor inertia are settings of the controller.
 //!
-//! If a controller has other limits or another gravity than the arm file, the check of a motion does not apply to the arm
-//! that moves (J-55). A controller without extensions is assumed to use the settings of the built-in arm,
-//! [`Config::avena`].
+//! If a controller has other limits or another gravity than the arm file, the motion check with the file does not apply to the real arm
+//! (J-55). A controller without extensions is assumed to use the settings of the built-in arm, [`Config::avena`].
 
 use jtc_core::settings::{Setting, TABLE};
 use jtc_core::{Config, JointConfig};
@@ -11,7 +10,7 @@ use jtc_wire::Joint;
 
 use super::Arm;
 
-/// Relative difference up to which two values are considered equal, because a number can be written in two ways.
+/// Relative difference up to which two values are considered equal, because the same number can be written in two notations.
 const SAME: f64 = 1e-9;
 
 /// A value of the arm file that the controller does not use.
@@ -41,12 +40,12 @@ impl std::fmt::Display for Difference {
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
-/// Description of the settings that are not sent with friction, gains and arm model.
+/// Description, for messages, of the settings that are not sent with friction, gains and arm model.
 pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
 impl Arm {
-    /// Returns `true` if the arm has its own value for a setting. A URDF file cannot give gravity and rotor inertia.
+    /// Returns `true` if the arm has its own value for a setting. A URDF file cannot contain gravity and rotor inertia.
     pub(super) fn gives(&self, setting: &Setting, joint: Option<Joint>) -> bool {
         match setting.name {
             "rotor_inertia_kg_m2" => joint.is_none_or(|joint| self.rotors_given[joint.index()]),
@@ -60,8 +59,8 @@ impl Arm {
         setting.of_joint() && setting.of_arm() && self.gives(setting, Some(joint))
     }
 
-    /// Returns the settings in which this arm differs from the controller settings `device`: gravity first, then joint by
-    /// joint. The list is empty if all settings are equal.
+    /// Returns the settings in which this arm differs from the controller settings `device`; gravity is first, followed by the settings of
+    /// each joint. The list is empty if all settings are equal.
     pub fn device_differences(&self, device: &Config) -> Vec<Difference> {
         let own = self.config();
         let mut all = Vec::new();
@@ -86,16 +85,16 @@ impl Arm {
         all
     }
 
-    /// Returns the settings that are not sent with friction, gains and arm model, and that the file does not give. The
-    /// controller uses its own values, so these settings are not compared.
+    /// Returns the settings that are not sent with friction, gains and arm model, and that are missing in the file. For these settings the
+    /// controller uses its own values, so they are not compared.
     pub fn settings_not_given(&self) -> Vec<&'static str> {
         let rotors = self.rotors_given.contains(&false);
         let parts = [(self.gravity.is_none(), "gravity"), (rotors, "rotor inertia")];
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the settings for the check of a motion for a controller with the settings `device`. The tighter one of
-    /// two limits is used; gravity, payload and rotor inertia are those of the controller.
+    /// Returns the settings with which a motion is checked for a controller that uses the settings `device`. The result contains the
+    /// stricter of the two limits, and the gravity, payload and rotor inertia of the controller.
     pub fn config_on_device(&self, device: &Config) -> Config {
         let mut config = self.config();
         config.gravity = device.gravity;
@@ -147,14 +146,14 @@ mod tests {
         );
     }
 
-    /// If the arm file does not give gravity, the gravity of the controller is used.
+    /// If the arm file does not contain gravity, the gravity of the controller is used.
     #[test]
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
         assert!(arm.device_differences(&Config::avena()).is_empty());
     }
 
-    /// A URDF file cannot give a rotor inertia. The value is then unknown instead of 0, and is not reported as a
+    /// A URDF file cannot contain a rotor inertia. For such a file, the rotor inertia is unknown instead of 0, so it is not reported as a
     /// difference.
     #[test]
     fn j55_a_rotor_inertia_that_no_file_gives_is_no_difference() {
@@ -168,7 +167,8 @@ mod tests {
             urdf.config_on_device(&Config::avena()).joints[3].rotor_inertia,
             Config::avena().joints[3].rotor_inertia
         );
-        // An arm file that is written from the URDF also omits the rotor inertia. A file with the value 0 gives it.
+        // An arm file created from the URDF file also does not contain the rotor inertia. If an arm file contains the value 0, the rotor
+        // inertia is known.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);

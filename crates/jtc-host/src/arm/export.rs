@@ -1,4 +1,4 @@
-//! Arms as TOML and URDF files.
+//! Output of arms as TOML and URDF files.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use super::toml_form::FORMAT;
 use super::{Arm, RULES, Rule};
 
 fn list(values: &[f64]) -> String {
-    // `{:?}` keeps the decimal point, so that TOML reads a float.
+    // `{:?}` keeps the decimal point, so that a TOML parser reads a float.
     let cells: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();
     format!("[{}]", cells.join(", "))
 }
@@ -29,14 +29,13 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Returns the name of a frame of the description: 0 is the base, 1 to 6 are the links that joints 1 to 6 carry, 7 is the
-/// flange.
+/// Returns the name of a frame of the robot description: 0 is the base, 1 to 6 are the links that joints 1 to 6 carry, 7 is the flange.
 pub(crate) fn frame_name(i: usize) -> String {
     if i > JOINTS { "flange".into() } else { format!("link_{i}") }
 }
 
 impl Arm {
-    /// Writes the list of the proposed numbers, either of a joint or of the arm.
+    /// Writes the list of the proposed numbers, for a joint or for the whole arm.
     fn write_marks(&self, out: &mut String, joint: Option<Joint>) {
         let marked = self.sources.marked(joint);
         if !marked.is_empty() {

@@ -1,12 +1,11 @@
-//! Range of inertias in which the gains of an arm are stable in the loop of the controller (J-41, J-71).
+//! Range of inertias in which the gains of an arm are stable in the control loop (J-41, J-71).
 //!
-//! Loop of one joint: the controller reads a position. Its torque takes effect `delay_ticks` later and lasts for one tick.
-//! The derivative covers five ticks. Such a loop is stable between two inertias. Below the lower inertia the derivative is
-//! too late; above the upper inertia the integral is too strong.
+//! In the loop of one joint, the controller reads a position. The resulting torque takes effect `delay_ticks` later and lasts for one tick.
+//! The controller computes the derivative over five ticks. This control loop is stable between a lower and an upper inertia. Below the
+//! lower inertia the derivative is too slow; above the upper inertia the integral gain is too high.
 //!
-//! Coupled joints: D and U are the lower and upper inertias of the joints, and M is the mass matrix with rotors. The arm is
-//! stable if M − D and U − M are positive definite. This condition is exact if the gains of all joints have the same
-//! ratios.
+//! For coupled joints, D and U are the lower and upper inertias of the joints, and M is the mass matrix with rotors. The arm is stable if M
+//! − D and U − M are positive definite. This condition is exact if the gains of all joints have the same ratios.
 
 use std::f64::consts::PI;
 
@@ -19,28 +18,28 @@ use super::statics::{POSES, Ranges, pose};
 const DT: f64 = 1e-3;
 /// Ticks over which the controller takes the derivative (J-41).
 const WINDOW: f64 = 5.0;
-/// Steps of the search along the frequency, from [`SLOWEST`] to half of the tick rate.
+/// Steps of the frequency search, from [`SLOWEST`] to half of the tick rate.
 const STEPS: i32 = 400;
 /// Lowest frequency of the search, rad per tick.
 const SLOWEST: f64 = 1e-6;
-/// Factors of a proposed rotor inertia for which the gains must be stable until the rotor is measured. The drives of one
-/// family differ by these factors.
+/// Factors of a proposed rotor inertia for which the gains must be stable until the rotor inertia is measured. Rotor inertias within one
+/// family of drives differ by these factors.
 pub(super) const PROPOSED_RANGE: RotorMargin = RotorMargin { down: 0.2, up: 3.0 };
 /// Smallest and largest factor of the rotor inertia in the search.
 const FACTORS: (f64, f64) = (0.0, 1000.0);
 
 type Matrix = [[f64; JOINTS]; JOINTS];
 
-/// The inertias (kg·m²) between which a joint is stable under its gains.
+/// Range of inertias (kg·m²) in which a joint is stable with its gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StableInertia {
-    /// Lower limit; below this inertia the derivative is too late.
+    /// Lower limit; below this inertia the derivative is too slow.
     pub least: f64,
-    /// Upper limit; above this inertia the integral is too strong. Infinite without an integral.
+    /// Upper limit; above this inertia the integral gain is too high. The limit is infinite if the integral gain is 0.
     pub most: f64,
 }
 
-/// Factors of the rotor inertias in the file between which the arm is stable.
+/// Range of factors of the rotor inertias in the file in which the arm is stable.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RotorMargin {
     /// Lowest factor; 0 if the arm is stable even without a rotor.
@@ -52,8 +51,9 @@ pub struct RotorMargin {
 impl StableInertia {
     /// Returns the stable range. Returns `None` if the gains are not stable with any inertia, or are not finite.
     ///
-    /// θ is the frequency in rad per tick. The loop is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), and H is the control law with
-    /// its delay and half a tick of hold. At a limit of stability H is real and the loop is −1, which gives the inertia J.
+    /// In the formulas, θ is the frequency in rad per tick. The loop transfer function is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), and H is the
+    /// control law with its delay and the half tick during which a torque stays constant. At a limit of stability H is real and the loop is
+    /// −1, which gives the inertia J.
     pub(super) fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
         let turned = |theta: f64| {
             let half = 0.5 * gains.ki * DT;
@@ -100,7 +100,7 @@ pub(super) fn all_stable(gains: &[PidGains; JOINTS], delay_ticks: u8) -> Option<
     each.try_into().ok()
 }
 
-/// Returns mass matrices without rotors, in poses distributed over the ranges.
+/// Returns the mass matrices, without rotors, for poses distributed over the position ranges.
 pub(super) fn mass_matrices(model: &ArmModel, ranges: &Ranges) -> Vec<Matrix> {
     let dynamics = Dynamics::new(model, [0.0; 3]);
     (0..POSES).map(|n| dynamics.mass_matrix(&pose(n, ranges))).collect()
@@ -122,7 +122,7 @@ fn is_positive(mut a: Matrix) -> bool {
     true
 }
 
-/// Returns `true` if the mass matrix with these rotors is at least `stable` times `reserve`.
+/// Returns `true` if the mass matrix with the given rotors is at least `stable` times `reserve`.
 pub(super) fn is_heavy_enough(
     m: &Matrix,
     rotor: &JointVec,
@@ -134,7 +134,7 @@ pub(super) fn is_heavy_enough(
     is_positive(a)
 }
 
-/// Returns `true` if the mass matrix with these rotors is at most `stable` divided by `reserve`.
+/// Returns `true` if the mass matrix with the given rotors is at most `stable` divided by `reserve`.
 pub(super) fn is_light_enough(
     m: &Matrix,
     rotor: &JointVec,

@@ -3,7 +3,7 @@
 use super::*;
 use crate::arm::Arm;
 
-/// Returns the size of a joint's position error (rad) in the last third of `ticks`, divided by its size in the second third.
+/// Returns the magnitude of a joint's position error (rad) in the last third of `ticks`, divided by its size in the second third.
 fn growth(gains: &PidGains, delay: u8, inertia: f64, ticks: usize) -> f64 {
     let mut torques = vec![0.0; usize::from(delay) + 1];
     let mut errors = [0.0; 6];
@@ -49,7 +49,7 @@ fn j41_j71_a_joint_is_stable_between_two_inertias_and_nowhere_else() {
             assert_eq!(most, f64::INFINITY);
             continue;
         }
-        // Near the upper limit the oscillation grows slowly, so some hundred swings are simulated.
+        // Near the upper limit the oscillation grows slowly, so the test simulates some hundred oscillations.
         let slow = |inertia: f64| {
             let swing = std::f64::consts::TAU * (inertia / gains.kp).sqrt() / DT;
             growth(&gains, delay, inertia, ((300.0 * swing) as usize).clamp(6_000, 20_000_000))
@@ -97,8 +97,8 @@ fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     assert_eq!(rotor_margin(&[both], &[0.01; JOINTS], &stable, [true; JOINTS]), None);
 }
 
-/// For every delay, the inertia that a controller requires is 1.1 to 1.7 times the stability limit of the loop. For delays
-/// below two ticks and a strong Kp it may be down to 0.85 times the limit.
+/// For every delay, the inertia that a controller requires is 1.1 to 1.7 times the stability limit of the control loop. For delays below
+/// two ticks and a strong Kp the required inertia may be as low as 0.85 times the stability limit.
 #[test]
 fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     for delay in 0..=7u8 {
@@ -114,8 +114,8 @@ fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     }
 }
 
-/// A controller accepts the gain sets in use on their arms in 300 poses, with and without a load. The controller refuses the gains
-/// of the built-in arm times three and five.
+/// A controller accepts the gain sets of existing arms for those arms in 300 poses, with and without a load. The controller refuses three
+/// and five times the gains of the built-in arm.
 #[test]
 fn j71_the_gains_in_use_are_taken_in_all_poses_with_all_loads() {
     let plain = include_str!("../../tests/sessions/plain.urdf");

@@ -1,4 +1,5 @@
-//! Image of an arm in a controller with extensions (J-54), its hash (J-52), and its differences from a file (J-55).
+//! Image of an arm in a controller with extensions (J-54), hash of this image (J-52), and differences between the image and an arm file
+//! (J-55).
 
 use jtc_core::settings::{self, SettingError};
 use jtc_core::{Config, Friction, JOINTS, PidGains, TableOf};
@@ -22,17 +23,17 @@ pub enum ImageError {
 }
 
 impl Arm {
-    /// Returns the values of all settings of a controller with this arm, in the order of the settings table. Values that
-    /// the arm does not give are those of the built-in arm.
+    /// Returns the values of all settings of a controller with this arm, in the order of the settings table. Values that are missing in the
+    /// arm are taken from the built-in arm.
     pub fn settings(&self) -> Vec<SettingValue> {
         settings::values(&self.config(), 0, true).collect()
     }
 
-    /// Returns the image of a controller that uses this arm; `None` if gains or friction are missing.
+    /// Returns the image that a controller with this arm has; `None` if gains or friction are missing.
     ///
     /// # Errors
     ///
-    /// Returns an error for a number that does not fit into its frame.
+    /// Returns an error for a number that is out of range for its CAN frame.
     pub fn image(&self) -> Result<Option<Vec<u8>>, EncodeError> {
         let (Some(pid), Some(friction)) = (&self.pid, self.friction()) else { return Ok(None) };
         let settings = self.settings();
@@ -52,7 +53,7 @@ impl Arm {
         Ok(Some(bytes))
     }
 
-    /// Returns the hash of a controller that uses this arm; `None` if gains or friction are missing.
+    /// Returns the hash that a controller with this arm has; `None` if gains or friction are missing.
     ///
     /// # Errors
     ///
@@ -88,8 +89,8 @@ impl Arm {
         })
     }
 
-    /// Returns the differences between this arm and the arm of a controller, value by value. Skips values that the file
-    /// does not give.
+    /// Returns the differences between this arm and the arm of a controllerfor each value. Values that are missing in the arm file are
+    /// skipped.
     pub fn differences(&self, device: &Self) -> Vec<Difference> {
         let mut all = Vec::new();
         let mut compare = |name: String, joint, file: f64, device: f64, unit| {
@@ -126,7 +127,7 @@ impl Arm {
         compare: &mut impl FnMut(String, Option<Joint>, f64, f64, &'static str),
     ) {
         let has = device.friction();
-        // A file may have both forms of friction; the comparison uses the form of the device.
+        // A file may contain a friction table and a friction polynomial; the comparison uses the form that the controller uses.
         let own = match has {
             Some(Friction::Table(_)) => self.table.as_ref().map(|t| Friction::Table(**t)).or(self.friction()),
             _ => self.friction(),
@@ -145,7 +146,7 @@ impl Arm {
                         let torque = t.torque.into_iter().flatten();
                         t.velocity.into_iter().chain(t.temperature).chain(torque).collect::<Vec<_>>()
                     };
-                    // Only the first difference between the 440 numbers of two tables is listed.
+                    // The list contains only the first of the differences between the 440 numbers of two friction tables.
                     let pairs = numbers(own).into_iter().zip(numbers(has));
                     if let Some((own, has)) = pairs.clone().find(|(own, has)| own != has) {
                         let count = pairs.filter(|(own, has)| own != has).count();
@@ -154,7 +155,7 @@ impl Arm {
                     }
                 }
             }
-            // A polynomial is compared with a table.
+            // The file has a polynomial and the controller has a table, or the reverse.
             (Some(own), Some(has)) => {
                 let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
                 compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");
@@ -164,7 +165,7 @@ impl Arm {
     }
 }
 
-/// Returns the settings that differ from the built-in arm and have no key of their own in an arm file.
+/// Returns the settings that differ from the built-in arm and do not have their own key in an arm file.
 fn others(config: &Config) -> Vec<SettingValue> {
     let built_in = Config::avena();
     let built_in = settings::values(&built_in, 0, true);
@@ -249,7 +250,7 @@ mod tests {
         assert!(arm.differences(&again).is_empty(), "{:?}", arm.differences(&again));
         assert_eq!(again.image().unwrap().as_deref(), Some(&image[..]));
         assert_eq!(again.name, "avena");
-        // The image also survives a round trip through the arm file.
+        // The image is also unchanged after the arm is written to a file and read again.
         let file = Arm::from_toml(&again.to_toml()).unwrap();
         assert_eq!(file.image().unwrap().as_deref(), Some(&image[..]));
         let table = Arm { polynomial: None, ..arm.clone() };
@@ -258,7 +259,7 @@ mod tests {
         assert_eq!(Arm { pid: None, ..arm }.image(), Ok(None));
     }
 
-    /// Settings that have no key in the joints are written to a table of the file.
+    /// Controller settings without a key in the joint tables are written to the `[settings]` table of the arm file.
     #[test]
     fn j53_settings_of_the_controller_travel_with_the_file() {
         let text =
@@ -306,7 +307,7 @@ mod tests {
             ("friction_polynomial.c2", Some(2)),
         ];
         assert_eq!(names, expected.map(|(name, joint)| (name.to_owned(), joint)));
-        // Values that a file does not give cause no difference.
+        // Values that are missing in a file are not reported as differences.
         let open = Arm { gravity: None, pid: None, polynomial: None, table: None, ..arm.clone() };
         other.joints[2] = arm.joints[2];
         other.model = arm.model;

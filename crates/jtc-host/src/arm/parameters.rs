@@ -5,7 +5,7 @@ use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 use jtc_wire::Joint;
 
-/// Parameters to send. A part that is `None` is not sent.
+/// Parameters to send. Set of parameters for a controller. A parameter that is `None` is not sent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
     /// Friction compensation.
@@ -20,7 +20,7 @@ pub struct ParameterSet {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParameterError {
-    /// A number that does not fit into its frame.
+    /// A number is out of range for its CAN frame.
     #[error("{what} of {joint}: {value} does not fit into a 32-bit float")]
     NotFinite {
         /// Name of the number.
@@ -47,14 +47,14 @@ pub enum ParameterError {
         joint: Joint,
         /// "velocity" or "temperature".
         axis: &'static str,
-        /// Position of the second value on the axis, from 1.
+        /// Position, counted from 1, of the value that is not larger than the value before it.
         place: usize,
-        /// Value before that position.
+        /// Value before position `place`.
         before: f32,
-        /// Value at that position.
+        /// Value at position `place`.
         after: f32,
     },
-    /// The arm model is not physical.
+    /// The arm model is not physically possible.
     #[error("arm model: {0}")]
     Model(jtc_dynamics::ModelError),
 }
@@ -64,7 +64,7 @@ pub enum ParameterError {
 pub struct Beyond {
     /// Joint; `None` for a parameter of the arm model.
     pub joint: Option<Joint>,
-    /// Parameter, value and bounds.
+    /// Parameter that is out of bounds, with its value and bounds.
     pub bounds: OutOfBounds,
 }
 
@@ -90,12 +90,12 @@ impl Diagnose for ParameterError {
 }
 
 impl ParameterSet {
-    /// Returns `true` if the set is empty.
+    /// Returns `true` if the set contains no parameter.
     pub fn is_empty(&self) -> bool {
         self.friction.is_none() && self.pid.is_none() && self.model.is_none()
     }
 
-    /// Returns the missing parameters that a controller needs before it powers an arm.
+    /// Returns the missing parameters that a controller needs before it enables an arm.
     pub fn missing(&self) -> Vec<&'static str> {
         let parts = [
             (self.friction.is_none(), "friction"),
@@ -105,8 +105,8 @@ impl ParameterSet {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the first parameter out of the bounds of a controller with these settings (J-06). Used for the message after
-    /// a refusal.
+    /// Returns the first parameter that is out of the bounds of a controller with these settings (J-06). The result is used for the error
+    /// message after a controller refused the parameters.
     pub fn beyond(&self, config: &Config) -> Option<Beyond> {
         let bounds = &config.parameter_bounds;
         let joints = Joint::ALL.into_iter().zip(&config.joints);
@@ -135,8 +135,8 @@ impl ParameterSet {
     ///
     /// # Errors
     ///
-    /// Returns an error with the first number that does not fit into its frame, contradicts another number, or is not
-    /// physical.
+    /// Returns an error with the first number that is out of range for its CAN frame, contradicts another number, or is not physically
+    /// possible.
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {
             Some(Friction::Polynomial(c)) => {
@@ -166,7 +166,7 @@ fn finite(what: &'static str, joint: Joint, value: f64) -> Result<(), ParameterE
     if (value as f32).is_finite() { Ok(()) } else { Err(ParameterError::NotFinite { what, joint, value }) }
 }
 
-/// Checks that both axes increase and that all numbers fit into their frames.
+/// Checks that the values of both table axes increase and that all numbers fit into their CAN frames.
 pub(super) fn check_table(j: Joint, t: &TableOf<f32>) -> Result<(), ParameterError> {
     for (axis, values) in [("velocity", &t.velocity), ("temperature", &t.temperature)] {
         values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;

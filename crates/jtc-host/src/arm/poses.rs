@@ -1,7 +1,7 @@
 //! Named joint positions of an arm, in the `[poses]` table of its file.
 //!
-//! A pose is a name and six positions (rad, base to wrist). Poses are not sent to a controller and are not part of the arm's
-//! hash. [`save_pose`] and [`remove_pose`] change only that table: the rest of the file keeps its text, including comments.
+//! A pose consists of a name and six joint positions (rad, base to wrist). Poses are not sent to a controller and are not part of the arm's
+//! hash. [`save_pose`] and [`remove_pose`] change only this table; all other text of the file, including comments, stays the same.
 
 mod error;
 
@@ -23,10 +23,10 @@ pub type Poses = BTreeMap<String, [f64; JOINTS]>;
 
 /// Maximum length of a pose's name, characters.
 const NAME_MAX: usize = 64;
-/// Similarity at which a name is suggested as the correct spelling of another name.
+/// Similarity at which a name is suggested instead of a misspelled name.
 const ALIKE: f64 = 0.7;
-/// Saved positions have a resolution of 1e-6 rad, which is a micrometre at the end of a one-metre arm. Encoders have no
-/// finer resolution.
+/// Decimal factor for saved positions: the resolution is 1e-6 rad, which is one micrometre at the end of an arm of one metre. The
+/// resolution of the encoders is not finer.
 const DECIMALS: f64 = 1e6;
 
 impl Arm {
@@ -49,7 +49,7 @@ impl Arm {
         self.at_pose(name, position).map(|()| *position)
     }
 
-    /// Checks that a position (rad) is within the arm's limits. `name` is used in the error.
+    /// Checks that a position (rad) is within the arm's limits. The error contains `name`.
     ///
     /// # Errors
     ///
@@ -63,7 +63,7 @@ impl Arm {
         }
     }
 
-    /// Returns the first joint that is outside its range at this position, and that range, rad.
+    /// Returns the first joint that is outside its position range, with the range (rad).
     pub(crate) fn outside(&self, position: &[f64; JOINTS]) -> Option<(Joint, f64, f64)> {
         let config = self.config();
         Joint::ALL.into_iter().find_map(|joint| {
@@ -73,8 +73,8 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a valid name of a pose. Such a name can be used in an option next to lists of numbers, and in a cell
-/// of a waypoint file.
+/// Returns `true` for a valid name of a pose. A valid name can be used in an option that also accepts lists of numbers, and in a cell of a
+/// waypoint file.
 pub fn is_pose_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
@@ -82,7 +82,7 @@ pub fn is_pose_name(name: &str) -> bool {
         && name.parse::<f64>().is_err()
 }
 
-/// Reads the poses from the table of a file.
+/// Reads the poses from the `[poses]` table of an arm file.
 pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileError> {
     let pose = |(name, values): (&String, &Vec<f64>)| {
         let wrong = |problem: String| FileError::at(Place::name(format!("poses, {}", short(name))), problem);
@@ -100,7 +100,7 @@ pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileErro
     given.iter().map(pose).collect()
 }
 
-/// Formats a key of a table for a TOML file.
+/// Formats a table key for a TOML file.
 pub(super) fn key(name: &str) -> String {
     toml_edit::Key::new(name).display_repr().into_owned()
 }
@@ -121,7 +121,7 @@ pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool)
             return Err(PoseError::Exists { path: path.to_owned(), name: name.into() });
         }
         match table.get_mut(name).and_then(Item::as_value_mut) {
-            // The text before and after the value is kept.
+            // The text before and after the value stays the same.
             Some(value) => {
                 let around = value.decor().clone();
                 *value = Value::Array(Array::from_iter(rounded));
@@ -151,7 +151,8 @@ pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
     })
 }
 
-/// Applies one change both to the table of poses in a file and to the arm of that file. Both must then have the same poses.
+/// Applies one change to the `[poses]` table of a file and to the arm read from that file. After the change, the table and the arm must
+/// have the same poses.
 fn edit(
     path: &Path,
     change: impl FnOnce(&mut dyn toml_edit::TableLike, &mut Arm) -> Result<(), PoseError>,
@@ -178,8 +179,8 @@ fn edit(
     Ok(())
 }
 
-/// Restores the byte order mark and the line ends of the old text in a changed text, because the TOML library does not keep
-/// them. Lines before and after the change keep their line ends. The lines between them get the line end of the first line.
+/// Restores the byte order mark and the line endings of the old text in the changed text, because the TOML library does not keep them.
+/// Lines before and after the changed part keep their line endings. Changed lines receive the line ending of the first line of the file.
 fn as_it_was(changed: &str, before: &str) -> String {
     const MARK: char = '\u{feff}';
     let (lines, old): (Vec<&str>, Vec<&str>) = (
@@ -197,7 +198,7 @@ fn as_it_was(changed: &str, before: &str) -> String {
         _ => (*line).to_owned(),
     };
     let mark = before.starts_with(MARK).then(|| MARK.to_string());
-    // The old last line may have had no line end.
+    // The old last line may not have had a line ending.
     let kept = |(new, old): (&&str, &&str)| if old.ends_with('\n') { (*old).to_owned() } else { fresh(new) };
     let (first, last) = (lines.iter().zip(&old).take(head).map(kept), old.len() - tail);
     let between = lines[head..lines.len() - tail].iter().map(fresh);
@@ -224,7 +225,7 @@ mod tests {
         (dir, path)
     }
 
-    /// The first pose creates the table, each later change touches one line, and removing all poses restores the arm.
+    /// The first pose creates the table, each later change affects one line, and removing all poses restores the arm.
     #[test]
     fn the_rest_of_the_file_stays_as_it_is() {
         let (_dir, path) = file(AVENA_TOML);
@@ -250,8 +251,8 @@ mod tests {
         assert_eq!(Arm::load(&path).unwrap(), Arm::avena());
     }
 
-    /// The byte order mark and the line ends are kept, even mixed ones. After the pose is removed, the file has its
-    /// original bytes.
+    /// The byte order mark and the line endings stay the same, even if the file contains mixed line endings. After the pose is removed, the
+    /// file has its original bytes.
     #[test]
     fn every_byte_of_the_rest_stays() {
         let with_home = format!("{AVENA_TOML}\n[poses]\nhome = [0, 0, 0, 0, 0, 0]\n# the end\n");

@@ -1,26 +1,26 @@
-//! Source of each number of an arm: its file, a proposal of `jtc arm import`, a default, or no source.
+//! Source of each number of an arm: the arm file, a proposal of `jtc arm import`, a default, or no source for a missing number.
 
 use std::collections::BTreeSet;
 
 use jtc_wire::Joint;
 use serde::Serialize;
 
-/// Source of a number.
+/// Source of a number of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// The file gives the number.
+    /// The arm file contains the number.
     File,
-    /// The file gives the number and marks it as a starting value, which was neither measured nor taken from a data sheet.
+    /// The arm file contains the number and marks it as a starting value, which was neither measured nor taken from a data sheet.
     Proposed,
-    /// The file does not give the number, and a default is used.
+    /// The arm file does not contain the number, and a default is used.
     Default,
-    /// The file does not give the number, and it has no default.
+    /// The arm file does not contain the number, and no default exists.
     Missing,
 }
 
 impl Source {
-    /// Returns the name, as in JSON.
+    /// Returns the name of the source, as used in JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::File => "file",
@@ -34,9 +34,9 @@ impl Source {
 /// Key of a joint or of the arm in an arm file.
 pub type Key = (Option<Joint>, &'static str);
 
-/// Keys of the arm that can be proposed.
+/// Keys of the arm for which a value can be proposed.
 pub(super) const ARM_KEYS: [&str; 1] = ["gravity_m_s2"];
-/// Keys of a joint that can be proposed, in the order of the file.
+/// Keys of a joint for which a value can be proposed, in the order of the arm file.
 pub(super) const JOINT_KEYS: [&str; 10] = [
     "position_min_rad",
     "position_max_rad",
@@ -58,7 +58,7 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Returns the keys that the file marks as proposals: first those of the arm, then joint by joint.
+    /// Returns the keys that the file marks as proposals: first the keys of the arm, then the keys of each joint.
     pub fn proposed(&self) -> impl Iterator<Item = Key> + '_ {
         self.proposed.iter().copied()
     }
@@ -85,7 +85,7 @@ impl Sources {
         self.defaults.insert(key);
     }
 
-    /// Returns the marked keys of a joint or of the arm, in the order of the file.
+    /// Returns the marked keys of a joint or of the arm, in the order of the arm file.
     pub(super) fn marked(&self, joint: Option<Joint>) -> Vec<&'static str> {
         let keys: &[&str] = if joint.is_some() { &JOINT_KEYS } else { &ARM_KEYS };
         keys.iter().copied().filter(|key| self.proposed.contains(&(joint, key))).collect()

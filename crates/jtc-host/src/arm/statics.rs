@@ -9,9 +9,9 @@ pub(super) type Ranges = [(f64, f64); JOINTS];
 
 /// Number of start poses of the search for the greatest torque.
 const STARTS: usize = 24;
-/// Maximum number of rounds over all joints in one search. A search usually ends after three.
+/// Maximum number of rounds over all joints in one search. A search usually ends after three rounds.
 const ROUNDS: usize = 12;
-/// Number of poses in which inertia is computed.
+/// Number of poses for which the inertia is computed.
 pub(super) const POSES: usize = 512;
 /// Relative increase of the torque below which the search treats two torques as equal.
 const GAIN: f64 = 1e-9;
@@ -46,8 +46,8 @@ pub(super) fn pose(n: usize, ranges: &Ranges) -> JointVec {
     })
 }
 
-/// Returns the x in a range at which a + b·cos x + c·sin x is greatest. `values` are the values at `at` and a third of a
-/// turn to either side.
+/// Returns the angle x in a range at which the function a + b·cos x + c·sin x is greatest. `values` are the function values at `at` and at
+/// a third of a turn in each direction.
 fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
     let third = std::f64::consts::TAU / 3.0;
     let angles = [at, at + third, at - third];
@@ -61,10 +61,10 @@ fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
     ends.max_by(|x, y| height(*x).total_cmp(&height(*y))).unwrap_or(low)
 }
 
-/// Returns the greatest gravity torque of each joint over the ranges.
+/// Returns the greatest gravity torque of each joint over the position ranges.
 ///
-/// As a function of one position each torque is a sine with an offset, so its maximum has a closed form. Each search goes
-/// from joint to joint until no position increases the torque. The searches start from many poses.
+/// As a function of one joint position, each torque is a sine with an offset, so a formula gives its maximum. Each search optimises one
+/// joint after the other until no change of a position increases the torque. The searches start from many poses.
 pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges) -> [Worst; JOINTS] {
     let dynamics = Dynamics::new(model, gravity);
     let third = std::f64::consts::TAU / 3.0;
@@ -99,8 +99,7 @@ pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges
     })
 }
 
-/// Returns the pose after setting each position that does not change the torque to 0, or to the value nearest to 0 in its
-/// range.
+/// Returns the pose in which each position that does not affect the torque is 0, or the value nearest to 0 in its range.
 fn plain(
     q: &JointVec,
     sign: f64,
@@ -128,7 +127,7 @@ fn with(q: &JointVec, joint: usize, position: f64) -> JointVec {
     q
 }
 
-/// Returns the least and greatest inertia of each joint with its rotor, over poses distributed over the ranges.
+/// Returns the least and greatest inertia of each joint with its rotorfor poses distributed over the position ranges.
 pub(super) fn inertia(model: &ArmModel, rotor: &JointVec, ranges: &Ranges) -> [Inertia; JOINTS] {
     let dynamics = Dynamics::new(model, [0.0; 3]);
     let mut all = [Inertia { least: f64::INFINITY, most: 0.0 }; JOINTS];
@@ -158,7 +157,7 @@ mod tests {
         arm.joints.map(|j| (j.position_min, j.position_max))
     }
 
-    /// Compares with a search on a grid of all positions that change the torque.
+    /// Compares the greatest torque with the torques on a grid of all positions that affect the torque.
     #[test]
     fn the_greatest_gravity_torque_is_no_less_than_any_on_a_grid() {
         let arm = Arm::avena();

@@ -1,4 +1,4 @@
-//! TOML format of an arm.
+//! TOML format of an arm file.
 
 use std::collections::BTreeMap;
 
@@ -21,10 +21,10 @@ use super::source::{ARM_KEYS, JOINT_KEYS};
 use super::{Arm, Change, Source, Sources, Warning};
 use crate::file::{FileError, Place, short};
 
-/// Format number of the arm files that this program reads. Older files have no number and are read in the same way.
+/// Format number of the arm files that this program reads. Older files do not contain a format number and are read in the same way.
 pub(super) const FORMAT: i64 = 2;
 
-/// Keys that determine how the rest of the file is read.
+/// Keys that determine how the other keys of the file are read.
 #[derive(Deserialize)]
 struct Head {
     format: Option<toml::Value>,
@@ -76,7 +76,7 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error with the first key or number that is missing, unknown or of the wrong form, with its line.
+    /// Returns an error with the first key or number that is missing, unknown or of an invalid type, with the line number.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let arm = read(text)?;
         match arm.limit_faults().into_iter().next() {
@@ -246,7 +246,7 @@ fn all_or_none<T>(
     }
 }
 
-/// Stores the list of proposed numbers, either of the arm or of a joint.
+/// Stores the list of proposed numbers, for the whole arm or for a joint.
 fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]) -> Result<(), FileError> {
     let number = of.map(|(number, _)| number);
     let keys: &[&'static str] = if of.is_some() { &JOINT_KEYS } else { &ARM_KEYS };
@@ -292,7 +292,7 @@ fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, Fi
             )));
         }
     };
-    // The tables are checked even if polynomials are used. An operator who changes to tables later expects valid tables.
+    // The friction tables are checked even if the arm uses polynomials. If an operator selects the tables later, they must be valid.
     for (joint, table) in Joint::ALL.into_iter().zip(all.iter()) {
         check_table(joint, table).map_err(|e| FileError::at(Place::name("friction_table"), e.to_string()))?;
     }

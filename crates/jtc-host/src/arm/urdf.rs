@@ -1,8 +1,8 @@
 //! Arms from URDF: six rotary joints in a chain and a fixed flange. The reader reports properties that the arm model of the
 //! controller cannot represent.
 //!
-//! If the axis of a joint is not +z, the reader turns the frame of its link. This changes neither positions nor torques.
-//! Bodies that are attached by fixed joints, or by joints other than the six, become part of the link that carries them.
+//! If the axis of a joint is not +z, the reader rotates the frame of its link. This rotation does not change positions or torques. Bodies
+//! that are attached by fixed joints, or by joints that are not among the six, become part of the link to which they are attached.
 
 mod choice;
 mod frames;
@@ -33,7 +33,7 @@ struct Chain<'a> {
     without_ranges: Vec<String>,
 }
 
-/// Standard gravity as in arm files, m/s², downwards in a description whose z points upwards.
+/// Standard gravity as in arm files, m/s², pointing downwards in a description in which z points upwards.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
 /// Reads the arm of a description; `choice` selects its joints.
@@ -62,14 +62,14 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
         joints,
         warnings: chain.warnings,
         sources: chain.sources,
-        // URDF cannot give the other fields.
+        // A URDF file does not contain values for the other fields.
         ..Arm::nameless()
     };
     Ok(Described { arm, gravity, friction })
 }
 
-/// Checks that joint names and link names are unique and that no link has two parents. The reader does not guess which one
-/// is meant.
+/// Checks that joint names and link names are unique and that no link has two parents. If a name occurs twice, the reader does not guess
+/// which joint or link is meant.
 fn only_once(robot: &Robot) -> Result<(), FileError> {
     fn twice(mut names: Vec<&str>) -> Option<&str> {
         names.sort_unstable();
@@ -122,7 +122,7 @@ impl<'a> Chain<'a> {
         self.warnings.push(Warning::new(change, place, problem));
     }
 
-    /// Warns if the sixth joint may be a gripper, because five axes and a gripper also have six joints.
+    /// Warns if the sixth joint may be a gripper, because an arm with five axes and a gripper also has six joints.
     fn doubt_gripper(&mut self, choice: &ArmChoice) {
         let last = self.rotary[JOINTS - 1];
         let words = format!("{} {}", last.name, last.child.link).to_lowercase();
@@ -140,13 +140,12 @@ impl<'a> Chain<'a> {
             frame = Frame::of(&origin(&joint.origin)).then(&frame);
             at = &joint.parent.link;
         }
-        // Removes the rounding error of a quarter turn, which is not a tilt.
+        // Removes the rounding error of a rotation by 90°, so that it is not treated as a tilt.
         frame.inverse().direction(&GRAVITY).map(|v| if v.abs() < 1e-9 { 0.0 } else { v })
     }
 
-    /// Finds the joints from the last link to the flange. These joints are the path to `tip`, or, without a tip, one fixed
-    /// joint on the last link. If the last link has several, the joint with a usual name of a flange is used, or else the
-    /// first.
+    /// Finds the joints from the last link to the flange. These joints form the path to `tip`; without `tip`, the result is one fixed joint
+    /// on the last link. If the last link has several fixed joints, the joint with a usual flange name is used, otherwise the first joint.
     fn find_flange(&mut self, tip: Option<&str>) {
         let last = &self.rotary[JOINTS - 1].child.link;
         if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
@@ -179,7 +178,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Returns the joints on the path from link `from` to link `to`, first to last. Returns `None` if one of them moves.
+    /// Returns the joints on the path from link `from` to link `to`, first to last. Returns `None` if one of these joints moves.
     fn rigid_path(&self, from: &str, to: &str) -> Option<Vec<&'a Joint>> {
         let mut path = Vec::new();
         let mut at = to;
@@ -243,7 +242,7 @@ impl<'a> Chain<'a> {
         Ok(model)
     }
 
-    /// Reports joints below the base of the arm. These joints do not move, but an offset changes the place of the base.
+    /// Reports joints below the base of the arm. These joints do not move, but their offset changes the position of the base.
     fn look_below(&mut self, base: &str) {
         let mut at = base.to_owned();
         for _ in 0..self.robot.joints.len() {
@@ -261,7 +260,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Returns a link in the turned frame, together with all bodies attached by joints that do not move.
+    /// Returns a link in the rotated frame, together with all bodies attached by joints that do not move.
     fn link(&mut self, name: &str, turn: &Frame) -> Result<Link, FileError> {
         let mut bodies = Vec::new();
         let mut todo = vec![(name.to_owned(), Frame::IDENTITY)];

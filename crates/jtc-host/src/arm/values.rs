@@ -1,4 +1,4 @@
-//! Every number of an arm with its unit, range, default and source.
+//! List of all numbers of an arm, each with unit, range, default and source.
 
 use jtc_core::settings::{self, Setting};
 use jtc_core::{Config, ParameterBounds, PidGains, WORKING_AREA};
@@ -11,8 +11,7 @@ use super::{Arm, Source};
 /// Number of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmValue {
-    /// Key in an arm file. For a number in a table or list, the name of the part follows after a dot: `pid.kp`,
-    /// `com_xyz_m.x`.
+    /// Key in an arm file. For a number in a table or list, the part follows after a dot, for example `pid.kp`, `com_xyz_m.x`.
     pub name: &'static str,
     /// Joint, if the number belongs to a joint; `None` for the flange.
     pub joint: Option<Joint>,
@@ -27,7 +26,7 @@ pub struct ArmValue {
     pub min: Option<f64>,
     /// Largest value that a controller accepts, if there is a bound.
     pub max: Option<f64>,
-    /// Default if the file does not give the number.
+    /// Default if the number is missing in the file.
     pub default: Option<f64>,
     /// Source of the number.
     pub from: Source,
@@ -68,11 +67,11 @@ const FRICTION: [(&str, &str); 6] = [
     ("friction_polynomial.c5", "°C"),
 ];
 
-/// Numbers of a type `T`: properties of each number, and a function that reads it.
+/// Numbers of a type `T`: properties of each number, and a function that reads the number.
 pub(super) type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
 
-/// Returns the properties of a setting of the joints or of the controller. The range is that of the settings table,
-/// narrowed to the range of the drives.
+/// Returns the properties of a setting of the joints or of the controller. The range comes from the settings table and is narrowed to the
+/// range of the drives.
 fn setting(row: &Setting, drives: &Config) -> Kind {
     let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
     let (low, high) = match row.name {
@@ -88,7 +87,7 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
         "torque_gain" => Some(1.0),
         // The default depends on the torque limit, which differs from joint to joint.
         "teach_damping_nm_s_rad" => None,
-        // An arm file must give these numbers.
+        // An arm file must contain these numbers.
         _ if row.of_joint() => None,
         _ => row.get(drives, 0),
     };
@@ -113,7 +112,7 @@ fn value(kind: Kind, value: Option<f64>, from: Source) -> ArmValue {
     ArmValue { name, joint: None, link: None, value, unit, min, max, default, from }
 }
 
-/// Creates the numbers of a list in the file.
+/// Creates the numbers of a list in the arm file.
 fn listed(
     names: &[&'static str],
     unit: &'static str,
@@ -129,8 +128,8 @@ fn listed(
 }
 
 impl Arm {
-    /// Returns every number of the arm except the long friction tables: gravity, the numbers of the joints, frames and links, and
-    /// the controller's own settings.
+    /// Returns every number of the arm except the long friction tables: gravity, the numbers of the joints, frames and links, and the
+    /// settings of the controller.
     pub fn values(&self) -> Vec<ArmValue> {
         let (drives, config) = (Config::avena(), self.config());
         let gravity = self.gravity.map_or(Source::Default, |_| self.sources.of((None, "gravity_m_s2")));
@@ -173,7 +172,7 @@ impl Arm {
             all.extend(listed(&COM_RPY, "rad", &link.origin.rpy, i, None));
             all.extend(listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max)));
         }
-        // Settings of the controller, except gravity, which is already in the list.
+        // Settings of the controller, except gravity, which the list already contains.
         let of_controller =
             |row: &&Setting| !row.of_joint() && row.of_arm() && !row.name.starts_with("gravity");
         for row in settings::TABLE.iter().filter(of_controller) {
@@ -212,7 +211,7 @@ mod tests {
         );
         assert_eq!((of("pid.kd", 1).from, of("pid.kd", 1).value), (Source::Proposed, Some(80.0)));
         assert_eq!(of("friction_polynomial.c0", 3).value, arm.polynomial.map(|c| c[2][0]));
-        // 3 numbers of gravity, 19 of each joint, 6 of each frame, 13 of each link, and the settings of the controller.
+        // The list has 3 numbers of gravity, 19 of each joint, 6 of each frame, 13 of each link, and the settings of the controller.
         let own = settings::count(true) - 6 * 8 - 3;
         assert_eq!(all.len(), 3 + 6 * 19 + 7 * 6 + 7 * 13 + own);
         let missing = Arm { pid: None, ..arm }.values();

@@ -1,21 +1,21 @@
-//! Changes that the loader made to the values of a file: changed, filled in or left out.
+//! Values of a file that the loader changed, filled in or left out.
 
 use serde::Serialize;
 
-/// Kind of a change.
+/// Kind of a change that the loader made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Change {
-    /// The base frame was chosen.
+    /// The loader chose the base frame.
     Base,
-    /// The flange frame was chosen.
+    /// The loader chose the flange frame.
     Flange,
-    /// The axis of a joint was turned to +z.
+    /// The axis of a joint was rotated to +z.
     AxisTurned,
-    /// A fixed joint, or its body, was merged into the link that carries it.
+    /// A fixed joint, or its body, was merged into the link to which it is attached.
     Merged,
-    /// A joint outside the six is held at 0.
+    /// A joint that is not one of the six arm joints is fixed at position 0.
     LeftOut,
     /// A limit was narrowed to the range of the drives.
     LimitCut,
@@ -25,7 +25,7 @@ pub enum Change {
     NotCarried,
     /// A number of a robot description is used only as a starting value.
     Doubtful,
-    /// Numbers of the file are proposals of `jtc arm import`.
+    /// Some numbers of the file are proposals of `jtc arm import`.
     Proposed,
     /// The loader chose between several files.
     Files,
@@ -52,7 +52,7 @@ impl Change {
     }
 }
 
-/// Item of a file that the loader could not carry over, or filled in.
+/// Item of a file that the loader ignored, changed or filled in.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
     /// Kind of the change.

@@ -1,4 +1,4 @@
-//! Checks of the gains: will a controller accept them (J-71), and do they damp the arm?
+//! Checks that a controller accepts the gains (J-71), and that the gains damp the arm.
 
 use host_kit::Severity;
 use jtc_core::{JOINTS, PidGains, inertia_needed, least_felt_inertia};
@@ -11,8 +11,8 @@ use crate::arm::statics::{POSES, pose};
 
 /// Heaviest payload for the check of the damping, kg.
 const PAYLOAD_MAX: f64 = 5.0;
-/// Delay of the position gain in addition to the controller's setting, s: a torque is held for one tick, which delays it by
-/// half a tick on average. `TICK` is the length of a tick, s.
+/// Delay of the position gain in addition to the controller's setting, s: each torque stays constant for one tick, so the average delay is
+/// half a tick. `TICK` is the length of a tick, s.
 const HALF_A_TICK: f64 = 0.5e-3;
 const TICK: f64 = 1e-3;
 
@@ -26,7 +26,7 @@ impl Arm {
         let (payload, moved) = self.heaviest_moved();
         for (joint, gains) in Joint::ALL.into_iter().zip(pid) {
             let j = joint.index();
-            // A stability finding for the joint is more precise.
+            // If the joint already has a stability finding, that finding is more precise.
             if findings.iter().any(|found| found.code == "gains" && found.joint == Some(joint)) {
                 continue;
             }
@@ -73,7 +73,7 @@ impl Arm {
             "{}: Kd {kd} N·m·s/rad does not damp the joint{with}, expected at least {needed:.1}",
             self.titled(joint)
         );
-        // The delay of Kp uses up a part of Kd. The integral can use the rest.
+        // The delay of Kp reduces the effective Kd. The integral gain can use the remaining damping.
         let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
         ArmFinding::new(Severity::Warning, "damping", what)
             .because(

@@ -1,11 +1,11 @@
-//! Invalid limits of joints.
+//! Detection of invalid joint limits.
 
 use jtc_core::settings::{self, Setting};
 use jtc_wire::Joint;
 
 use crate::arm::Arm;
 
-/// Fault of a limit.
+/// Fault of a joint limit.
 pub(in crate::arm) struct LimitFault {
     pub key: &'static str,
     pub value: f64,

@@ -67,7 +67,7 @@ impl Arm {
         holding
     }
 
-    /// Finds torque limits far above the gravity torques, for example limits in kg·cm or arbitrary numbers.
+    /// Finds torque limits far above the gravity torques, for example limits in kg·cm or placeholder values.
     fn find_unit(&self, holding: &[Holding], findings: &mut Vec<ArmFinding>) {
         let most = |of: fn(&Holding) -> f64| holding.iter().map(of).fold(0.0, f64::max);
         let (torque, limit) = (most(|h| h.torque_nm), most(|h| h.limit_nm));

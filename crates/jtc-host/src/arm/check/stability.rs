@@ -21,12 +21,12 @@ pub struct RotorMargins {
 }
 
 impl Arm {
-    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71), with the rules of [`Arm::check`].
-    /// An arm without gains passes.
+    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71), by the same rules as [`Arm::check`]. An arm without
+    /// gains passes.
     ///
     /// # Errors
     ///
-    /// [`ParametersError::Unstable`] with the first such finding.
+    /// [`ParametersError::Unstable`] with the first finding about the gains.
     pub fn check_gains(&self) -> Result<(), ParametersError> {
         let mut findings = Vec::new();
         if self.is_physical().is_ok() {
@@ -42,8 +42,8 @@ impl Arm {
         }
     }
 
-    /// Finds unstable gains, of each joint and of all joints together. If all are stable, returns the tolerated factors of the
-    /// rotor inertias. Returns `None` if gains are unstable, or if the file does not give gains or all rotor inertias.
+    /// Finds unstable gains, of each joint and of all joints together. If the gains are stable, returns the tolerated factors of the rotor
+    /// inertias. Returns `None` if gains are unstable, or if the file does not give gains or all rotor inertias.
     pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) -> Option<RotorMargins> {
         let pid = self.pid.as_ref().filter(|_| self.rotors_given == [true; JOINTS])?;
         let delay = self.config().delay_ticks;
@@ -117,7 +117,7 @@ impl Arm {
         Some(found.of(joint, "pid"))
     }
 
-    /// Finds gains that are not stable over the uncertainty of proposed rotor inertias, which were not measured.
+    /// Finds gains that are not stable for all rotor inertias within the uncertainty of a proposed value, which was not measured.
     fn proposed_rotors(&self, margin: impl Fn([bool; JOINTS]) -> Option<RotorMargin>) -> Option<ArmFinding> {
         let name = "rotor_inertia_kg_m2";
         let is_proposed = |joint: &Joint| self.sources.of((Some(*joint), name)) == Source::Proposed;
@@ -163,7 +163,7 @@ fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
 
 /// Formats a range such as `0.08..12`, with two digits, rounded to the safe side.
 fn range(down: f64, up: f64) -> String {
-    // Keeps a value that already has two digits from being rounded further.
+    // Tolerance that prevents further rounding of a value that already has two digits.
     const ROUNDING: f64 = 1e-9;
     format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
 }

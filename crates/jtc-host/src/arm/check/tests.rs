@@ -1,4 +1,4 @@
-//! Each fault of an arm causes its own finding, and no other finding.
+//! Tests that each fault of an arm causes exactly its own finding.
 
 use proptest::prelude::*;
 
@@ -74,7 +74,7 @@ fn what_is_missing_is_said_and_only_what_no_controller_starts_without_is_refused
     assert_eq!(lacking("gravity"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("rotor"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("velocity_max"), (vec![("default", Warning, None)], false));
-    // The file still has a friction table, so friction is not missing.
+    // The file still has a friction table, so the check does not report missing friction.
     assert_eq!(lacking("friction_polynomial"), (vec![], false));
 }
 
@@ -91,7 +91,7 @@ fn an_arm_that_its_drives_cannot_hold_is_named_with_joint_pose_and_share() {
     assert!(f.finding.what.contains("N·m of 100 N·m (132 %) at q = ("), "{}", f.finding.what);
     let tight = found(&of("torque_max_nm = 180.0", "torque_max_nm = 150.0"));
     assert_eq!(tight, [("holding", Severity::Warning, Some(2))]);
-    // The narrower position ranges exclude the poses with the greatest gravity torque.
+    // The narrower position ranges do not contain the poses with the greatest gravity torque.
     let narrow = of("torque_max_nm = 180.0", "torque_max_nm = 100.0");
     let mut narrow = Arm { ..narrow };
     (narrow.joints[1].position_min, narrow.joints[1].position_max) = (-0.3, 0.3);
@@ -109,7 +109,7 @@ fn torque_limits_in_another_unit_are_suspected() {
     assert!(found(&arm).contains(&("unit", Severity::Warning, None)));
 }
 
-/// Unstable gains are refused, and never reported as accepted.
+/// The check always reports unstable gains as refused.
 #[test]
 fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     use Severity::Problem;
@@ -133,7 +133,7 @@ fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 1.2)), of(&[]));
 }
 
-/// Within the margins of the rotor inertias the gains are stable; slightly outside they are not.
+/// Within the margins of the rotor inertias the gains are stable; slightly outside the margins the gains are unstable.
 #[test]
 fn j71_the_rotor_margin_is_where_the_check_changes() {
     let arm = Arm::avena();
@@ -216,7 +216,7 @@ proptest! {
     }
 }
 
-/// Gains that a controller would refuse are refused here, with the joint and the allowed inertia.
+/// Gains that a controller would refuse are refused here, in an error with the joint and the allowed inertia.
 #[test]
 fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let mut arm = Arm::avena();
@@ -227,7 +227,7 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     // The gains are barely stable, so the stability check finds no problem.
     assert!(!findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem));
     assert!(arm.check_gains().unwrap_err().to_string().contains("kg·m²"));
-    // The check also works if the rotor inertias are not given and stability is unknown.
+    // The check also works if the file does not contain the rotor inertias, so that stability is unknown.
     let mut arm = Arm { rotors_given: [false; JOINTS], ..Arm::avena() };
     arm.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 0.0);
     assert!(arm.check_gains().is_ok());
@@ -235,8 +235,7 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     assert!(arm.check_gains().is_err());
 }
 
-/// An integral gain that is too strong for a heavy load causes a warning. With the gain that the warning advises, it
-/// disappears.
+/// An integral gain that is too strong for a heavy load causes a warning. With the gain that the warning advises, the warning disappears.
 #[test]
 fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
     let warned = |ki: f64| {

@@ -1,4 +1,4 @@
-//! Errors of using and saving poses.
+//! Errors when poses are used or saved.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Joint in the TOML format of an arm.
+//! Joint in the TOML format of an arm file.
 
 use jtc_core::{JointConfig, PidGains};
 use jtc_wire::Joint;
@@ -8,12 +8,12 @@ use super::exactly;
 use crate::arm::{Change, Sources, Warning};
 use crate::file::{FileError, Place};
 
-/// Defaults for limits that a file does not give, in rad/s, rad/s² and rad.
+/// Defaults for limits that are missing in a file, in rad/s, rad/s² and rad.
 pub(in crate::arm) const VELOCITY_DEFAULT: f64 = 1.5;
 pub(in crate::arm) const ACCELERATION_DEFAULT: f64 = 12.56637;
 pub(in crate::arm) const POSITION_ERROR_DEFAULT: f64 = 0.09;
-/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s this damping takes three tenths of the
-/// limit, which is also the greatest torque that the controller recognises as a load.
+/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s this damping torque is 30 % of the torque limit, which is
+/// also the greatest torque that the controller recognises as a load.
 pub(in crate::arm) const TEACH_DAMPING_DEFAULT: f64 = 0.5;
 
 #[derive(Serialize, Deserialize)]
@@ -51,7 +51,7 @@ pub(super) struct PidForm {
 }
 
 impl JointForm {
-    /// Returns `true` if the file gives this number of the joint, or if the number has a default.
+    /// Returns `true` if the file contains the value of `key` for the joint, or if a default exists.
     pub(super) fn has(&self, key: &str) -> bool {
         match key {
             "rotor_inertia_kg_m2" => self.rotor_inertia_kg_m2.is_some(),

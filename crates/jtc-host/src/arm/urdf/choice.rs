@@ -1,8 +1,7 @@
 //! Selection of the arm's six joints in a robot description.
 //!
-//! Terms: a *rotary* joint is a revolute or a continuous joint. A joint that is not fixed and is not one of the six is
-//! *held* at zero, like a fixed joint. Examples are the finger of a gripper, the wheel of a cart, and the seventh joint of
-//! a redundant arm.
+//! Terms: a *rotary* joint is a revolute or a continuous joint. A joint that is not fixed and is not one of the six is *held* at zero, as
+//! if it were fixed. Examples are the finger of a gripper, the wheel of a cart, and the seventh joint of a redundant arm.
 
 use std::path::PathBuf;
 
@@ -12,7 +11,7 @@ use urdf_rs::{Joint, JointType, Robot};
 use crate::arm::ArmChoice;
 use crate::file::{FileError, Place};
 
-/// Returns the six joints, base to wrist. Each is carried by the joint before it.
+/// Returns the six joints, base to wrist. Each of these joints is attached to the previous one.
 pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Joint; JOINTS], FileError> {
     no_loops(robot)?;
     let candidates: Vec<&Joint> = match (&choice.joints, &choice.tip) {
@@ -65,7 +64,7 @@ fn way_down<'a>(robot: &'a Robot, link: &str) -> impl Iterator<Item = &'a Joint>
     std::iter::successors(above(robot, link), |j| above(robot, &j.parent.link))
 }
 
-/// Checks that each chain of parents ends, so that the description has no loops.
+/// Checks that the description does not contain a loop: each chain of parent links must end at a root.
 fn no_loops(robot: &Robot) -> Result<(), FileError> {
     for joint in &robot.joints {
         let mut at = joint;
@@ -121,7 +120,7 @@ fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, File
     Ok(joints)
 }
 
-/// Returns the first joint that is not carried by the joint before it.
+/// Returns the first joint that is not attached to the previous joint.
 fn first_branch<'a>(robot: &'a Robot, joints: &[&'a Joint]) -> Option<&'a Joint> {
     joints.windows(2).map(|pair| (pair[0], pair[1])).find_map(|(below, joint)| {
         (!way_down(robot, &joint.parent.link).any(|j| j.name == below.name)).then_some(joint)
@@ -136,7 +135,7 @@ fn kind(joint: &Joint) -> String {
     format!("{:?}", joint.joint_type).to_lowercase()
 }
 
-/// Returns an error with the reason why the joints are not a six-axis arm, and with the option that selects the joints.
+/// Returns an error that explains why the joints are not a six-axis arm and names the option that selects the joints.
 fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileError {
     // Finds the longest chain of rotary joints.
     let chain_to = |end: &Joint| -> Vec<&Joint> {

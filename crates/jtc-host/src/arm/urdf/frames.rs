@@ -41,7 +41,7 @@ impl Frame {
         }
     }
 
-    /// Returns xyz and rpy. If roll and yaw turn about the same axis, yaw is 0.
+    /// Returns the frame as translation `xyz` and rotation `rpy`. If roll and yaw rotate about the same axis, yaw is 0.
     pub(super) fn origin(&self) -> Origin {
         let r = &self.rotation;
         let cos_pitch = r[0][0].hypot(r[1][0]);
@@ -58,7 +58,7 @@ impl Frame {
         *self == Self::IDENTITY
     }
 
-    /// Transforms the frame `next` from this frame into this frame's parent.
+    /// Transforms the frame `next`, which is relative to this frame, into the parent of this frame.
     pub(super) fn then(&self, next: &Self) -> Self {
         let moved = applied(&self.rotation, &next.position);
         Self {
@@ -73,12 +73,12 @@ impl Frame {
         Self { rotation, position }
     }
 
-    /// Transforms a direction of this frame into its parent.
+    /// Transforms a direction from this frame into the parent frame.
     pub(super) fn direction(&self, direction: &[f64; 3]) -> [f64; 3] {
         applied(&self.rotation, direction)
     }
 
-    /// Returns a rotation that turns z to `axis`. Returns `None` if the axis is zero.
+    /// Returns a rotation that maps the z axis to `axis`. Returns `None` if `axis` is a zero vector.
     pub(super) fn turning_z_to(axis: [f64; 3]) -> Option<Self> {
         let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !(norm > 1e-9 && norm.is_finite()) {
@@ -98,7 +98,7 @@ impl Frame {
     }
 }
 
-/// Mass, centre and inertia about the centre, relative to a frame.
+/// Mass, centre of mass, and inertia about the centre of mass, relative to a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     mass: f64,
@@ -118,7 +118,7 @@ impl Body {
         Self { mass: link.mass, centre: link.origin.xyz, inertia }
     }
 
-    /// Transforms the body from `frame` into its parent.
+    /// Transforms the body from `frame` into the parent of `frame`.
     pub(super) fn seen_from(&self, frame: &Frame) -> Self {
         let turned = applied(&frame.rotation, &self.centre);
         Self {
@@ -128,7 +128,7 @@ impl Body {
         }
     }
 
-    /// Returns the inertia about `point` (Steiner).
+    /// Returns the inertia about `point` (parallel-axis theorem).
     fn about(&self, point: &[f64; 3]) -> Matrix {
         let d: [f64; 3] = std::array::from_fn(|i| self.centre[i] - point[i]);
         let square: f64 = d.iter().map(|v| v * v).sum();
@@ -156,7 +156,7 @@ impl Body {
         };
     }
 
-    /// Returns a link whose inertia frame is parallel to the link's frame.
+    /// Returns a link whose inertia frame has the same orientation as the link's frame.
     pub(super) fn link(&self) -> Link {
         let i = &self.inertia;
         Link {

@@ -1,4 +1,4 @@
-//! Typical robot descriptions: arbitrary axes, fixed joints, fingers, and numbers that are missing, doubled or wrong.
+//! Typical robot descriptions: arbitrary axes, fixed joints, gripper fingers, and numbers that are missing, duplicated or wrong.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::arm::{Arm, ArmChoice, Change, Source};
 use host_kit::Diagnose;
 
-/// Joint of a description: its origin, its axis, and its link with mass and centre of mass.
+/// Joint of a robot description with origin, axis, and mass and centre of mass of the link.
 #[derive(Clone, Debug)]
 struct Part {
     xyz: [f64; 3],
@@ -39,7 +39,8 @@ fn joint(name: &str, kind: &str, (parent, child): (&str, &str), inside: &str) ->
 
 const LIMIT: &str = "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"50\" velocity=\"1.2\"/>\n";
 
-/// Returns a description with six joints a1..a6 and links b1..b6 on link b0, followed by `more`; the mesh files do not exist.
+/// Returns a description with six joints a1..a6 and links b1..b6 on link b0, followed by the text `more`; the mesh files named in it do not
+/// exist.
 fn robot(parts: &[Part], more: &str) -> String {
     let mut text = format!("<?xml version=\"1.0\"?>\n<robot name=\"arm\">\n{}", body("b0", 2.0, &[0.0; 3]));
     for (i, p) in parts.iter().enumerate() {
@@ -56,7 +57,7 @@ fn robot(parts: &[Part], more: &str) -> String {
     format!("{text}{more}</robot>\n")
 }
 
-/// Returns a plain arm with parallel and crossing axes.
+/// Returns a simple arm with parallel and crossing axes.
 fn parts() -> Vec<Part> {
     let axes = [
         [0.0, 0.0, 1.0],
@@ -88,7 +89,7 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| (0..3).map(|k| a[i][k] * v[k]).sum())
 }
 
-/// Returns the rotation about an axis (Rodrigues). The test does not use the importer for this.
+/// Returns the rotation about an axis (Rodrigues). This function does not use code of the importer.
 fn turn(axis: [f64; 3], angle: f64) -> Matrix {
     let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
     let [x, y, z] = axis.map(|v| v / norm);
@@ -101,7 +102,7 @@ fn turn(axis: [f64; 3], angle: f64) -> Matrix {
     ]
 }
 
-/// Returns the potential energy (J) of the described masses.
+/// Returns the potential energy (J) of the masses in the description.
 fn energy(parts: &[Part], q: &[f64; 6], gravity: &[f64; 3]) -> f64 {
     let (mut rotation, mut place, mut sum) = (turn([1.0, 0.0, 0.0], 0.0), [0.0; 3], 0.0);
     for (p, q) in parts.iter().zip(q) {
@@ -166,7 +167,8 @@ proptest! {
     }
 }
 
-/// A plate between two joints and a tool on two fixed joints give the same masses as links that already contain them.
+/// A plate between two joints and a tool on two fixed joints result in the same masses as links that already contain the plate and the
+/// tool.
 #[test]
 fn fixed_joints_are_merged_into_the_link_that_carries_them() {
     let flange =
@@ -199,7 +201,7 @@ fn j40_fingers_and_what_follows_them_are_left_out() {
     let finger = joint("left", "prismatic", ("b6", "l"), LIMIT) + &body("l", 0.1, &[0.0; 3]);
     let mimic = joint("right", "prismatic", ("b6", "r"), &format!("<mimic joint=\"left\"/>{LIMIT}"))
         + &body("r", 0.1, &[0.0; 3]);
-    // A joint that mimics another joint needs no option. A joint that moves independently needs one.
+    // A joint that mimics another joint needs no option. A joint that moves independently needs an option.
     let follower = mimic.replace("\"left\"", "\"a1\"");
     let arm = Arm::from_urdf(&robot(&parts(), &follower)).unwrap();
     assert_eq!(
@@ -263,7 +265,7 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
             "{limit}: {assumed:?}"
         );
     }
-    // A proposed torque limit is computed from this arm and not copied from another arm.
+    // The proposed torque limit is computed from this arm, never copied from another arm.
     let text = robot(&parts(), "").replace("effort=\"50\"", "");
     let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
     assert!(arm.joints.iter().all(|j| j.torque_max < 60.0 && j.torque_max > 0.5), "{:?}", arm.joints);
@@ -323,8 +325,8 @@ fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
     }
 }
 
-/// A limit that is narrower than the drives is kept. A side without a limit is marked. A wrist limit of more than one turn
-/// is cut and marked.
+/// The reader keeps a limit that is narrower than the limit of the drives. A direction without a limit is marked. A wrist limit of more
+/// than one turn is reduced and marked.
 #[test]
 fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
     let second = |limits: &str| {
@@ -359,8 +361,8 @@ fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
     }
 }
 
-/// A velocity above the speed of any arm is in degrees per second, or is a placeholder. The reader uses the slower of both
-/// meanings, and marks it for the check.
+/// A velocity above the speed of any arm is probably in degrees per second, or is a placeholder. The reader uses the lower speed of both
+/// meanings, and marks the value for the check.
 #[test]
 fn a_velocity_that_is_not_believed_is_marked_and_never_the_fastest_in_silence() {
     for (velocity, used, marked) in [
@@ -458,7 +460,7 @@ fn what_cannot_be_read_is_named_with_its_place() {
         error_of("axis xyz=\"0 1 0\"", "axis xyz=\"0 0 0\"")
             .contains("joint a2: axis 0 0 0 has no direction")
     );
-    // Text in a comment is ignored.
+    // The reader ignores text in an XML comment.
     let text = good.replacen("<link", "<!-- <link name=\"b1\"> <limit> --><link", 1);
     assert_eq!(Arm::from_urdf(&text).unwrap().model, Arm::from_urdf(&good).unwrap().model);
 }
@@ -493,11 +495,11 @@ fn gravity_is_proposed_as_the_description_mounts_the_arm() {
     };
     assert_eq!(mount("0 0 1"), [0.0, 0.0, -9.81]);
     assert_eq!(mount("3.14159265358979 0 0"), [0.0, 0.0, 9.81]);
-    // After a quarter turn about y, the x axis of the base points down.
+    // After a rotation by 90° about y, the x axis of the base points down.
     assert_eq!(mount("0 1.5707963267948966 0"), [9.81, 0.0, 0.0]);
 }
 
-/// The file that `jtc arm import` writes is read back with all marks, and its check finds no problem.
+/// The file that `jtc arm import` writes is read again with all marks, and the check finds no problem in this file.
 #[test]
 fn proposals_are_marked_in_the_file_and_found_again() {
     let text = robot(&parts(), "").replacen(

@@ -1,14 +1,14 @@
-//! Text of a robot description before it is parsed: nesting depth, positions of its elements, and faults for which the XML
-//! reader gives no position.
+//! Text of a robot description before it is parsed: nesting depth, positions of the elements, and faults for which the XML reader gives no
+//! position.
 
 use std::borrow::Cow;
 
 use crate::file::{FileError, Place, short};
 
-/// Maximum nesting depth. Descriptions of arms are less deep.
+/// Maximum nesting depth. Maximum nesting depth of elements; descriptions of arms have less.
 const DEPTH_MAX: usize = 32;
 
-/// Tag in the text: begin, end, and depth of its element. The outermost element has depth 0.
+/// Tag in the text with its begin, its end, and the nesting depth of its element. The outermost element has depth 0.
 struct Tag<'a> {
     text: &'a str,
     begin: usize,
@@ -66,7 +66,7 @@ fn end_of_tag(rest: &str) -> Option<usize> {
     })
 }
 
-/// Rejects a text with too deep nesting, because the reader is recursive.
+/// Rejects a text whose elements are nested too deep, because the XML reader is recursive.
 pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
     if deepest > DEPTH_MAX {
@@ -77,8 +77,8 @@ pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Adds the velocity limit 0 to each limit without a velocity, because the reader requires one. The value 0 means that
-/// the velocity is not limited.
+/// Adds the velocity limit 0 to each limit without a velocity, because the XML reader requires a velocity. The value 0 means that the
+/// velocity is not limited.
 pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !tag.text.contains("velocity");
     let places: Vec<usize> = tags(text).filter(lacks).map(|tag| tag.begin + "<limit".len()).collect();
@@ -95,7 +95,7 @@ pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     Cow::Owned(out + &text[from..])
 }
 
-/// Returns the names of the joints whose limits have neither a lower nor an upper position. The reader would set both to 0.
+/// Returns the names of the joints whose limits have neither a lower nor an upper position. The XML reader would set both limits to 0.
 pub(super) fn without_ranges(text: &str) -> Vec<String> {
     let mut joints: Vec<(String, bool)> = Vec::new();
     for tag in tags(text).filter(|tag| !tag.closes) {
@@ -112,12 +112,12 @@ pub(super) fn without_ranges(text: &str) -> Vec<String> {
     lacking.filter_map(|(name, _)| name.strip_prefix("joint ").map(str::to_owned)).collect()
 }
 
-/// Returns `true` if a tag has one of these attributes.
+/// Returns `true` if a tag has one of the attributes `keys`.
 fn has_attribute(tag: &Tag, keys: &[&str]) -> bool {
     tag.text.split('=').any(|head| keys.iter().any(|key| head.trim_end().ends_with(key)))
 }
 
-/// Returns the error of the reader with the element that causes it, because the reader does not report the place.
+/// Adds the element that causes the error to an error of the XML reader, which does not report the position.
 pub(super) fn locate(text: &str, what: &str) -> FileError {
     let what = what.trim_start_matches("custom: ").replace("float literal", "number");
     let mut open = None;
@@ -139,7 +139,7 @@ pub(super) fn locate(text: &str, what: &str) -> FileError {
     FileError::form(format!("not a valid URDF: {whole}"))
 }
 
-/// Returns the first attribute of an element that must be a number and is not.
+/// Returns the first attribute of an element that must be a number but is not.
 fn no_number(element: &str) -> Option<String> {
     const NUMBERS: [&str; 16] = [
         "value",
@@ -172,7 +172,7 @@ fn no_number(element: &str) -> Option<String> {
     })
 }
 
-/// Returns kind and name of an element.
+/// Returns the type and name of an element.
 fn name(tag: &Tag) -> String {
     let kind = tag.text.trim_start_matches('<').split([' ', '\n', '\t', '\r', '>', '/']).next().unwrap_or("");
     let name = tag.text.split("name=").nth(1).and_then(|rest| rest.split(['"', '\'']).nth(1));

@@ -1,4 +1,4 @@
-//! Ports to the controller: serial ports, the simulator in this process, and wrappers around ports.
+//! Ports to the controller: serial ports, the simulator in this process, and wrappers that add functions to ports.
 
 mod capture;
 #[cfg(unix)]
@@ -36,43 +36,43 @@ pub struct Halts {
 
 /// Byte stream to a controller, polled by one thread.
 ///
-/// The port defines the time. In the simulator time is virtual and advances while `read` waits, so that runs are
+/// The port also provides the clock. In the simulator time is virtual and advances while `read` waits, so that simulations are
 /// deterministic.
 pub trait Port {
     /// Waits until at least one byte is available or `timeout` has passed. Returns the number of bytes read, which is 0
     /// after a timeout.
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError>;
-    /// Writes all bytes to the line. May block while the buffer of the line is full.
+    /// Writes all bytes to the serial line. The call may block while the transmit buffer is full.
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError>;
-    /// Returns the time since a fixed start.
+    /// Returns the time since a fixed reference time.
     fn now(&self) -> Duration;
-    /// Returns the rate of the line, bits per second, if it has one.
+    /// Returns the bit rate of the line (bits per second), if the line has a bit rate.
     fn baud(&self) -> Option<u32>;
-    /// Returns the name of this port for the user.
+    /// Returns the name of this port as shown to the user.
     fn name(&self) -> String {
         "port".to_owned()
     }
-    /// Returns the reason why the last rejected frame did not reach the device. Returns `None` if the device itself
-    /// rejected it. Only a shared line gives such reasons.
+    /// Returns the reason why the last rejected frame did not reach the device. Returns `None` if the device itself rejected the frame.
+    /// Only a shared line returns such reasons.
     fn take_denial(&mut self) -> Option<String> {
         None
     }
-    /// Marks the start of a motion request. Frames that are written from now on belong to it. A shared line rejects
-    /// requests that are older than another client's Stop. On other lines this call has no effect.
+    /// Marks the start of a motion request. Frames that are written from now on belong to this request. A shared line rejects requests that
+    /// are older than another client's Stop. On other lines this call has no effect.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         Ok(())
     }
-    /// Returns how often other programs have stopped or paused the arm, as far as this port knows.
+    /// Returns the number of times that other programs have stopped or paused the arm, as far as known to this port.
     fn halts(&self) -> Halts {
         Halts::default()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move), for a motion that was requested when [`halts`](Self::halts) was `halts`. If
-    /// the request waited, for example in a queue, and the arm was stopped meanwhile, the motion is rejected.
+    /// Like [`ask_to_move`](Self::ask_to_move), for a motion that was requested when [`halts`](Self::halts) returned `halts`. If another
+    /// program stopped the arm while the request waited, for example in a queue, the motion is rejected.
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
         let _ = halts;
         self.ask_to_move()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move), for resuming a paused motion. After a Stop a motion cannot be resumed.
+    /// Like [`ask_to_move`](Self::ask_to_move), for resuming a paused motion. A motion cannot be resumed after a Stop.
     fn ask_to_resume(&mut self) -> Result<(), PortError> {
         self.ask_to_move()
     }
@@ -111,7 +111,7 @@ impl<P: Port + ?Sized> Port for Box<P> {
     }
 }
 
-/// Returns the time that `bytes` take on a line with 8N1 at `baud`; zero on a line without a rate.
+/// Returns the time that `bytes` take on a line with 8N1 at `baud`; returns zero for a line without a bit rate.
 pub fn line_time(bytes: usize, baud: Option<u32>) -> Duration {
     match baud {
         Some(baud) if baud > 0 => Duration::from_secs_f64(bytes as f64 * 10.0 / f64::from(baud)),

@@ -15,7 +15,7 @@ const INSTALLED: &str = "share/openjtc/firmware";
 /// Environment variable with a folder that replaces the default folders.
 const VARIABLE: &str = "OPENJTC_FIRMWARE";
 
-/// Image of the catalogue.
+/// Entry of the catalogue for one image.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 pub struct CatalogueImage {
     /// Board of the image.
@@ -24,7 +24,7 @@ pub struct CatalogueImage {
     pub file: String,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Address of the first byte.
+    /// Flash address of the first byte of the image.
     pub address: u32,
     /// Size of the file, bytes.
     pub bytes: u64,
@@ -59,8 +59,8 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Returns the folders in which a catalogue is searched. If the environment variable is set, it gives the only folder.
-    /// Otherwise they are the installation prefix of the program and the install folder of packages.
+    /// Returns the folders in which a catalogue is searched. If the environment variable is set, it contains the only folder. Otherwise the
+    /// folders are the installation prefix of the program and the folder into which packages install images.
     pub fn folders() -> Vec<PathBuf> {
         if let Some(folder) = env::var_os(VARIABLE).filter(|folder| !folder.is_empty()) {
             return vec![folder.into()];
@@ -75,7 +75,7 @@ impl Catalogue {
         folders
     }
 
-    /// Returns the first catalogue in these folders.
+    /// Returns the first catalogue in `folders`.
     ///
     /// # Errors
     ///
@@ -113,8 +113,8 @@ impl Catalogue {
         Ok(catalogue)
     }
 
-    /// Returns `true` if a catalogue in the folder of this file lists the file, and the content matches. Returns `false` if
-    /// the folder has no readable catalogue.
+    /// Returns `true` if a catalogue in the folder of this file lists the file with the same content. Returns `false` if the folder has no
+    /// readable catalogue.
     ///
     /// # Errors
     ///
@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(found.image("nucleo-h743zi2").unwrap().record().board, "nucleo-h743zi2");
         let said = found.image("nucleo-f401re").unwrap_err().to_string();
         assert!(said.contains("nucleo-f401re") && said.contains("nucleo-h745zi-q, nucleo-h743zi2"), "{said}");
-        // Changes one bit of the file.
+        // The test changes one bit of the file.
         let path = folder.path().join("nucleo-h743zi2.bin");
         let mut bytes = fs::read(&path).unwrap();
         bytes[0x800] ^= 1;

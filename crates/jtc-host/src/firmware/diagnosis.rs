@@ -1,4 +1,4 @@
-//! Advice for an image that was not written to a board, or does not run there.
+//! Advice if an image was not written to a board, or if the board does not run it.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 

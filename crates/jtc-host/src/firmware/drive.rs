@@ -1,16 +1,16 @@
-//! Drive that an ST-LINK presents on USB: its board and its files.
+//! Drive that an ST-LINK presents on USB, with its board name and its files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::FirmwareError;
 
-/// Maximum length of a label in the file system of the drive. Longer labels are cut.
+/// Maximum length of a label in the file system of the drive. Longer labels are truncated.
 const LABEL_MAX: usize = 11;
 /// Maximum number of bytes read from the drive's small files.
 const TEXT_MAX: usize = 4096;
 
-/// Prefixes of the board name in a label: first of ST-LINK firmware from 2019 on, then of older firmware.
+/// Prefixes of the board name in a label. The first prefix is used by ST-LINK firmware since 2019, the second by older firmware.
 const PREFIXES: [&str; 2] = ["NOD_", "NODE_"];
 
 /// Board numbers in `MBED.HTM`, with the board names in labels.
@@ -23,32 +23,32 @@ const CODES: [(&str, &str); 6] = [
     ("0847", "H745I-DISCO"),
 ];
 
-/// Drive with the description that it gives of itself.
+/// Drive with the description of the board in its files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Drive {
     /// Mount point.
     pub path: PathBuf,
-    /// Label, if the system knows it.
+    /// Label of the drive, if the operating system knows it.
     pub label: Option<String>,
-    /// Number of the board in `MBED.HTM`, if there is one.
+    /// Board number in `MBED.HTM`, if the file contains one.
     pub code: Option<String>,
-    /// Content of `DETAILS.TXT`: version and build date of the ST-LINK, one line each.
+    /// Content of `DETAILS.TXT`: version and build date of the ST-LINK firmware, one line each.
     pub details: String,
-    /// Device that is mounted there, such as `/dev/sda`, if the system knows it.
+    /// Block device of the drive, such as `/dev/sda`, if the operating system knows it.
     pub device: Option<PathBuf>,
-    /// USB device to which the drive belongs, if the system knows it.
+    /// USB device to which the drive belongs, if the operating system knows it.
     pub usb: Option<UsbDevice>,
-    /// Number of the file system at the path, if the operating system has such numbers. After the drive is removed, the
-    /// path belongs to another file system.
+    /// Number of the file system at the path, if the operating system has such numbers. The number shows a removal of the drive, because
+    /// the path then belongs to another file system.
     pub volume: Option<u64>,
 }
 
-/// USB device of the ST-LINK of a board, which is a drive, a serial port and a debugger at the same time.
+/// USB device of the ST-LINK of a board, which presents a drive, a serial port and a debugger.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbDevice {
-    /// Folder in the device tree of the operating system. Its name contains the USB connector.
+    /// Folder in the device tree of the operating system. The name of this folder contains the USB connector.
     pub folder: PathBuf,
-    /// Number on the bus. The number changes each time the device is plugged in.
+    /// Device number on the USB bus. The number changes each time the device is plugged in.
     pub number: String,
 }
 
@@ -58,18 +58,18 @@ pub struct UsbDevice {
 pub enum Fit {
     /// The drive belongs to the board.
     Same,
-    /// The drive does not give its board, or gives only a part of the name.
+    /// The drive does not name its board, or contains only a part of the board name.
     Unknown,
     /// The drive belongs to another board.
     Other,
 }
 
 impl Drive {
-    /// Reads the drive at a folder.
+    /// Reads the description of the drive that is mounted at a folder.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoDrive`] if the folder has none of the files of such a drive.
+    /// [`FirmwareError::NoDrive`] if the folder does not contain a file of an ST-LINK drive.
     pub fn at(path: &Path) -> Result<Self, FirmwareError> {
         let no_drive = |why: &str| FirmwareError::NoDrive { path: path.to_owned(), why: why.to_owned() };
         if !path.is_dir() {
@@ -81,7 +81,7 @@ impl Drive {
         }
         Ok(Self {
             path: path.to_owned(),
-            // For an automatic mount, the operating system uses the label as the name of the folder.
+            // If the operating system mounts a drive automatically, it uses the label as the folder name.
             label: path.file_name().map(|name| name.to_string_lossy().into_owned()),
             code: page.as_deref().and_then(code),
             details: details.unwrap_or_default(),
@@ -91,15 +91,15 @@ impl Drive {
         })
     }
 
-    /// Adds information of the operating system about the drive. The label of the device replaces the folder name, which can be
-    /// misleading. A second drive with the same label is mounted with a digit appended, so that the folder `NODE_H743ZI2`
-    /// may belong to a NUCLEO-H743ZI.
+    /// Adds the information about the drive that the operating system provides. The label of the device replaces the folder name, which can
+    /// be misleading. The operating system appends a digit to the folder name of a second drive with the same label. So the folder
+    /// `NODE_H743ZI2` may belong to a NUCLEO-H743ZI.
     pub fn of_system(self, device: PathBuf, label: Option<String>, usb: Option<UsbDevice>) -> Self {
         Self { device: Some(device), label, usb, ..self }
     }
 
-    /// Returns the board name in the form of labels (`H745ZIQ`), and `true` if the name is complete. Returns `None` if the
-    /// drive does not give its board.
+    /// Returns the board name in the form used in labels (`H745ZIQ`), and `true` if the name is complete. Returns `None` if the drive does
+    /// not name its board.
     pub fn board(&self) -> Option<(&str, bool)> {
         let by_code =
             |code: &String| CODES.iter().find(|(known, _)| known == code).map(|(_, name)| (*name, true));
@@ -116,12 +116,12 @@ impl Drive {
         })
     }
 
-    /// Compares the drive with a board. `board` has the form of the firmware: `nucleo-h745zi-q`.
+    /// Compares the drive with a board. `board` has the form that the firmware uses, for example `nucleo-h745zi-q`.
     pub fn fit(&self, board: &str) -> Fit {
         let wanted = short_name(board);
         match self.board() {
             Some((name, _)) if name == wanted => Fit::Same,
-            // A label of full length may be only the beginning of a name.
+            // A label of maximum length may contain only the beginning of a board name.
             Some((name, false)) if wanted.starts_with(name) => Fit::Unknown,
             Some(_) => Fit::Other,
             None => Fit::Unknown,
@@ -152,19 +152,19 @@ pub(super) fn volume(_: &fs::Metadata) -> Option<u64> {
     None
 }
 
-/// Returns the board name in the form of labels. `nucleo-h745zi-q-ldo` and `nucleo-h745zi-q` are the same board, `H745ZIQ`.
+/// Returns the board name in the form used in labels. `nucleo-h745zi-q-ldo` and `nucleo-h745zi-q` are names of the same board, `H745ZIQ`.
 fn short_name(board: &str) -> String {
     let name = same_board(board);
     name.strip_prefix("nucleo-").unwrap_or(name).replace('-', "").to_uppercase()
 }
 
-/// Returns the board name without the kind of core supply.
+/// Returns the board name without the suffix for the core supply.
 pub(super) fn same_board(board: &str) -> &str {
     board.strip_suffix("-ldo").unwrap_or(board)
 }
 
-/// Returns `true` if the core of this board can be supplied in two ways. An image is built for one of them. In ST's board
-/// names, `-q` means that the board has a switching regulator in addition to the linear one.
+/// Returns `true` if the processor core of this board has two possible power supplies. Each image is built for one of these supplies. In
+/// ST's board names, `-q` means that the board has a switching regulator in addition to the linear regulator.
 pub(super) fn has_two_supplies(board: &str) -> bool {
     same_board(board).ends_with("-q") || same_board(board) != board
 }
@@ -209,7 +209,7 @@ mod tests {
         for (label, code, of_h745, of_h743) in [
             ("NOD_H745ZIQ", None, Same, Other),
             ("NOD_H743ZI2", None, Other, Same),
-            // The older board of this name is a different board with other LEDs. Its label equals the cut label of the
+            // The older NUCLEO-H743ZI is a different board with other LEDs. The label of the older board equals the truncated label of the
             // newer board.
             ("NODE_H743ZI", None, Other, Unknown),
             ("NODE_H743ZI", Some("0836"), Other, Same),

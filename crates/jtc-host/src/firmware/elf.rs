@@ -1,4 +1,4 @@
-//! Extraction of the flash content of an ELF file. Only the necessary part of the format is parsed.
+//! Extraction of the flash content from an ELF file. The parser supports only the necessary part of the ELF format.
 
 use super::image::{ERASED, FLASH, STORED_ARM};
 
@@ -8,7 +8,7 @@ const MAGIC: [u8; 6] = [0x7F, b'E', b'L', b'F', 1, 1];
 const PT_LOAD: u32 = 1;
 /// ELF machine number of Arm.
 const EM_ARM: u16 = 40;
-/// Maximum number of segments. The programs of this project have fewer.
+/// Maximum number of segments. The programs of this project have fewer segments.
 const SEGMENTS_MAX: u16 = 64;
 
 /// Returns `true` if the file is an ELF file of any kind.
@@ -16,8 +16,8 @@ pub(super) fn is_elf(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC[..4])
 }
 
-/// Returns the flash content of the file, beginning with the first byte of the flash. Gaps are filled with the value of
-/// erased flash.
+/// Returns the flash content from the file; the result starts at the first byte of the flash. Gaps are filled with the value of erased
+/// flash.
 pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let damaged = || "an incomplete or damaged ELF file".to_owned();
     let half =
@@ -63,7 +63,7 @@ pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
 mod tests {
     use super::*;
 
-    /// Builds a file with these segments. Each has an address and bytes.
+    /// Builds an ELF file with these segments. Each segment consists of an address and bytes.
     fn file(segments: &[(u32, &[u8])]) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.resize(52, 0);

@@ -1,4 +1,4 @@
-//! Errors of writing an image to a board and of verifying that it runs there.
+//! Errors when an image is written to a board, and when the program verifies that the board runs it.
 
 use std::io;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub enum FirmwareError {
     NoImage {
         /// The file.
         path: PathBuf,
-        /// Fault of the file.
+        /// Description of the fault in the file.
         why: String,
     },
     /// No images are installed.
@@ -34,12 +34,12 @@ pub enum FirmwareError {
         /// Folders that were searched.
         folders: Vec<PathBuf>,
     },
-    /// The catalogue of images is invalid, or does not match its images.
+    /// The catalogue of images is invalid, or does not match the image files.
     #[error("{}: {why}", path.display())]
     BadCatalogue {
         /// The catalogue.
         path: PathBuf,
-        /// Fault of the catalogue.
+        /// Description of the fault in the catalogue.
         why: String,
     },
     /// The catalogue has no image for this board.
@@ -47,7 +47,7 @@ pub enum FirmwareError {
     NoBoard {
         /// Requested board.
         board: String,
-        /// The boards of the catalogue.
+        /// Boards in the catalogue.
         known: Vec<String>,
     },
     /// A file differs from the file of the release.
@@ -81,7 +81,7 @@ pub enum FirmwareError {
         /// Mount points of the drives.
         drives: Vec<PathBuf>,
     },
-    /// The board must be asked over a serial port before it is flashed, but the port cannot be used.
+    /// Before flashing, the program must query the board over a serial port, but the port cannot be used.
     #[error("the board must report its state over {port} before it is flashed: {source}")]
     NotAsked {
         /// The port.
@@ -95,7 +95,7 @@ pub enum FirmwareError {
         /// Description of the change.
         what: String,
     },
-    /// The arm has torque.
+    /// The drives of the arm produce torque, so the board must not be reset.
     #[error(
         "the controller at {port} holds an arm (state {state}); flashing resets the board, and the arm falls"
     )]
@@ -105,7 +105,7 @@ pub enum FirmwareError {
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// The controller on the line runs on another board than the board of the image.
+    /// The controller on the serial line runs on a board that does not match the image.
     #[error("the controller at {port} runs on {runs}, but the image is for {board}")]
     OtherController {
         /// Port of the controller.
@@ -125,7 +125,7 @@ pub enum FirmwareError {
         /// Board of the image.
         board: String,
     },
-    /// The drive does not give its board.
+    /// The drive does not name its board.
     #[error("{}: the drive{} does not report its board; the image is for {board}", drive.display(), of_label(label))]
     UnnamedBoard {
         /// The drive.
@@ -135,12 +135,12 @@ pub enum FirmwareError {
         /// Board of the image.
         board: String,
     },
-    /// The board may be wired for another core supply than the image needs.
+    /// The wiring of the board may use a core supply that does not match the image.
     #[error("the image is for {board}, {}", as_supplied(board, runs))]
     Supply {
         /// Board of the image.
         board: String,
-        /// Board of the running program, if the controller reports it and it differs from the image.
+        /// Board of the running program, if the controller reports it and if it differs from the board of the image.
         runs: Option<String>,
     },
     /// The drive has no space for a file of this size.
@@ -156,17 +156,17 @@ pub enum FirmwareError {
     /// The file on the drive cannot be created.
     #[error("{}: {}: {source}", path.display(), cannot_open(source))]
     NotOpened {
-        /// The file on the drive.
+        /// Path of the file on the drive.
         path: PathBuf,
-        /// Device that is mounted there, if it is known.
+        /// Block device of the drive, if it is known.
         device: Option<PathBuf>,
         /// Error of the operating system.
         source: io::Error,
     },
-    /// The copying was interrupted.
+    /// An error interrupted the copying of the file.
     #[error("{}: {source} after {written} bytes; the board may contain a part of the image", path.display())]
     NotWritten {
-        /// The file on the drive.
+        /// Path of the file on the drive.
         path: PathBuf,
         /// Number of bytes written before the error.
         written: usize,
@@ -181,25 +181,25 @@ pub enum FirmwareError {
         /// Content of `FAIL.TXT`.
         text: String,
     },
-    /// The drive does not behave as after accepting an image.
+    /// The behaviour of the drive shows that it has not accepted the image.
     #[error("the image was copied, but {seen}{}", with_doubt(doubt))]
     NotTaken {
-        /// Behaviour of the drive.
+        /// Observed behaviour of the drive.
         seen: DriveAfter,
-        /// Error that the system reported during the copying.
+        /// Error that the operating system reported during the copying.
         doubt: Option<String>,
     },
-    /// The running program is not the image.
+    /// The running program differs from the image.
     #[error("the board does not run {}: {why}; it reports {runs}", path.display())]
     OtherProgram {
         /// The image.
         path: PathBuf,
         /// Version and board that the controller reports.
         runs: String,
-        /// Difference between its flash and the image.
+        /// Difference between the flash of the board and the image.
         why: String,
     },
-    /// The running program does not report its flash.
+    /// The running program does not report the content of its flash.
     #[error(
         "the board runs {runs}, which does not report the content of its flash, so the image cannot be verified"
     )]
@@ -207,7 +207,7 @@ pub enum FirmwareError {
         /// Version and board that the controller reports.
         runs: String,
     },
-    /// No controller answers on the line.
+    /// No controller answers on the serial line.
     #[error("no controller answers")]
     NoController,
     /// No controller started in time.
@@ -220,7 +220,7 @@ pub enum FirmwareError {
         waited_s: f64,
         /// Last observation.
         last: String,
-        /// Error that the system reported during the copying.
+        /// Error that the operating system reported during the copying.
         doubt: Option<String>,
     },
     /// The serial port cannot be used.

@@ -17,8 +17,7 @@ use crate::port::{Port, PortError};
 /// Size of the program in an image, bytes.
 const PROGRAM: usize = 0x1000;
 
-/// Returns an image of a board with a content that depends on `seed`. If the board has a second core, the image contains a
-/// program for it.
+/// Returns an image for a board; the content depends on `seed`. If the board has a second core, the image contains a program for it.
 pub(super) fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     let mut bytes = vec![0; PROGRAM];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
@@ -44,7 +43,7 @@ pub(super) fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     bytes
 }
 
-/// Returns the flash report of a device with this image. The CRC is computed bit by bit, from its definition.
+/// Returns the report about the flash that a device with this image sends. The function computes the CRC bit by bit from the definition.
 pub(super) fn program_of(image: &[u8]) -> Program {
     let bytes = &image[..PROGRAM];
     let mut register = u32::MAX;
@@ -80,7 +79,7 @@ pub(super) fn catalogue(folder: &Path, boards: &[&str]) {
 pub(super) struct Board(Arc<Mutex<Flashed>>);
 
 struct Flashed {
-    /// `true` while the ST-LINK holds the processor.
+    /// `true` while the ST-LINK stops the processor.
     held: bool,
     program: Option<Program>,
     board: String,
@@ -105,12 +104,12 @@ impl Board {
         })))
     }
 
-    /// Changes the status that the board sends from then on.
+    /// Changes the status that the board sends from now on.
     pub(super) fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.0.lock().unwrap().status);
     }
 
-    /// Holds the processor, so that the board sends no data, or releases it.
+    /// Stops the processor, so that the board sends no data, or releases the processor.
     pub(super) fn hold(&self, held: bool) {
         self.0.lock().unwrap().held = held;
     }
@@ -176,9 +175,9 @@ impl Board {
 /// Reaction of an ST-LINK to a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Behaviour {
-    /// Writes the file into the flash. The drive vanishes and comes back.
+    /// Writes the file into the flash. The drive disappears and appears again.
     Takes,
-    /// Like `Takes`, but a part of the flash stays empty. This happens if the bytes arrive in another order.
+    /// Like `Takes`, but a part of the flash stays empty. A real ST-LINK behaves like this if the bytes arrive in another order.
     LeavesHole,
     /// Like `Takes`, but the previous program restarts before the ST-LINK stops it.
     StartsBeforeAnew,
@@ -198,7 +197,7 @@ pub(super) struct StLink {
 }
 
 impl StLink {
-    /// Creates a drive with this label for this board.
+    /// Creates a drive with the label `label` for `board`.
     pub(super) fn new(label: &str, board: &Board, behaviour: Behaviour) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(label);
@@ -209,12 +208,12 @@ impl StLink {
             let mut length = 0;
             while !end.load(Ordering::Relaxed) {
                 thread::sleep(Duration::from_millis(5));
-                // If the path leads to a device such as `/dev/full`, reading it would never end and use all memory.
+                // If the path is a link to a device such as `/dev/full`, reading would never end and would use all memory.
                 let file = at.join("openjtc.bin");
                 if !file.symlink_metadata().is_ok_and(|data| data.is_file()) {
                     continue;
                 }
-                // A file that is still growing is not complete.
+                // The file is incomplete while its size still increases.
                 let Ok(bytes) = fs::read(&file) else { continue };
                 if Image::parse(&file, bytes.clone()).is_err() || bytes.len() != length {
                     length = bytes.len();
@@ -257,7 +256,7 @@ fn work(path: &Path, board: &Board, behaviour: &Behaviour, mut bytes: Vec<u8>) {
             if *behaviour == Behaviour::LeavesHole {
                 bytes[0x800..0xA00].fill(0);
             }
-            // The start must be later than the tolerance for different clocks.
+            // The program must start later than the tolerance for clock differences.
             thread::sleep(Duration::from_millis(400));
             if *behaviour == Behaviour::StartsBeforeAnew {
                 board.start_with(&name, before);

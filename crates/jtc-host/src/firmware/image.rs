@@ -22,8 +22,8 @@ const VECTORS: usize = 166;
 /// Value of erased flash.
 pub(super) const ERASED: u8 = 0xFF;
 
-/// Memories that can hold a stack: the tightly coupled memory and the memory on the AXI bus. Each has its first address and
-/// the first address after its end.
+/// Memories that can contain a stack: the tightly coupled memory and the memory on the AXI bus. Each entry contains the first address and
+/// the first address after the end.
 const STACKS: [(u32, u32); 2] = [(0x2000_0000, 0x2002_0000), (0x2400_0000, 0x2408_0000)];
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
@@ -35,9 +35,9 @@ pub struct Record {
     pub version: String,
     /// Board of the image.
     pub board: String,
-    /// Commit, with `+` if files had changed since that commit.
+    /// Commit, with `+` if files were changed after that commit.
     pub build: String,
-    /// Rate of the serial lines, Bd.
+    /// Bit rate of the serial lines, Bd.
     pub baud: u32,
 }
 
@@ -47,7 +47,7 @@ impl Record {
     const MAGIC: &[u8] = b"OPENJTC\0";
     /// Size of the first version of the record, bytes. Later versions are longer.
     const LEN: usize = 96;
-    /// Valid rates of a build, Bd.
+    /// Bit rates that are valid in a record, Bd.
     const RATES: std::ops::RangeInclusive<u32> = 9_600..=15_000_000;
 
     /// Reads the record of an image; `None` if the offset does not contain a record.
@@ -70,7 +70,7 @@ impl Record {
     }
 }
 
-/// Flash image, from the first byte of the flash on.
+/// Flash image that starts at the first byte of the flash.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     path: PathBuf,
@@ -86,13 +86,13 @@ impl std::fmt::Debug for Image {
 }
 
 impl Image {
-    /// Reads a binary or an ELF file, and checks that it is firmware for a board of this project. If a catalogue in the
-    /// same folder lists the file, the content must match it.
+    /// Reads a binary or an ELF file, and checks that it is firmware for a board of this project. If a catalogue in the same folder lists
+    /// the file, the content must match the catalogue.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::File`] if the file cannot be read, [`FirmwareError::NoImage`] if it is not firmware for these
-    /// boards, and [`FirmwareError::Damaged`] if it differs from the catalogue.
+    /// [`FirmwareError::File`] if the file cannot be read, [`FirmwareError::NoImage`] if the file is not firmware for these boards, and
+    /// [`FirmwareError::Damaged`] if the file differs from the catalogue.
     pub fn read(path: &Path) -> Result<Self, FirmwareError> {
         let bytes = fs::read(path).map_err(|source| FirmwareError::File { path: path.to_owned(), source })?;
         let listed = Catalogue::lists(path, &bytes)?;
@@ -100,13 +100,13 @@ impl Image {
         Ok(if listed { image.listed() } else { image })
     }
 
-    /// Like [`Image::read`], but with the content of the file at `path`, and without a catalogue.
+    /// Like [`Image::read`], but takes the content `bytes` of the file at `path`, and does not use a catalogue.
     ///
     /// # Errors
     ///
     /// [`FirmwareError::NoImage`].
     pub fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, FirmwareError> {
-        // An ELF file contains the lengths of all its parts, so a cut is detected.
+        // An ELF file contains the lengths of all its parts, so a truncated file is detected.
         let whole = elf::is_elf(&bytes);
         let flat = if whole { elf::flat(&bytes) } else { Ok(bytes) };
         let looked_at = flat.and_then(|bytes| Ok((examine(&bytes)?, bytes)));
@@ -120,8 +120,8 @@ impl Image {
         Self { whole: true, ..self }
     }
 
-    /// Returns `true` if the image is known to be complete, because of the file format or a catalogue. In a binary file
-    /// alone, only some cuts are detected.
+    /// Returns `true` if the image is known to be complete, because of the file format or a catalogue. Without a catalogue, only some
+    /// truncated binary files are detected.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
@@ -141,12 +141,13 @@ impl Image {
         &self.record
     }
 
-    /// Checks that the flash report of a device matches this image (J-67). The CRC over the bytes that the device has read
-    /// must equal the CRC of these bytes in the image. The rest of bank 1 in the image may contain only filler.
+    /// Checks that the flash report of a device matches this image (J-67). The CRC over the bytes that the device has read must equal the
+    /// CRC of these bytes in the image. The remaining part of bank 1 in the image may contain only filler bytes (0 or the value of erased
+    /// flash).
     ///
     /// # Errors
     ///
-    /// Returns the difference in words.
+    /// Returns a description of the difference.
     pub fn is_what_runs(&self, program: Program) -> Result<(), String> {
         let bank1 = &self.bytes[..self.bytes.len().min(BANK1)];
         let Some((read, rest)) = bank1.split_at_checked(program.bytes as usize) else {
@@ -211,7 +212,7 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
 fn starts_second_core(bytes: &[u8]) -> bool {
     let bank2 = FLASH + BANK1 as u32;
     let reset = bytes.get(BANK1 + 4..BANK1 + 8).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    // The program begins with two instructions; the second one jumps back to the first.
+    // The program begins with two instructions; the second instruction jumps back to the first one.
     reset.is_some_and(|reset| {
         reset % 2 == 1 && reset >= bank2 && (reset & !1) + 4 <= FLASH + bytes.len() as u32
     })
@@ -283,14 +284,14 @@ mod tests {
         let path = folder.path().join("nucleo-h743zi2.bin");
         fs::write(&path, image_bytes("nucleo-h743zi2", 7)).unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
-        // A catalogue of other files and an invalid catalogue do not affect the file.
+        // A catalogue of other files and an invalid catalogue do not affect the result for the file.
         catalogue(folder.path(), &["nucleo-h745zi-q"]);
         assert!(!Image::read(&path).unwrap().is_whole());
         fs::write(folder.path().join("firmware.json"), "{").unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
         catalogue(folder.path(), &["nucleo-h743zi2"]);
         assert!(Image::read(&path).unwrap().is_whole());
-        // Cuts the file so that the file itself does not show the cut.
+        // The test truncates the file at a position at which the file content does not show the truncation.
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..0xFF0]).unwrap();
         assert!(parsed(bytes[..0xFF0].to_vec()).is_ok());
@@ -320,7 +321,7 @@ mod tests {
         assert!(image.is_what_runs(less).unwrap_err().contains("ends after"));
     }
 
-    /// Compares with the published check value of CRC-32/ISO-HDLC.
+    /// The test compares the CRC with the published check value of CRC-32/ISO-HDLC.
     #[test]
     fn j67_the_crc_is_that_of_ethernet_and_zlib() {
         assert_eq!(CRC.checksum(b"123456789"), 0xCBF4_3926);

@@ -1,8 +1,7 @@
-//! Serial lines on which the controller of a board is asked before the board is flashed.
+//! Serial lines on which the program queries the controller of a board before it flashes the board.
 //!
-//! The drive and the serial port of an ST-LINK belong to the same USB device. So this port leads to the board that is
-//! flashed, and is always asked. The caller can give another port in addition, because the controller may be in use over
-//! its RS422 line.
+//! The drive and the serial port of an ST-LINK belong to the same USB device. So this port is connected to the board that is flashed, and
+//! is always queried. The caller can pass one more port, because another program may use the controller over its RS422 line.
 
 use std::fs;
 use std::path::PathBuf;
@@ -12,11 +11,11 @@ use super::{Drive, FirmwareError, Places};
 use crate::port::{Port, PortError};
 use crate::session::Session;
 
-/// Function that opens a serial port exclusively for this program.
+/// Function that opens a serial port for exclusive use by this program.
 pub type OpenLine<'a> = dyn FnMut(&str) -> Result<Box<dyn Port>, PortError> + 'a;
 
-/// Lines on which controllers are asked. While they are open, neither another program nor an agent can reach a controller
-/// through them.
+/// Serial lines on which controllers are queried. While these lines are open, other programs and agents cannot reach a controller through
+/// them.
 pub struct Lines(Vec<Line>);
 
 struct Line {
@@ -26,7 +25,7 @@ struct Line {
 }
 
 impl Lines {
-    /// Opens the serial ports of the drive's own USB device, and the port `named` if there is one.
+    /// Opens the serial ports of the drive's own USB device, and the port `named` if the caller passes one.
     ///
     /// # Errors
     ///
@@ -55,7 +54,7 @@ impl Lines {
         Ok(Self(lines))
     }
 
-    /// Returns the current report on each line.
+    /// Returns the current report of the controller on each line.
     ///
     /// # Errors
     ///
@@ -71,8 +70,8 @@ impl Lines {
         Ok(Preflight { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
     }
 
-    /// Returns the serial line on which the new program is verified: the line of the board itself, or, if it has none, the
-    /// line that the user gave. The second value is `true` if the line belongs to the drive's USB device.
+    /// Returns the serial line on which the new program is verified. This is the line of the board itself, or, if the board has no line,
+    /// the line that the user selected. The second value is `true` if the line belongs to the drive's USB device.
     pub fn proving(&self) -> Option<(&str, Option<bool>)> {
         self.0.first().map(|line| (line.port.as_str(), line.same_device))
     }
@@ -82,7 +81,7 @@ fn not_asked(port: &str, source: PortError) -> FirmwareError {
     FirmwareError::NotAsked { port: port.to_owned(), source }
 }
 
-/// Returns the device node to which a port name leads, through symbolic links.
+/// Returns the device node to which a port name refers, after all symbolic links.
 fn real(port: &str) -> PathBuf {
     fs::canonicalize(port).unwrap_or_else(|_| port.into())
 }

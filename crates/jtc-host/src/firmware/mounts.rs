@@ -1,16 +1,16 @@
-//! Mount points of the drives of boards, and the serial ports on the same USB devices.
+//! Search for the mount points of board drives, and for the serial ports on the same USB devices.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Drive, FirmwareError, UsbDevice};
 
-/// Locations of the operating system's lists of drives and ports.
+/// Locations at which the operating system lists drives and ports.
 #[derive(Clone, Debug)]
 pub struct Places {
-    /// Mount table in the format of Linux.
+    /// Path of the mount table, which has the Linux format.
     pub mounts: PathBuf,
-    /// Folder with links from labels to devices.
+    /// Folder with links from volume labels to devices.
     pub by_label: PathBuf,
     /// Folders whose subfolders may be drives.
     pub folders: Vec<PathBuf>,
@@ -53,7 +53,7 @@ impl Places {
         drives
     }
 
-    /// Returns the drive at a given folder, with information of the operating system about it.
+    /// Returns the drive that is mounted at a folder, with information from the operating system.
     ///
     /// # Errors
     ///
@@ -68,11 +68,11 @@ impl Places {
         })
     }
 
-    /// Checks that the drive is still present and that it was not replaced by another one.
+    /// Checks that the drive is still present and that it was not replaced by another drive.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::Changed`]: no byte was written.
+    /// [`FirmwareError::Changed`] if the drive was removed or replaced; no byte was written.
     pub fn still_there(&self, drive: &Drive) -> Result<(), FirmwareError> {
         let what = match self.at(&drive.path) {
             Ok(now) if now == *drive => return Ok(()),
@@ -82,8 +82,8 @@ impl Places {
         Err(FirmwareError::Changed { what: format!("{}: {what}", drive.path.display()) })
     }
 
-    /// Returns the current state of the drive. The drive is found at its path. If its USB device is known, it is also
-    /// found in another folder after it was plugged in again.
+    /// Returns the current state of the drive. The function looks for the drive at its path. If its USB device is known, the function also
+    /// finds the drive in another folder after it was unplugged and plugged in again.
     pub fn again(&self, drive: &Drive) -> Option<Drive> {
         let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
         let own = connector(drive);
@@ -100,8 +100,8 @@ impl Places {
         drive.of_system(device, label, usb)
     }
 
-    /// Returns devices and mount points of file systems of the types that such a drive can have. If several are mounted at
-    /// one place, only the last one is visible.
+    /// Returns devices and mount points of file systems of the types that an ST-LINK drive can have. If several devices are mounted at one
+    /// folder, only the last one is visible.
     fn mounted(&self) -> Vec<(PathBuf, PathBuf)> {
         let table = fs::read(&self.mounts).unwrap_or_default();
         let mount = |line: &[u8]| {
@@ -131,7 +131,7 @@ impl Places {
         links.into_iter().find_map(label)
     }
 
-    /// Returns the names of the serial ports on the drive's USB device, and so on its board. The list is empty if the
+    /// Returns the names of the serial ports on the USB device of the drive, which are the ports of its board. The list is empty if the
     /// operating system does not report the USB devices. Linux does.
     pub fn ports_of(&self, drive: &Drive) -> Vec<String> {
         let Some(usb) = &drive.usb else { return Vec::new() };
@@ -143,7 +143,7 @@ impl Places {
         ports
     }
 
-    /// Returns `true` if a serial port and a drive belong to one USB device, and so to one board. Returns `None` if the
+    /// Returns `true` if a serial port and a drive belong to the same USB device, which means to the same board. Returns `None` if the
     /// operating system does not report the USB devices. Linux does.
     pub fn same_usb_device(&self, port: &str, drive: &Drive) -> Option<bool> {
         let of_port = self.usb_device("tty", Path::new(port))?;
@@ -154,7 +154,7 @@ impl Places {
     fn usb_device(&self, class: &str, node: &Path) -> Option<UsbDevice> {
         let node = fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
         let mut folder = fs::canonicalize(self.classes.join(class).join(node.file_name()?)).ok()?;
-        // The USB device is the folder that has a vendor id.
+        // The folder that contains a vendor id is the USB device.
         while !folder.join("idVendor").exists() {
             folder = folder.parent()?.to_owned();
         }
@@ -163,7 +163,7 @@ impl Places {
     }
 }
 
-/// Decodes the bytes of a path in the mount table. `\040` is a space.
+/// Decodes the bytes of a path in the mount table. For example, `\040` is a space.
 fn unescaped(text: &[u8]) -> Vec<u8> {
     let mut plain = Vec::new();
     let mut rest = text;
@@ -183,14 +183,14 @@ fn unescaped(text: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// Returns a path with these bytes. The bytes need not be valid text.
+/// Returns a path that consists of these bytes. The bytes may be invalid text.
 #[cfg(unix)]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     use std::os::unix::ffi::OsStringExt as _;
     Some(std::ffi::OsString::from_vec(bytes).into())
 }
 
-/// Returns a path with these bytes if they are valid text.
+/// Returns a path that consists of these bytes, if the bytes are valid text.
 #[cfg(not(unix))]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     String::from_utf8(bytes).ok().map(Into::into)
@@ -205,7 +205,7 @@ mod tests {
     use super::super::Fit;
     use super::*;
 
-    /// Two boards on USB, each with a drive and a serial port, and the locations of a system that has them.
+    /// Two boards on USB, each with a drive and a serial port, and the locations at which a system with these boards lists them.
     struct Desk {
         folder: tempfile::TempDir,
         places: Places,
@@ -246,7 +246,7 @@ mod tests {
             self.folder.path().join(name)
         }
 
-        /// Creates a drive in a folder of this name.
+        /// Creates a drive in a folder with the given name.
         fn mount(&mut self, device: &str, name: &[u8], kind: &str) -> PathBuf {
             let path = self.folder.path().join(OsStr::from_bytes(name));
             fs::create_dir_all(&path).unwrap();
@@ -282,7 +282,7 @@ mod tests {
             found,
             [(one.clone(), Some("NOD_H745ZIQ")), (desk.at("more/NOD_H743ZI2"), Some("NOD_H743ZI2"))]
         );
-        // The drive at a given path is the same drive, with the label of its device.
+        // The drive at the path is the same drive, with the label of the block device.
         let named = desk.places.at(&one).unwrap();
         assert_eq!((&named, named.fit("nucleo-h745zi-q")), (&drives[0], Fit::Same));
         assert_eq!(desk.places.at(&other).unwrap().label.as_deref(), Some("usb"));
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn the_name_of_a_folder_is_no_label_where_the_device_is_known() {
         let mut desk = Desk::new();
-        // The second NUCLEO-H743ZI of a computer. Its folder has the label of the first board with a digit appended.
+        // This is the second NUCLEO-H743ZI on a computer. The name of its folder is the label of the first board with an appended digit.
         let path = desk.mount("dev/sdb", b"NODE_H743ZI2", "vfat");
         let drive = desk.places.at(&path).unwrap();
         assert_eq!((drive.label.as_deref(), drive.fit("nucleo-h743zi2")), (None, Fit::Unknown));
@@ -318,7 +318,7 @@ mod tests {
         assert_eq!(same(&port("ttyACM0")), Some(true));
         assert_eq!(same(&port("ttyACM1")), Some(false));
         assert_eq!((same("/dev/ttyS0"), same("/tmp/jtc")), (None, None));
-        // An unknown drive has no ports.
+        // No serial ports are found for an unknown drive.
         let unknown = Drive::at(&path).unwrap();
         assert_eq!(desk.places.ports_of(&unknown), [""; 0]);
         assert_eq!(desk.places.same_usb_device(&port("ttyACM0"), &unknown), None);
@@ -357,10 +357,10 @@ mod tests {
         refused(&desk);
         fs::write(desk.at("1-2/devnum"), "7\n").unwrap();
         desk.places.still_there(&drive).unwrap();
-        // Another board is mounted at that place.
+        // Another board is mounted at the path of the drive.
         desk.mount("dev/sdb", b"one", "vfat");
         refused(&desk);
-        // No drive is mounted at that place, and the folder is on this computer's disk.
+        // No drive is mounted at the path, and the folder is on a disk of this computer.
         fs::write(desk.at("mounts"), "").unwrap();
         refused(&desk);
         fs::remove_dir_all(&path).unwrap();

@@ -1,8 +1,8 @@
-//! Check of a board before it is flashed: the state of its controller, and whether it is safe to stop the controller.
+//! Check of a board before flashing: the state of the controller, and if the controller can be stopped safely.
 //!
-//! A flash resets the processor. The drives then receive no more frames, and an arm that they hold falls. So a board whose
-//! controller reports torque is never flashed. If the report is incomplete, or may come from another controller, an
-//! operator must confirm the flash.
+//! Flashing resets the processor of the board. After the reset, the drives no longer receive frames, and an arm that is held by the drives
+//! falls. Therefore a board is never flashed while its controller reports torque. If the report is incomplete, or may come from another
+//! controller, an operator must confirm the flashing.
 
 use std::time::Duration;
 
@@ -14,13 +14,13 @@ use crate::error::LinkError;
 use crate::port::Port;
 use crate::session::{Session, Timeouts};
 
-/// If no status arrives for this time, no controller runs on the line. A controller sends a status every 40 ms.
+/// Time without a status after which the program assumes that no controller is on the line. A controller sends a status every 40 ms.
 const SILENT: Duration = Duration::from_millis(1_500);
 
 /// Report of the controller on a serial line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answers {
-    /// No readable data: the board has no firmware, another firmware, or another rate.
+    /// The line has no readable data, because the board has no firmware, another firmware or another bit rate.
     Nothing {
         /// Number of bytes received.
         bytes: u64,
@@ -29,24 +29,24 @@ pub enum Answers {
     Controller {
         /// State of the controller.
         state: Code<ControllerState>,
-        /// `true` if the arm has torque.
+        /// `true` if the drives of the arm produce torque.
         torque: bool,
         /// Joints that do not answer the controller, so that their torque is unknown.
         silent: Vec<Joint>,
         /// `true` if the gripper is on, so that it may hold a part.
         grips: bool,
-        /// Identity of the controller. `None` if it has no extensions, or if the report was not understood.
+        /// Identity of the controller. `None` if the controller has no extensions, or if the program cannot read the report.
         info: Option<Box<Info>>,
     },
 }
 
-/// Serial line over which the board was asked.
+/// Serial line on which the board was queried.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
     /// Name of the port.
     pub port: String,
-    /// `true` if line and drive belong to one USB device, and so to one board. `None` if the operating system does not
-    /// know.
+    /// `true` if the line and the drive belong to the same USB device, which means to the same board. `None` if the operating system does
+    /// not report it.
     pub same_device: Option<bool>,
     /// Report of the controller on the line.
     pub answers: Answers,
@@ -65,8 +65,7 @@ impl Asked {
         self.same_device == Some(true)
     }
 
-    /// Returns the reasons why the flash needs a confirmation. This method does not check if the line belongs to the
-    /// board.
+    /// Returns the reasons why the operator must confirm the flashing. This method does not check if the line belongs to the board.
     fn doubts(&self) -> Option<String> {
         match &self.answers {
             Answers::Nothing { bytes: 0 } => None,
@@ -88,10 +87,11 @@ impl Asked {
     }
 }
 
-/// Facts about a board before it is flashed: the report on each line that was asked. Without lines, no controller was asked.
+/// Facts about a board before flashing: the controller's report on each line that was queried. If the list of lines is empty, no controller
+/// was queried.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Preflight {
-    /// Lines that were asked.
+    /// Lines that were queried, each with the report.
     pub lines: Vec<Asked>,
 }
 
@@ -101,12 +101,12 @@ impl Preflight {
         self.lines.iter().filter(|line| line.is_own()).filter_map(Asked::info)
     }
 
-    /// Returns the identity of the board's own controller, or, if it is unknown, of another controller that was asked.
+    /// Returns the identity of the board's own controller, or, if that is unknown, of another controller that was queried.
     pub fn info(&self) -> Option<&Info> {
         self.own_info().next().or_else(|| self.lines.iter().find_map(Asked::info))
     }
 
-    /// Returns `true` if the board stores an arm, which a flash might remove.
+    /// Returns `true` if the board stores an arm, which flashing might remove.
     pub fn stored_arm(&self) -> Option<bool> {
         self.info().map(|info| info.store == StoreState::Stored)
     }
@@ -142,16 +142,16 @@ impl Preflight {
     }
 }
 
-/// Statements that the operator has confirmed beforehand.
+/// Statements that the operator has already confirmed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Permissions {
-    /// A drive whose board is unknown belongs to the image's board.
+    /// `true` if the operator confirmed that a drive with an unknown board belongs to the board of the image.
     pub assume_board: bool,
-    /// The solder bridges of the board are set for the core supply that the image needs.
+    /// `true` if the operator confirmed that the solder bridges of the board match the core supply that the image needs.
     pub accept_supply: bool,
 }
 
-/// Requests the present state from the controller on a line.
+/// Requests the current state from the controller on a line.
 ///
 /// # Errors
 ///
@@ -164,7 +164,8 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     if answered(session.poll(SILENT))?.flatten().is_none() {
         return silent(session);
     }
-    // The statuses may have been buffered for minutes while the operator was asked. Waiting for this answer skips them.
+    // Status frames may have been buffered for minutes while the program waited for the operator. The program skips these frames because it
+    // waits for the answer to this request.
     let info = answered(session.info())?.flatten().map(Box::new);
     match answered(session.fresh_status())? {
         Some(status) => Ok(controller(&status, info)),
@@ -183,7 +184,7 @@ fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError>
 
 fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     let flag = |joint: &Joint| status.can_current & can_flag::no_answer(joint.index()) != 0;
-    // All joints begin in Start. A joint that is still in this state has not answered yet.
+    // All joints begin in Start. A joint that is still in Start has not answered yet.
     let begins = |joint: &Joint| status.joints[joint.index()].state == NodeState::START;
     let grips = status.gripper.is_some_and(|gripper| gripper.pump != 0 || !is_idle(gripper.state));
     Answers::Controller {
@@ -195,15 +196,14 @@ fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     }
 }
 
-/// Returns `true` if the arm has or may have torque. This is derived from the states of the controller and the drives.
+/// Returns `true` if the arm has or may have torque. The result is derived from the states of the controller and the drives.
 fn has_torque(status: &Status) -> bool {
     let idle = [ControllerState::Init, ControllerState::Error].into_iter().any(|idle| status.state == idle);
     !idle || status.joints.iter().any(|joint| !is_idle(joint.state))
 }
 
-/// Returns `true` if the motor of this node is off. Returns `false` in the transitions to and from *enabled*, in the
-/// reaction to a fault, and in states of later drives that this program does not know, because the motor may hold, align or
-/// calibrate then.
+/// Returns `true` if the motor of this node is off. Returns `false` in the transitions to and from *enabled*, in the reaction to a fault,
+/// and in states of later drives that this program does not know, because the motor may hold, align or calibrate in these states.
 fn is_idle(state: NodeState) -> bool {
     [
         NodeState::START,
@@ -216,12 +216,12 @@ fn is_idle(state: NodeState) -> bool {
     .contains(&state)
 }
 
-/// Checks that this image may be written to the board of this drive.
+/// Checks that the image may be written to the board of the drive.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::HasTorque`], [`FirmwareError::OtherBoard`], [`FirmwareError::OtherController`],
-/// [`FirmwareError::UnnamedBoard`] and [`FirmwareError::Supply`]: no byte was written.
+/// [`FirmwareError::HasTorque`], [`FirmwareError::OtherBoard`], [`FirmwareError::OtherController`], [`FirmwareError::UnnamedBoard`] and
+/// [`FirmwareError::Supply`] if the image must not be written; no byte was written.
 pub fn may_flash(
     image: &Image,
     drive: &Drive,
@@ -254,7 +254,7 @@ pub fn may_flash(
             board: board.clone(),
         });
     }
-    // A program that runs shows that the board has the supply that it needs. The solder bridges cannot be read.
+    // A running program proves that the board has the core supply that this program needs. Software cannot read the solder bridges.
     let mut runs = before.own_info().map(|info| info.board.as_str());
     let runs_this = runs.next().is_some_and(|runs| runs == board) && runs.all(|runs| runs == board);
     let supply_known = !has_two_supplies(board) || runs_this;

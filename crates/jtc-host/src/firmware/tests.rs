@@ -1,4 +1,4 @@
-//! Tests from reading a file to verifying it, with a simulated board and ST-LINK.
+//! Tests of all steps, from reading an image file to verifying the flash, with a simulated board and ST-LINK.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ mod before;
 mod lines;
 
 const H745: &str = "nucleo-h745zi-q";
-/// Limits for tests in which the expected event happens at once, and for tests in which it never happens.
+/// Time limits for tests in which the expected event occurs immediately, followed by limits for tests in which it never occurs.
 const LIMITS: Limits = Limits { wait: Duration::from_secs(20), pause: Duration::from_millis(20) };
 const SHORT: Limits = Limits { wait: Duration::from_millis(300), pause: Duration::from_millis(20) };
 
@@ -23,7 +23,7 @@ fn image(board: &str, seed: u8) -> Image {
     Image::parse(Path::new("new.bin"), image_bytes(board, seed)).unwrap()
 }
 
-/// Returns the locations of a system without drives and ports.
+/// Returns the locations on a system without drives and ports.
 fn places() -> Places {
     let nowhere = || Path::new("/nowhere-of-test").to_owned();
     Places {
@@ -35,7 +35,7 @@ fn places() -> Places {
     }
 }
 
-/// Returns the report of the board on a line. `same_device` tells if the line belongs to the drive's USB device.
+/// Returns the report of the board on a line. `same_device` is `true` if the line belongs to the drive's USB device.
 fn asked(board: &Board, same_device: Option<bool>) -> Preflight {
     let answers = look(&mut Session::new(board.port())).unwrap();
     Preflight { lines: vec![Asked { port: "ttyX".into(), same_device, answers }] }
@@ -64,7 +64,7 @@ fn j67_a_board_is_flashed_and_proves_it() {
     assert_eq!(verification.program, program_of(&image_bytes(H745, 2)));
     assert_eq!((verification.info.firmware(), verification.stored_arm()), ("0.2.0", true));
     assert_eq!(verification.drive, DriveAfter::CameBack);
-    // Each request confirms the new image and rejects the old one.
+    // The answer to each request confirms the new image and rejects the old image.
     let info = Session::new(board.port()).info().unwrap().unwrap();
     assert!(compare(&image(H745, 2), &info).is_ok());
     let said = compare(&image(H745, 1), &info).unwrap_err().to_string();
@@ -88,7 +88,7 @@ fn j67_the_program_of_before_may_start_anew_before_it_is_stopped() {
 
 #[test]
 fn a_controller_that_never_has_read_its_flash_is_not_waited_for() {
-    // The clock of this controller does not advance, so it always appears to be in its first second.
+    // The clock of this controller does not advance, so the device always appears to have just started.
     let mut asked = 0;
     let port = crate::port::test::ScriptedPort::new(Some(9_600), move |_, bytes| {
         if bytes.is_empty() {
@@ -114,7 +114,7 @@ fn what_fail_txt_says_is_reported() {
     let error = verification.unwrap_err();
     assert!(error.to_string().ends_with("The target flash is write protected"), "{error}");
     assert_eq!(error.kind(), ErrorKind::Device);
-    // The text of an earlier attempt is not considered a report of the next attempt.
+    // The program does not treat the failure text of an earlier attempt as a report about the next attempt.
     let (drive, new) = (link.drive(), image(H745, 2));
     let written = write_image(&drive, &new, &mut |_| {}).unwrap();
     assert_eq!(written.failure_before.as_deref(), Some("The target flash is write protected"));
@@ -146,7 +146,7 @@ fn a_drive_that_does_not_come_back_is_no_success_where_the_system_is_in_doubt() 
     let drive = link.drive();
     let written = write_image(&drive, &image(H745, 2), &mut |_| {}).unwrap();
     let doubtful = Written { doubt: Some("Input/output error".into()), ..written.clone() };
-    // A drive that never vanishes has not accepted the image. A drive that was removed may have.
+    // A drive that never disappears has not accepted the image. A drive that was removed may have accepted the image.
     let stayed = wait_for_drive(&places(), &drive, &written, SHORT).unwrap_err();
     assert!(stayed.to_string().contains("has not disappeared"), "{stayed}");
     fs::remove_dir_all(&link.path).unwrap();
@@ -167,9 +167,9 @@ fn nothing_is_written_where_the_drive_has_gone() {
         assert_eq!(error.kind(), ErrorKind::Refused);
         assert!(!link.path.join("openjtc.bin").exists());
     };
-    // Another file system is mounted at the path now.
+    // The test simulates that another file system is now mounted at the path.
     refused(&Drive { volume: Some(u64::MAX), ..drive.clone() });
-    // The mount point is an empty folder now.
+    // The mount point is now an empty folder.
     fs::remove_file(link.path.join("DETAILS.TXT")).unwrap();
     refused(&drive);
 }
@@ -205,7 +205,7 @@ fn a_drive_that_may_not_be_written_says_how_it_can() {
     }
 }
 
-/// Linux has a device that is always full.
+/// On Linux, the device `/dev/full` is always full.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_drive_that_is_full_says_what_that_means() {

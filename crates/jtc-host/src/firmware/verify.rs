@@ -1,4 +1,4 @@
-//! Verification after an image was copied to a drive: the report of the drive, and the flash report of the running program.
+//! Verification after an image was copied to a drive, with the report of the drive and the flash report of the running program.
 
 use std::fmt;
 use std::thread::sleep;
@@ -11,27 +11,27 @@ use crate::error::LinkError;
 use crate::port::{Port, PortError};
 use crate::session::{Session, Timeouts};
 
-/// Time after its start in which a device reads its flash (J-67).
+/// Time after the start within which a device reads its flash (J-67).
 const READ_WITHIN: Duration = Duration::from_secs(3);
-/// Tolerance between two clocks: a relative difference, and a delay until the start is observed.
+/// Tolerance between two clocks: a relative difference, and a delay until the program observes the start of a device.
 const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
 
-/// Time after the copying in which the previous program may still run, until the ST-LINK stops it.
+/// Time after the copying during which the previous program may still run before the ST-LINK stops it.
 const OTHER_STOPS: Duration = Duration::from_secs(10);
-/// Longest wait for a controller to read its flash, on the clock of the line.
+/// Maximum time to wait until a controller has read its flash, measured with the clock of the line.
 const READS_NOW: Duration = Duration::from_secs(5);
 
 /// Waiting times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Total wait for the controller to start with the image.
+    /// Maximum time to wait until the controller has started with the image.
     pub wait: Duration,
     /// Pause between two attempts.
     pub pause: Duration,
 }
 
 impl Default for Limits {
-    /// Returns 120 s and 250 ms. The ST-LINK needs half a minute for a megabyte, and an operating system needs some more
+    /// Returns 120 s for `wait` and 250 ms for `pause`. The ST-LINK needs 30 s for one megabyte, and an operating system needs some more
     /// seconds to mount a drive.
     fn default() -> Self {
         Self { wait: Duration::from_secs(120), pause: Duration::from_millis(250) }
@@ -45,9 +45,9 @@ pub type OpenPort<'a> = dyn FnMut() -> Result<Box<dyn Port>, PortError> + 'a;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriveAfter {
-    /// The drive vanished and came back, which is normal after an accepted image.
+    /// The drive disappeared and appeared again, which is normal after it has accepted an image.
     CameBack,
-    /// The drive vanished and has not come back. This happens on a system that does not mount drives automatically.
+    /// The drive disappeared and has not appeared again. This is normal on a system that does not mount drives automatically.
     Gone,
     /// The drive was present all the time.
     Stayed,
@@ -72,7 +72,7 @@ pub struct Verification {
     pub program: Program,
     /// Behaviour of the drive.
     pub drive: DriveAfter,
-    /// Time from the copying to the verification.
+    /// Time between the copying and the verification.
     pub took: Duration,
 }
 
@@ -83,7 +83,7 @@ impl Verification {
     }
 }
 
-/// Observes a drive again and again.
+/// Observer that repeatedly checks the state of a drive.
 struct Watch<'a> {
     places: &'a Places,
     drive: &'a Drive,
@@ -92,7 +92,7 @@ struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// Returns an error if the drive reports one.
+    /// Returns an error if the drive reports a failure.
     fn look(&mut self) -> Result<(), FirmwareError> {
         let now = self.places.again(self.drive);
         self.seen = match (&now, self.seen) {
@@ -103,7 +103,7 @@ impl Watch<'_> {
             (Some(_), _) => DriveAfter::CameBack,
         };
         let Some(now) = now else { return Ok(()) };
-        // The drive shows an old report until it vanishes. Such a report is not about this image.
+        // The drive shows an old failure report until the drive disappears. An old report does not concern this image.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };
@@ -114,13 +114,13 @@ impl Watch<'_> {
     }
 }
 
-/// Waits until the drive has come back, or until the time limit. Used for boards without a serial line. The result does not
-/// prove that the image runs.
+/// Waits until the drive has appeared again, at most until the time limit. The function is used for boards without a serial line. The
+/// result does not prove that the image runs.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] if the drive has not vanished, or if it has not come back and
-/// the operating system could not confirm that all bytes were written.
+/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] if the drive has not disappeared, or if it has not appeared again and the
+/// operating system could not confirm that all bytes were written.
 pub fn wait_for_drive(
     places: &Places,
     drive: &Drive,
@@ -138,7 +138,7 @@ pub fn wait_for_drive(
     let (seen, doubt) = (watch.seen, written.doubt.clone());
     match seen {
         DriveAfter::CameBack => Ok(seen),
-        // On a system that does not mount drives automatically, the drive does not come back.
+        // On a system that does not mount drives automatically, the drive does not appear again.
         DriveAfter::Gone if doubt.is_none() => Ok(seen),
         DriveAfter::Gone | DriveAfter::Stayed => Err(FirmwareError::NotTaken { seen, doubt }),
     }
@@ -169,7 +169,7 @@ pub fn verify_program(
             Ok(Some(info)) if still_reads(&info) => "the controller still reads its flash".into(),
             Ok(Some(info)) => match compare(image, &info) {
                 Ok(program) => {
-                    // The drive may have come back in the meantime, and it may contain a report.
+                    // The drive may have appeared again in the meantime and may contain a failure report.
                     watch.look()?;
                     return Ok(Verification {
                         info,
@@ -192,8 +192,8 @@ pub fn verify_program(
     }
 }
 
-/// Returns `true` if the running program will not be replaced any more. The previous program restarts before the ST-LINK
-/// begins to write, and after a reset without a write.
+/// Returns `true` if the running program will no longer be replaced. The previous program can restart before the ST-LINK begins to write,
+/// and after a reset without a write.
 fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
     let written = watch.written;
     watch.seen == DriveAfter::CameBack
@@ -201,7 +201,7 @@ fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
         || written.began.elapsed() >= limits.wait
 }
 
-/// Returns `true` if the device has started within this time.
+/// Returns `true` if the device started during the last `time`.
 fn started_since(info: &Info, time: Duration) -> bool {
     let (share, late) = CLOCKS_DIFFER;
     Duration::from_millis(info.uptime_ms) + time.mul_f64(share) + late < time
@@ -228,16 +228,16 @@ pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Inf
     }
 }
 
-/// Returns the identity of the controller. The timeouts are short, because the caller repeats the request.
+/// Requests and returns the identity of the controller. The timeouts are short, because the caller repeats the request.
 fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
     let mut session = Session::new(port);
     session.timeouts = Timeouts { status: limits.pause * 4, confirmation: limits.pause * 2, tries: 2 };
-    // While the ST-LINK holds the processor, a request would only time out.
+    // While the ST-LINK stops the processor, a request would only time out.
     session.next_status()?;
     session.info()
 }
 
-/// Checks that the program that the controller reports is the image (J-67).
+/// Checks that the program reported by the controller is the program of the image (J-67).
 ///
 /// # Errors
 ///
@@ -262,7 +262,7 @@ mod tests {
         let since = |uptime_ms, time_s| {
             started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
         };
-        // The device started just before the copying began, and its clock is 5 % slow.
+        // The device started just before the copying began, and the clock of the device is 5 % too slow.
         assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
         assert!(since(1_000, 10.0) && since(0, 0.4));
     }

@@ -1,4 +1,4 @@
-//! Copying an image to the drive of a board.
+//! Copying of an image to the drive of a board.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
@@ -8,35 +8,34 @@ use std::time::Instant;
 use super::drive::volume;
 use super::{Drive, FirmwareError, Image};
 
-/// Name of the file on the drive. The ST-LINK consumes the bytes when they arrive, so the file does not remain.
+/// Name of the file on the drive. The ST-LINK uses the bytes immediately when they arrive, so the file does not remain on the drive.
 const FILE: &str = "openjtc.bin";
-/// Number of bytes per write. Small writes make it possible to show the progress. The operating system decides in which
-/// order the bytes reach the drive. A flush after each write would also write the length of a partial file into the
-/// directory, and the ST-LINK might consider that part the whole file. The flash report of the program reveals damage from
-/// a wrong order.
+/// Number of bytes per write. Because each write is small, the program can show the progress. The operating system decides in which order
+/// the bytes reach the drive. A flush after each write would also write the length of a partial file to the directory. The ST-LINK might
+/// then treat the partial file as complete. The flash report of the program shows damage that a wrong order causes.
 const PIECE: usize = 32 * 1024;
 
-/// Image that was passed to the drive.
+/// Record of an image that was copied to the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
     /// Time when the copying began. A controller that started before this time runs the previous program.
     pub began: Instant,
-    /// Time when this computer had passed on all bytes.
+    /// Time when this computer had sent all bytes to the drive.
     pub ended: Instant,
     /// Content of `FAIL.TXT` before the copying.
     pub failure_before: Option<String>,
-    /// Reason why the operating system could not confirm that all bytes were written. The drive vanishes after the last
-    /// byte, and some systems report this as an error. Only the content of the flash shows if the write succeeded.
+    /// Reason why the operating system could not confirm that all bytes were written. The drive disappears after the last byte, and some
+    /// systems report this as an error. Only the content of the flash shows if the write succeeded.
     pub doubt: Option<String>,
 }
 
-/// Copies the image to the drive. `progress` receives the number of bytes so far. Writes nothing if the drive was removed
-/// in the meantime, so that its folder is on a disk of this computer.
+/// Copies the image to the drive. `progress` receives the number of bytes copied so far. Does not write if the drive was removed in the
+/// meantime, because the folder is then on a disk of this computer.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`]: no byte was written. [`FirmwareError::DriveFull`] and
-/// [`FirmwareError::NotWritten`]: the board has the previous program, or only a part of one.
+/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`] if no byte was written. [`FirmwareError::DriveFull`] and
+/// [`FirmwareError::NotWritten`] if the copying failed; the board has the previous program or only a part of a program.
 pub fn write_image(
     drive: &Drive,
     image: &Image,
@@ -72,7 +71,7 @@ pub fn write_image(
     Ok(Written { began, ended: Instant::now(), failure_before, doubt })
 }
 
-/// Creates the file on the drive. A file that was created on another file system instead is removed.
+/// Creates the file on the drive. If the file was created on another file system, the function removes it.
 fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let gone =
         || FirmwareError::Changed { what: format!("{}: the drive has disappeared", drive.path.display()) };
@@ -83,17 +82,17 @@ fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let not_opened =
         |source| FirmwareError::NotOpened { path: path.to_owned(), device: drive.device.clone(), source };
     let file = OpenOptions::new().write(true).create(true).truncate(true).open(path).map_err(not_opened)?;
-    // The drive may have been removed since the first check. The open file cannot move to another file system.
+    // The drive may have been removed since the first check. An open file always stays on its file system, so this check is final.
     if file.metadata().is_ok_and(|found| !found.is_file() || is_drive(&found)) {
         return Ok(file);
     }
     drop(file);
-    // The file is empty and on a disk of this computer.
+    // The file is empty and is on a disk of this computer.
     let _ = fs::remove_file(path);
     Err(gone())
 }
 
-/// Waits until the bytes have left this computer.
+/// Waits until this computer has sent all bytes to the drive.
 fn flushed(file: &File) -> io::Result<()> {
     file.sync_all()
 }

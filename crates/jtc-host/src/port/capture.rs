@@ -1,4 +1,4 @@
-//! Raw record of both directions of a port. Each line has the time in seconds, the direction, and bytes in hexadecimal.
+//! Raw capture of both directions of a port. Each text line contains the time in seconds, the direction, and the bytes in hexadecimal.
 //!
 //! ```text
 //! 0.001250 > 9B 06 00 06 0A E6
@@ -13,9 +13,9 @@ use super::{Halts, Port, PortError};
 /// Direction of bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// From the host to the controller, `>`.
+    /// Bytes from the host to the controller, written as `>`.
     ToDevice,
-    /// From the controller to the host, `<`.
+    /// Bytes from the controller to the host, written as `<`.
     ToHost,
 }
 
@@ -27,7 +27,7 @@ pub struct Capture<P, W: Write> {
 }
 
 impl<P: Port, W: Write> Capture<P, W> {
-    /// Wraps `port`. The lines are written to `out`.
+    /// Wraps `port`. Creates a capture of `port` that is written to `out`.
     pub fn new(port: P, out: W) -> Self {
         Self { port, out, failed: None }
     }
@@ -50,7 +50,7 @@ impl<P: Port, W: Write> Capture<P, W> {
         for b in bytes {
             let _ = write!(line, " {b:02X}");
         }
-        // A full disk must not end a motion. So the error is kept for `finish`.
+        // A motion must continue even if the disk is full. So the error is stored, and `finish` returns it.
         self.failed = writeln!(self.out, "{line}").err();
     }
 }
@@ -91,18 +91,18 @@ impl<P: Port, W: Write> Port for Capture<P, W> {
     }
 }
 
-/// A line of a capture.
+/// Text line of a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Captured {
     /// Time, s.
     pub time_s: f64,
     /// Direction of the bytes.
     pub direction: Direction,
-    /// Bytes sent or received.
+    /// Bytes that were sent or received.
     pub bytes: Vec<u8>,
 }
 
-/// Reads a capture. The error for an invalid line contains the line number.
+/// Reads a capture. Reads a capture. The error for an invalid line contains the line number.
 ///
 /// # Errors
 ///

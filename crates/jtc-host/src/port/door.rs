@@ -1,4 +1,4 @@
-//! The door of an open port: a socket through which other programs of the same user can stop the arm.
+//! Door of an open port, which is a socket through which other programs of the same user can stop the arm.
 
 use std::fs;
 use std::io;
@@ -16,20 +16,20 @@ use super::halt::{Answer, End, REQUEST_MAX, Request, may_ask, peer, read_line, s
 use super::line::{Counted, Line};
 use super::runtime;
 
-/// Maximum number of programs served at the same time.
+/// Maximum number of programs that a door serves at the same time.
 const ASKERS: usize = 8;
-/// Maximum delay until the door notices that it is closed, if no event wakes it.
+/// Maximum time until the thread of the door detects that the door is closed, if no event wakes the thread.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
-/// Pause after a connection that could not be accepted.
+/// Pause after an attempt to accept a connection has failed.
 const RETRY: Duration = Duration::from_millis(20);
-/// Timeout for a request and for writing an answer.
+/// Timeout for receiving a request and for writing an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// An open door. The door must be closed before the port, because the next program that opens the port creates a door at
-/// the same path.
+/// An open door. Door of an open port. The door must be closed before the port, because the next program that opens the port creates a door
+/// at the same path.
 pub(super) struct Door {
     path: PathBuf,
-    /// Device and inode of the socket. Both show if another program has since created a socket at the same path.
+    /// Device and inode of the socket. These numbers show if another program has created a new socket at the same path.
     file: (u64, u64),
     line: Arc<Line>,
     thread: Option<JoinHandle<()>>,
@@ -61,13 +61,13 @@ impl Door {
 impl Drop for Door {
     fn drop(&mut self) {
         self.line.close();
-        // Wakes the thread at once. Without this connection the thread would notice after at most 200 ms.
+        // The connection wakes the thread immediately. Without the connection, the thread would detect the end after at most 200 ms.
         let _ = UnixStream::connect(&self.path);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
         if file_of(&self.path) == Some(self.file) {
-            // The file may have been deleted already.
+            // Another program may have already deleted the file.
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -77,8 +77,8 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// Creates the socket. An existing socket that no program serves was left by a killed program, and is replaced. If a program
-/// still serves it, the socket is kept: that program belongs to the superuser, who can open any port.
+/// Creates the socket. Opens a socket at `path`. If no program serves an existing socket, a killed program left it, and it is replaced. If
+/// a program still serves the socket, it is not replaced. This program belongs to the superuser, who can open any port.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {
         return Err(io::ErrorKind::AddrInUse.into());
@@ -102,7 +102,7 @@ fn serve(listener: &UnixListener, line: &Line) {
                 Ok((stream, _)) => stream,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => continue,
                 Err(_) => {
-                    // The cause may be too many open files. Without a pause the next attempt would fail in the same way.
+                    // The cause may be too many open files. Without a pause, the next attempt would fail in the same way.
                     std::thread::sleep(RETRY);
                     continue;
                 }
@@ -124,7 +124,7 @@ fn serve(listener: &UnixListener, line: &Line) {
     });
 }
 
-/// Reader with one deadline for a whole request, even if its bytes arrive slowly.
+/// Reader with one common deadline for a whole request, even if its bytes arrive slowly.
 struct Within<'a> {
     stream: &'a UnixStream,
     end: Instant,
@@ -141,7 +141,7 @@ impl io::Read for Within<'_> {
     }
 }
 
-/// Executes the request of a client program.
+/// Executes the request of a client program and answers it.
 fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     stream.set_nonblocking(false)?;
     stream.set_write_timeout(Some(PATIENCE))?;
@@ -151,7 +151,7 @@ fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     let answer = Answer::of(line.path.clone(), line.baud, done);
     write_line(stream, &answer)?;
     if !answer.confirmed {
-        // The client reports the error and does not wait for the end.
+        // The client reports the error and does not wait for the final message.
         return Ok(());
     }
     let Some((status, standstill)) = line.wait_for_rest(request.halt) else { return Ok(()) };

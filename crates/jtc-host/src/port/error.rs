@@ -14,7 +14,7 @@ pub enum PortError {
         /// Name of the port.
         path: String,
     },
-    /// The operating system does not let this user open the port.
+    /// The operating system does not allow this user to open the port.
     #[error("{path}: no permission to open this port")]
     Permission {
         /// Name of the port.
@@ -26,12 +26,12 @@ pub enum PortError {
         /// Name of the port.
         path: String,
     },
-    /// The device does not support this rate.
+    /// The device does not support this bit rate.
     #[error("{path}: the port refuses {baud} Bd")]
     Baud {
         /// Name of the port.
         path: String,
-        /// Requested rate, bits per second.
+        /// Requested bit rate, bits per second.
         baud: u32,
     },
     /// The port disappeared while it was open.
@@ -66,7 +66,7 @@ pub enum PortError {
         /// Cause.
         what: String,
     },
-    /// The other end accepts no bytes.
+    /// The other end of the connection does not accept bytes.
     #[error("{path}: the port accepted no byte for {seconds:.1} s")]
     Stalled {
         /// Name of the port.
@@ -74,22 +74,22 @@ pub enum PortError {
         /// Waiting time, s.
         seconds: f64,
     },
-    /// The user selected no port, and the computer has none.
+    /// The user selected no port, and the computer has no port.
     #[error("no serial port found")]
     NoneFound,
-    /// The user selected no port, and the computer has several.
+    /// The user selected no port, and the computer has several ports.
     #[error("several serial ports found: {}", paths.join(", "))]
     Several {
         /// Names found.
         paths: Vec<String>,
     },
-    /// The path belongs to a file or directory instead of a port.
+    /// The path is a file or directory instead of a port.
     #[error("{path} is no serial port")]
     NoPort {
         /// Name of the port.
         path: String,
     },
-    /// The port withholds a frame that would move the arm, because the arm was stopped after the motion was requested.
+    /// The port does not send a frame that would move the arm, because the arm was stopped after the motion was requested.
     #[error("not sent: {} after this motion was requested", stopped_by(by.as_deref()))]
     Halted {
         /// Program that stopped the arm, if another program did.
@@ -100,7 +100,7 @@ pub enum PortError {
     HolderSilent {
         /// Name of the port or of its socket.
         path: String,
-        /// Process number of the program.
+        /// Process id of the program.
         process: Option<i32>,
         /// Waiting time, s.
         seconds: f64,
@@ -110,7 +110,7 @@ pub enum PortError {
     NotHalted {
         /// Name of the port.
         path: String,
-        /// Program that holds the port.
+        /// Name of the program that holds the port.
         holder: String,
         /// Cause, if the frame could not be written.
         what: Option<String>,

@@ -1,7 +1,7 @@
-//! Stop or Pause by another program of the same user: messages at the [door](super) of the program that holds the port.
+//! Stop or Pause by another program of the same user: messages through the [door](super) of the program that holds the port.
 //!
-//! The client sends one line with a request as JSON. The program that holds the port writes the frame to the line and
-//! answers with an [`Answer`]. When the arm is at rest, it also sends an [`End`].
+//! The client sends one line with a request as JSON. The program that holds the port writes the frame to the line and answers with an
+//! [`Answer`]. When the arm is at rest, this program also sends an [`End`].
 
 use std::io;
 use std::time::Duration;
@@ -26,25 +26,25 @@ use crate::labels;
 pub(super) const REQUEST_MAX: usize = 1024;
 /// Maximum size of an answer, bytes.
 const ANSWER_MAX: usize = 4096;
-/// Maximum size of an end, bytes.
+/// Maximum size of a final message, bytes.
 pub(super) const END_MAX: usize = 1024;
-/// Timeout for the answer of the program that holds the port. This timeout is longer than writing a Stop eight times.
+/// Timeout for the answer of the program that holds the port. This timeout is longer than the time for writing a Stop eight times.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Timeout for the final message. This timeout is longer than a stopped arm needs to come to rest.
+/// Timeout for the final message. This timeout is longer than the time that an arm needs to come to rest after a Stop.
 const REST: Duration = Duration::from_secs(6);
 
 /// Command that a program requests from the holder of the port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Halt {
-    /// Stops on the path and ends the execution.
+    /// The arm stops on the path, and the execution ends.
     Stop,
-    /// Pauses on the path.
+    /// The arm pauses on the path.
     Pause,
 }
 
 impl Halt {
-    /// Returns the command to the controller.
+    /// Returns the command that is sent to the controller.
     pub fn command(self) -> ExecCommand {
         match self {
             Self::Stop => ExecCommand::Stop,
@@ -53,23 +53,23 @@ impl Halt {
     }
 }
 
-/// Request: the command, and the name of the program that sends it.
+/// Request with the command and the name of the program that sends it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Request {
     pub halt: Halt,
     pub by: String,
 }
 
-/// Result of writing the frame.
+/// Answer with the result of writing the frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Answer {
-    /// Program that holds the port.
+    /// Name of the program that holds the port.
     pub program: String,
-    /// Process number of that program.
+    /// Process id of that program.
     pub pid: u32,
-    /// Port, with the name that this program used to open it.
+    /// Name with which this program opened the port.
     pub port: String,
-    /// Rate of the port, Bd.
+    /// Bit rate of the port, Bd.
     pub baud: u32,
     /// `true` if the controller has received the frame.
     pub confirmed: bool,
@@ -90,7 +90,7 @@ pub struct Answer {
 pub struct End {
     /// `true` if the arm is at rest.
     pub stands: bool,
-    /// `true` if the arm moved before.
+    /// `true` if the arm moved before the command.
     pub moved: bool,
     /// Description of the motion that remains.
     pub moving: Option<String>,
@@ -100,7 +100,7 @@ pub struct End {
     /// Trajectory execution state.
     #[serde(default)]
     pub trajectory: String,
-    /// `true` if the arm is in a held stop. A joint that still moves then yields to a push or lowers its load.
+    /// `true` if the arm is in a held stop. In a held stop, a joint that still moves yields to a push or lowers its load.
     #[serde(default)]
     pub held_stop: bool,
 }
@@ -179,26 +179,26 @@ pub fn this_program() -> String {
     all.join(" ").chars().filter(|c| !c.is_control()).take(80).collect()
 }
 
-/// Returns `true` if `user` may stop the arm. Only the user that runs this program may.
+/// Returns `true` if `user` may stop the arm. Only the user who runs this program may stop the arm.
 #[cfg(unix)]
 pub(super) fn may_ask(user: u32) -> bool {
     user == rustix::process::geteuid().as_raw()
 }
 
-/// Returns the user at the other end of a socket. If the operating system does not report it, the permissions of folder and
-/// socket admit no other user.
+/// Returns the user at the other end of a socket. If the operating system does not report the user, the permissions of the folder and the
+/// socket exclude other users.
 #[cfg(target_os = "linux")]
 pub(super) fn peer(stream: &UnixStream) -> Option<u32> {
     rustix::net::sockopt::socket_peercred(stream).ok().map(|peer| peer.uid.as_raw())
 }
 
-/// Returns the user of this program, because this operating system does not report the other end.
+/// Returns the user of this program, because this operating system does not report the user at the other end.
 #[cfg(all(unix, not(target_os = "linux")))]
 pub(super) fn peer(_: &UnixStream) -> Option<u32> {
     Some(rustix::process::geteuid().as_raw())
 }
 
-/// Returns the process at the other end of a socket, if the system reports it.
+/// Returns the id of the process at the other end of a socket, if the operating system reports it.
 #[cfg(unix)]
 fn process(stream: &UnixStream) -> Option<i32> {
     #[cfg(target_os = "linux")]
@@ -214,14 +214,14 @@ pub(super) fn socket_name(port: &str) -> Option<String> {
     Some(format!("line-{:x}.sock", std::fs::metadata(port).ok()?.rdev()))
 }
 
-/// Returns the sockets at which a program that holds this port may listen.
+/// Returns the sockets at which a program that holds the port may listen.
 #[cfg(unix)]
 pub fn sockets_of(port: &str) -> Vec<PathBuf> {
     let Some(name) = socket_name(port) else { return Vec::new() };
     runtime::folders().into_iter().map(|folder| folder.join(&name)).filter(|path| path.exists()).collect()
 }
 
-/// Returns the sockets of all ports that programs of this user hold, including sockets that killed programs left.
+/// Returns the sockets of all ports that programs of this user hold, including sockets that were left by killed programs.
 #[cfg(unix)]
 pub fn sockets() -> Vec<PathBuf> {
     let files = runtime::folders().into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
@@ -233,8 +233,8 @@ pub fn sockets() -> Vec<PathBuf> {
     files.flatten().map(|file| file.path()).filter(named).collect()
 }
 
-/// Returns the port of a socket. Returns `None` if its device is not the one for which the program listens: a device that
-/// was plugged in later, or a pseudo-terminal that was opened later, may have the same number.
+/// Returns the port of a socket. Returns `None` if the socket was created for another device with the same number. A device that was
+/// plugged in later, or a pseudo-terminal that was opened later, may have this number.
 #[cfg(unix)]
 pub fn port_of(socket: &Path) -> Option<String> {
     use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
@@ -254,14 +254,14 @@ pub fn port_of(socket: &Path) -> Option<String> {
     Some(port.display().to_string())
 }
 
-/// Returns `true` if a program listens at this socket.
+/// Returns `true` if a program listens at the socket.
 #[cfg(unix)]
 pub fn is_alive(socket: &Path) -> bool {
     UnixStream::connect(socket).is_ok()
 }
 
-/// Sends a request to the program that listens at this socket. Returns `None` if no program listens, or if it ended before
-/// it answered.
+/// Sends a request to the program that listens at `socket`. Returns `None` if no program listens, or if the program ended before it
+/// answered.
 ///
 /// # Errors
 ///
@@ -293,7 +293,7 @@ pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option
         let holder = format!("{} (process {})", answer.program, answer.pid);
         return Err(PortError::NotHalted { path: answer.port, holder, what: answer.error });
     }
-    // Because of the Stop, the other program may end before the arm is at rest.
+    // The Stop can cause the other program to exit before the arm is at rest.
     let end = stream.set_read_timeout(Some(REST)).and_then(|()| read_line(&stream, END_MAX)).ok();
     Ok(Some((answer, end)))
 }
@@ -324,7 +324,7 @@ pub(super) fn write_line<T: Serialize>(mut stream: impl io::Write, what: &T) -> 
 mod tests {
     use super::*;
 
-    /// Another user may not stop the arm, however the request arrives.
+    /// A request from another user is always rejected.
     #[test]
     fn the_request_of_another_user_is_refused() {
         let own = rustix::process::geteuid().as_raw();

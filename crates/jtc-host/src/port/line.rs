@@ -1,9 +1,9 @@
-//! The two directions of a serial line. Both are used by the owner of the port, and by the [door](super::door) through
-//! which other programs stop the arm.
+//! Serial line with both directions of transfer. The line is used by the owner of the port, and by the [door](super::door) through which
+//! other programs stop the arm.
 //!
-//! The thread of the door writes the Stop of another program even while the owner is busy. The Stop is written between two
-//! frames. A half-written long frame is abandoned, and a gap on the line tells the controller to drop it (J-03). From then
-//! on, frames are not written if they move the arm and were requested before the Stop.
+//! The thread of the door writes the Stop of another program even while the owner is busy. The Stop is written between two frames. If a
+//! long frame is only partly written, the rest is not sent, and a gap on the line causes the controller to discard it (J-03). After the
+//! Stop, frames that move the arm and were requested before the Stop are not written.
 
 use std::collections::VecDeque;
 use std::io;
@@ -20,32 +20,33 @@ use super::halt::Halt;
 use super::standstill::{Standstill, is_moving, is_paused};
 use super::{Halts, PortError, line_time};
 
-/// Timeout for a write that makes no progress.
+/// Timeout for a write during which no byte is accepted.
 const STALL: Duration = Duration::from_secs(5);
-/// Bytes per write. This number limits how late a stalled line is noticed, and how late a Stop is sent.
+/// Bytes per write. Maximum number of bytes per write. This number limits the delay until a stalled line is detected, and the delay of a
+/// Stop.
 const CHUNK: usize = 256;
-/// Gap on the line after an abandoned frame: the 5 ms of J-03, plus reserve for adapters that shorten the gap.
+/// Gap on the line after an abandoned frame. The gap is the 5 ms of J-03 plus a reserve for adapters that shorten it.
 const GAP: Duration = Duration::from_millis(8);
-/// A piece that is written later than this time after the last byte of a frame does not continue the frame.
+/// Maximum time between two pieces of one frame. A piece that is written later does not continue the frame.
 const PIECE: Duration = Duration::from_millis(50);
-/// Time to wait for the record of a Stop, in addition to three statuses on the line.
+/// Time to wait for the record of a Stop, in addition to the duration of three status frames on the line.
 const AWAITED: Duration = Duration::from_millis(150);
-/// Number of times that a Stop is written. After them it is considered not confirmed.
+/// Maximum number of times that a Stop is written. After the last time, the Stop is considered not confirmed.
 const TRIES: u32 = 8;
 /// Timeout for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(1);
-/// Time after another program's Stop in which motion requests are rejected. An agent does the same.
+/// Time after another program's Stop in which motion requests are rejected. An agent rejects requests for the same time.
 const CALM: Duration = Duration::from_secs(3);
-/// Maximum age at which a status or a jog still describes the current state of the arm.
+/// Maximum age of a status or a jog for which it still describes the current state of the arm.
 const RECENT: Duration = Duration::from_millis(300);
-/// Interval at which a Stop or the end of teaching is repeated, until the statuses show it.
+/// Interval at which a Stop or the end of teaching is repeated, until the status frames show the effect.
 const AGAIN: Duration = Duration::from_millis(200);
-/// Maximum time in which a stopped arm comes to rest.
+/// Maximum time in which an arm comes to rest after a Stop.
 const REST: Duration = Duration::from_secs(5);
-/// Maximum number of received bytes that are kept if the owner does not read them.
+/// Maximum number of received bytes that are buffered if the owner does not read them.
 const KEPT: usize = 1 << 16;
 
-/// The outcome of another program's Stop or Pause.
+/// Result of a Stop or Pause from another program.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HaltOutcome {
     /// `true` if the controller accepted the command.
@@ -56,19 +57,19 @@ pub(super) struct HaltOutcome {
     pub status: Status,
 }
 
-/// The line of one port.
+/// Serial line of one port.
 pub(super) struct Line {
     pub path: String,
     pub baud: u32,
     pub start: Instant,
     output: Mutex<Output>,
-    /// Number of Stops that wait for the output. The owner writes its next piece after them.
+    /// Number of Stops that wait for access to the output. The owner writes the next piece of a frame after these Stops.
     urgent: AtomicUsize,
-    /// Number of Stops and Pauses of other programs, and number of the Stops alone. Both change together with
+    /// Number of Stops and Pauses of other programs, followed by the number of only the Stops. Both numbers change together with
     /// `Output::halted`.
     halts: AtomicU64,
     stops: AtomicU64,
-    /// Lock that is held until a Stop is written and confirmed, so that Stops are handled one after the other.
+    /// Lock for the time until a Stop is written and confirmed, so that Stops are executed one after the other.
     turn: Mutex<()>,
     input: Mutex<Input>,
     seen: Mutex<Seen>,
@@ -83,9 +84,9 @@ struct Output {
     rest: usize,
     /// Time at which the line will have transmitted all written bytes.
     free_at: Instant,
-    /// `true` if the current frame was abandoned for a Stop.
+    /// `true` if the current frame was aborted because of a Stop.
     given_up: bool,
-    /// Last Stop or Pause of another program. The owner's next motion request removes it.
+    /// Last Stop or Pause from another program. The next motion request of the owner removes this entry.
     halted: Option<Halted>,
     /// Time of the owner's last jog.
     jogged: Option<Instant>,
@@ -105,7 +106,7 @@ struct Input {
     pending: VecDeque<u8>,
 }
 
-/// Facts from the received statuses, whichever thread has read them.
+/// Facts from the received status frames, independent of the thread that has read them.
 #[derive(Default)]
 struct Seen {
     status: Option<(Instant, Status)>,
@@ -113,16 +114,15 @@ struct Seen {
     moved_at: Option<Instant>,
     statuses: u64,
     damaged: u64,
-    /// `true` if the owner has switched teaching on and no record has confirmed since that it is off.
+    /// `true` if the owner has switched on teaching and no later record has confirmed that teaching is off.
     teaching: bool,
-    /// Frames Execute, Pause and Stop whose records have not arrived, oldest first. Frames that the door wrote have a
-    /// number.
+    /// Execute, Pause and Stop frames whose records have not arrived, oldest first. Frames that the door wrote have a number.
     written: VecDeque<(Instant, Option<u64>)>,
     numbers: u64,
     answered: VecDeque<(u64, Response)>,
 }
 
-/// Guard that increments a counter until it is dropped, even if its thread panics.
+/// Guard that increments a counter until it is dropped, even if the thread panics.
 pub(super) struct Counted<'a>(&'a AtomicUsize);
 
 impl<'a> Counted<'a> {
@@ -219,13 +219,13 @@ impl Line {
         Halts { all: self.halts.load(Ordering::SeqCst), stops }
     }
 
-    /// Permits the frames of a motion that was requested after `after` halts. The frames stay blocked if there were further
-    /// halts since, or if the last halt is less than 3 s old.
+    /// Permits the frames of a motion that was requested when the number of halts was `after`. The frames stay blocked if another halt has
+    /// occurred since the request, or if the last halt is less than 3 s old.
     pub(super) fn ask_to_move(&self, after: u64) {
         self.open_gate(after, |_| true);
     }
 
-    /// Like `ask_to_move`, for resuming a paused motion. After a Stop a motion cannot be resumed.
+    /// Like `ask_to_move`, for resuming a paused motion. A motion cannot be resumed after a Stop.
     pub(super) fn ask_to_resume(&self, after: u64) {
         self.open_gate(after, |halt| halt == Halt::Pause);
     }
@@ -238,7 +238,7 @@ impl Line {
         }
     }
 
-    /// Marks the port as closing and ends all waits.
+    /// Marks the port as closing and ends all waiting calls.
     pub(super) fn close(&self) {
         self.closing.store(true, Ordering::SeqCst);
         self.news.notify_all();
@@ -249,12 +249,11 @@ impl Line {
         self.closing.load(Ordering::SeqCst)
     }
 
-    /// Writes another program's Stop or Pause, and repeats it until the controller has received it. Returns `None` if it is
-    /// not confirmed. An owner that closes the port waits for this call, because the Stop may be the reason why it closes
-    /// the port.
+    /// Writes the Stop or Pause of another program, and repeats it until the controller has received it. Returns `None` if the controller
+    /// does not confirm the command. An owner that closes the port waits for this call, because the Stop may be the reason for closing.
     pub(super) fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         match self.write_halt(halt, by) {
-            // A Pause after a Stop is not written, because a stopped motion cannot be paused.
+            // The code does not write a Pause after a Stop, because a stopped motion cannot be paused.
             Err(PortError::Halted { .. }) => {
                 let status = lock(&self.seen).status.map(|(_, status)| status);
                 Ok(status.map(|status| HaltOutcome { accepted: false, moved: false, status }))
@@ -265,7 +264,7 @@ impl Line {
 
     fn write_halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         let (begin, mut jogged) = (Instant::now(), false);
-        // Before anything else, all frames that move the arm are blocked.
+        // As the first step, the code blocks all frames that move the arm.
         self.urgently(|output| {
             if halt == Halt::Pause && output.is_stopped() {
                 return Err(output.refusal());
@@ -290,20 +289,20 @@ impl Line {
             }
         }
         let status = lock(&self.seen).status.map(|(_, status)| status);
-        // In teaching the arm is compliant. After a Stop it must hold its position.
+        // In teaching the arm is compliant. After a Stop, the arm must hold its position.
         let taught = status.is_some_and(|status| status.state == ControllerState::Teaching);
         if halt == Halt::Stop && (taught || lock(&self.seen).teaching) {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
             accepted: record.data == DataStatus::NoError,
-            // If the owner has not been reading, the first statuses that arrive here are old.
+            // If the owner has not read the port for some time, the first status frames read here are old.
             moved: moved || taught || self.moved_since(begin),
             status,
         }))
     }
 
-    /// Waits until the arm is at rest, but at most 5 s. Returns the last status and the standstill state.
+    /// Waits until the arm is at rest, at most 5 s. Returns the last status and the evaluation of the standstill.
     pub(super) fn wait_for_rest(&self, halt: Halt) -> Option<(Status, Standstill)> {
         let (end, mut standstill, mut count) = (Instant::now() + REST, Standstill::after(halt), None);
         let mut written_at = Instant::now();
@@ -317,7 +316,7 @@ impl Line {
             {
                 if halt == Halt::Stop && written_at.elapsed() >= AGAIN {
                     written_at = Instant::now();
-                    // If the line accepts no bytes, the statuses will show that the arm is not at rest.
+                    // If the line does not accept bytes, the status frames will show that the arm is not at rest.
                     let _ = self.insist(&status);
                 }
                 standstill.see(at.duration_since(self.start), &status);
@@ -335,8 +334,8 @@ impl Line {
         status.map(|(_, status)| (status, standstill))
     }
 
-    /// Repeats those parts of a Stop that the statuses do not show yet: the end of teaching, and the Stop itself if the
-    /// Pause of another sender arrived after it.
+    /// Repeats the parts of a Stop whose effect the status frames do not show yet. These are the end of teaching, and the Stop itself if a
+    /// Pause of another sender arrived later.
     fn insist(&self, status: &Status) -> Result<(), PortError> {
         if status.state == ControllerState::Teaching || lock(&self.seen).teaching {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
@@ -352,7 +351,7 @@ impl Line {
         lock(&self.seen).moved_at.is_some_and(|at| at >= time)
     }
 
-    /// Waits for the record of a Stop whose number is at least `first`. Returns `None` if it does not arrive in time.
+    /// Waits for the record of a Stop whose number is at least `first`. Returns `None` if the record does not arrive in time.
     fn record_since(&self, first: u64) -> Option<Response> {
         let queued = lock(&self.output).free_at.saturating_duration_since(Instant::now());
         let end = Instant::now() + queued + AWAITED + line_time(3 * STATUS_LEN, Some(self.baud));
@@ -373,7 +372,7 @@ impl Line {
         }
     }
 
-    /// Waits for the next status. If the owner does not read, this function reads instead.
+    /// Waits for the next status frame. If the owner does not read, this function reads instead.
     fn look(&self) {
         let seen = lock(&self.seen);
         let before = seen.statuses;
@@ -384,7 +383,7 @@ impl Line {
             return;
         }
         if let Ok(mut input) = self.input.try_lock() {
-            // The owner gets the error at its next read.
+            // The owner receives the error at the next read.
             let _ = self.receive(&mut input, Duration::from_millis(20));
         }
     }
@@ -414,7 +413,7 @@ impl Line {
         Ok(())
     }
 
-    /// Checks bytes of the owner at the beginning of a frame, or at the beginning of a further piece of one.
+    /// Checks bytes of the owner at the beginning of a frame, or at the beginning of a further piece of a frame.
     fn begin(&self, output: &mut Output, bytes: &[u8]) -> Result<(), PortError> {
         let whole = FrameRef::new_checked(bytes).is_some();
         if !whole && output.given_up {
@@ -436,9 +435,9 @@ impl Line {
         let moves = jogs
             || bytes == fixed::EXECUTE
             || is(FrameType::TeachingModeEnable)
-            // An upload is the preparation of a motion.
+            // An upload prepares a motion, so upload frames are checked like frames that move the arm.
             || is(FrameType::Trajectory);
-        // With an older controller, a Pause while the arm decelerates after a Stop would leave a motion that can be resumed.
+        // With an older controller, a Pause during the deceleration after a Stop would change the Stop into a motion that can be resumed.
         let weakens = bytes == fixed::PAUSE && output.is_stopped();
         if (moves && output.halted.is_some()) || weakens {
             return Err(output.refusal());
@@ -476,13 +475,14 @@ impl Line {
         })
     }
 
-    /// Runs `work` on the output before the owner writes its next piece.
+    /// Calls `work` with the output before the owner writes its next piece.
     fn urgently(&self, work: impl FnOnce(&mut Output) -> Result<(), PortError>) -> Result<(), PortError> {
         let _counted = Counted::new(&self.urgent);
         work(&mut lock(&self.output))
     }
 
-    /// Lets waiting Stops write first, because a mutex does not guarantee the order. Each takes as long as a short write.
+    /// Waits until all pending Stops are written, because a mutex does not guarantee the order. Each Stop needs only the time of a short
+    /// write.
     fn let_urgent_pass(&self) {
         let end = Instant::now() + STALL;
         while self.urgent.load(Ordering::SeqCst) > 0 && Instant::now() < end {
@@ -525,7 +525,7 @@ impl Output {
 }
 
 impl Seen {
-    /// Records that a frame Execute, Pause or Stop is being written.
+    /// Records that an Execute, Pause or Stop frame is being written.
     fn write(&mut self, number: Option<u64>) {
         self.forget();
         self.written.push_back((Instant::now(), number));
@@ -554,7 +554,7 @@ impl Seen {
         }
     }
 
-    /// Drops frames whose record is overdue, and old records that no thread has taken.
+    /// Removes frames whose record is overdue, and old records that no thread has read.
     fn forget(&mut self) {
         self.written.retain(|(at, _)| at.elapsed() < RECORD_TIME);
         let excess = self.answered.len().saturating_sub(16);

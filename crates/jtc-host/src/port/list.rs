@@ -1,4 +1,4 @@
-//! The serial ports of this computer. For a port that cannot be used, the reason is given.
+//! List of the serial ports of this computer. For a port that cannot be used, the list contains the reason.
 
 use serialport::SerialPortType;
 
@@ -8,7 +8,7 @@ use super::{PortError, SerialPort};
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PortKind {
-    /// An adapter or board on USB.
+    /// Adapter or board on USB.
     Usb {
         /// Vendor number.
         vendor: u16,
@@ -16,25 +16,25 @@ pub enum PortKind {
         product: u16,
         /// Serial number, if the device has one.
         serial: Option<String>,
-        /// Description that the device gives of itself.
+        /// Description that the device reports.
         description: String,
     },
-    /// A card in the computer.
+    /// Plug-in card in the computer.
     Pci,
-    /// A paired radio link.
+    /// Paired Bluetooth link.
     Bluetooth,
     /// The operating system does not report the type.
     Unknown,
 }
 
-/// A serial port of this computer.
+/// Serial port of this computer.
 #[derive(Debug)]
 pub struct PortInfo {
-    /// Name for opening the port.
+    /// Name with which the port is opened.
     pub path: String,
     /// Hardware type.
     pub kind: PortKind,
-    /// Reason why the port cannot be used. `None` if it can be used.
+    /// Reason why a program cannot use the port. `None` if the port can be used.
     pub problem: Option<PortError>,
 }
 
@@ -45,11 +45,11 @@ impl PortInfo {
     }
 }
 
-/// Returns all ports, sorted by name. Opens each port briefly to check that it can be used.
+/// Returns all ports, sorted by name. Opens each port briefly to check that the port can be used.
 ///
 /// # Errors
 ///
-/// Returns an error if the operating system does not list its ports.
+/// Returns an error if the operating system does not list the ports.
 pub fn list() -> Result<Vec<PortInfo>, PortError> {
     let found = serialport::available_ports().map_err(|e| PortError::io("list of ports", e.into()))?;
     let mut ports: Vec<PortInfo> = found
@@ -64,7 +64,7 @@ pub fn list() -> Result<Vec<PortInfo>, PortError> {
     Ok(ports)
 }
 
-/// Returns the names of the ports with an adapter or board on USB, without opening them.
+/// Returns the names of the ports of USB adapters and boards, without opening the ports.
 pub fn usb_names() -> Vec<String> {
     let found = serialport::available_ports().unwrap_or_default();
     let is_usb = |kind: &SerialPortType| matches!(kind, SerialPortType::UsbPort(_));
@@ -78,13 +78,13 @@ pub fn usb_names() -> Vec<String> {
 ///
 /// # Errors
 ///
-/// Returns an error if none or several of the ports can be used. The error contains the names.
+/// Returns an error if no port or more than one port can be used. The error contains the names of the ports.
 pub fn only_one() -> Result<String, PortError> {
     let ports = list()?;
     let mut usable: Vec<String> = ports.iter().filter(|p| p.usable()).map(|p| p.path.clone()).collect();
     match usable.len() {
         1 => Ok(usable.remove(0)),
-        // If a connected board cannot be opened, its error is more helpful than "none found".
+        // If a connected board cannot be opened, the error of that board is more helpful than "none found".
         0 => Err(ports
             .into_iter()
             .filter(|p| matches!(p.kind, PortKind::Usb { .. }))

@@ -1,10 +1,10 @@
-//! Folder of this user for sockets and locks of running programs. Other users cannot write to it.
+//! Folder in which programs of this user store sockets and locks while they run. Other users cannot write to this folder.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Returns the folder that this program uses, if the operating system has a folder for this user alone.
+/// Returns the folder that this program uses, if the operating system provides a folder only for this user.
 pub fn folder() -> Option<PathBuf> {
     by_environment().or_else(by_user)
 }
@@ -15,16 +15,16 @@ pub(super) fn candidates() -> Vec<PathBuf> {
     by_environment().into_iter().chain(by_user()).collect()
 }
 
-/// Returns all folders that programs of this user may use. Another program may use a different one, because its environment
-/// variables differ (`su`, `cron`) or because a path was too long for a socket.
+/// Returns all folders that programs of this user may use. Programs may use different folders, because their environment variables differ
+/// (`su`, `cron`) or because a path was too long for a socket.
 pub fn folders() -> Vec<PathBuf> {
     let given = std::env::var_os("XDG_RUNTIME_DIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
     let all = own_name().map_or(Vec::new(), |name| all_of(given, &std::env::temp_dir(), &name));
     all.into_iter().filter(|folder| is_own(folder)).collect()
 }
 
-/// Returns the folders for these variables. If the runtime folder is not the usual one, its programs are isolated: only
-/// this folder and the folder for temporary files are used.
+/// Returns the folders that follow from the given environment variables. If the runtime folder is not the usual folder, its programs are
+/// isolated and use only this folder and the folder for temporary files.
 fn all_of(given: Option<PathBuf>, temporary: &Path, name: &str) -> Vec<PathBuf> {
     let user = name.trim_start_matches("openjtc-");
     let usual = Path::new("/run/user").join(user);
@@ -67,13 +67,13 @@ pub fn is_own(folder: &Path) -> bool {
     })
 }
 
-/// Returns `true` if the folder exists; ownership is not checked on this system.
+/// Returns `true` if the folder exists; the owner is not checked on this operating system.
 #[cfg(not(unix))]
 pub fn is_own(folder: &Path) -> bool {
     folder.is_dir()
 }
 
-/// Creates the folder. Returns `None` without a location to which only this user can write.
+/// Creates the folder. Creates the folder of this program. Returns `None` if no location exists to which only this user can write.
 ///
 /// # Errors
 ///
@@ -82,7 +82,7 @@ pub fn create() -> io::Result<Option<PathBuf>> {
     folder().map_or(Ok(None), create_at)
 }
 
-/// Creates this folder with access for this user alone.
+/// Creates `folder` with access only for this user.
 pub(super) fn create_at(folder: PathBuf) -> io::Result<Option<PathBuf>> {
     let mut builder = fs::DirBuilder::new();
     #[cfg(unix)]

@@ -1,5 +1,5 @@
-//! Serial ports of this computer, including pseudo-terminals: 8N1, no flow control, opened exclusively. Other programs
-//! of the same user can stop the arm through the port's [door](super::halt).
+//! Serial ports of this computer, including pseudo-terminals. A port is opened exclusively, with 8N1 and without flow control. Other
+//! programs of the same user can stop the arm through the port's [door](super::halt).
 
 use std::io;
 #[cfg(unix)]
@@ -12,28 +12,28 @@ use super::door::Door;
 use super::line::Line;
 use super::{Halts, Port, PortError};
 
-/// Rates up to 15 MBd that adapters support. Other rates may also work.
+/// Bit rates up to 15 MBd that adapters support. Other bit rates may also work.
 pub const STANDARD_RATES: [u32; 16] = [
     9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 500_000, 921_600, 1_000_000, 1_500_000,
     2_000_000, 3_000_000, 4_000_000, 12_000_000, 15_000_000,
 ];
 
-/// An open serial port.
+/// Open serial port.
 pub struct SerialPort {
-    /// Dropped before the line.
+    /// Door of the port, which is dropped before the line.
     #[cfg(unix)]
     _door: Option<Door>,
     line: Arc<Line>,
 }
 
 impl SerialPort {
-    /// Opens `path` at `baud`, with a door through which other programs of this user can stop the arm while this program
-    /// holds the port.
+    /// Opens `path` at `baud`, and opens a door through which other programs of this user can stop the arm while this program uses the
+    /// port.
     ///
     /// # Errors
     ///
-    /// Returns an error if the port does not exist, is used by another program, is not accessible for this user, or does
-    /// not support the rate.
+    /// Returns an error if the port does not exist, is used by another program, is not accessible for this user, or does not support the
+    /// bit rate.
     pub fn open(path: &str, baud: u32) -> Result<Self, PortError> {
         let port = Self::open_without_door(path, baud)?;
         #[cfg(unix)]
@@ -41,7 +41,7 @@ impl SerialPort {
         Ok(port)
     }
 
-    /// Like `open`, but without a door. Meant for a program that offers another way to stop the arm, such as an agent.
+    /// Like `open`, but without a door. The function is intended for a program that offers another way to stop the arm, such as an agent.
     ///
     /// # Errors
     ///
@@ -51,7 +51,7 @@ impl SerialPort {
         if cfg!(unix) && !std::path::Path::new(path).exists() {
             return Err(PortError::NotFound { path: path.to_owned() });
         }
-        // For a regular file the system would report "not a typewriter".
+        // For a regular file, the operating system would report "not a typewriter".
         #[cfg(unix)]
         if std::fs::metadata(path).is_ok_and(|m| !m.file_type().is_char_device()) {
             return Err(PortError::NoPort { path: path.to_owned() });
@@ -79,7 +79,7 @@ fn opening(path: &str, baud: u32, error: serialport::Error) -> PortError {
         serialport::ErrorKind::NoDevice if error.description.contains("busy") => {
             PortError::Busy { path: named }
         }
-        // If another program has opened the port in shared mode, its lock leads to the error "try again".
+        // If another program has opened the port in shared mode, the lock of that program causes the error "try again".
         serialport::ErrorKind::Io(io::ErrorKind::WouldBlock) => PortError::Busy { path: named },
         serialport::ErrorKind::NoDevice if cfg!(unix) => PortError::Busy { path: named },
         serialport::ErrorKind::NoDevice => PortError::NotFound { path: named },

@@ -1,4 +1,4 @@
-//! A simulated controller with drives and arm in this process, as a port in virtual time.
+//! Port to a controller, drives and an arm that are simulated in this process, in virtual time.
 
 use std::time::{Duration, Instant};
 
@@ -6,13 +6,13 @@ use jtc_sim::World;
 
 use super::{Port, PortError};
 
-/// Size of the write buffer of the line, bytes. Like in an operating system, a write to a full buffer blocks.
+/// Size of the write buffer of the line, bytes. A write to a full buffer blocks, as in an operating system.
 const WRITE_BUFFER: usize = 4096;
 
-/// Callback after each simulated millisecond.
+/// Callback that is called after each simulated millisecond.
 type Observer = Box<dyn FnMut(&World)>;
 
-/// Simulated world as a port. Waiting advances the virtual time.
+/// Port to a simulated world. The virtual time advances while a call waits.
 pub struct SimPort {
     world: World,
     observer: Option<Observer>,
@@ -24,7 +24,7 @@ impl SimPort {
         Self { world, observer: None }
     }
 
-    /// Sets `observer`, which is called after each simulated millisecond. Used for recordings at 1 kHz.
+    /// Sets `observer`, which is called after each simulated millisecond. The observer is used for recordings at 1 kHz.
     pub fn observe(&mut self, observer: impl FnMut(&World) + 'static) {
         self.observer = Some(Box::new(observer));
     }
@@ -81,10 +81,11 @@ impl Port for SimPort {
     }
 }
 
-/// Maximum simulated time to catch up at once. A longer delay, for example of a suspended computer, is skipped as a whole.
+/// Maximum simulated time that the port catches up in one step. If the delay is longer, for example after the computer was suspended, the
+/// whole delay is skipped.
 const CATCH_UP: Duration = Duration::from_secs(2);
 
-/// Simulated world as a port in real time, like a real controller.
+/// Port to a simulated world that runs in real time, like a real controller.
 pub struct LivePort {
     world: World,
     start: Instant,
@@ -93,12 +94,12 @@ pub struct LivePort {
 }
 
 impl LivePort {
-    /// Creates a port to `world`. The time of the world begins now.
+    /// Creates a port to `world`. The time of the world begins when the port is created.
     pub fn new(world: World) -> Self {
         Self { world, start: Instant::now(), left_out: Duration::ZERO }
     }
 
-    /// Advances the world to the present time.
+    /// Advances the world to the current time.
     fn catch_up(&mut self) {
         let world = Duration::from_micros(self.world.now_us());
         let behind = self.now().saturating_sub(world);

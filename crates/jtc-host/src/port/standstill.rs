@@ -28,8 +28,7 @@ pub(super) fn has_torque(status: &Status) -> bool {
     status.state.is_in(&[HoldPos, Operate, Teaching])
 }
 
-/// Evaluates statuses until the arm is at rest. An arm that falls without torque is not at rest, although a Stop cannot
-/// hold it.
+/// Evaluation of status frames until the arm is at rest. An arm that falls without torque is not at rest, although a Stop cannot hold it.
 #[derive(Clone, Copy, Debug)]
 pub struct Standstill {
     halt: Halt,
@@ -39,7 +38,7 @@ pub struct Standstill {
 }
 
 impl Standstill {
-    /// Begins to evaluate the statuses after a Stop or Pause.
+    /// Begins the evaluation of status frames after a Stop or Pause.
     pub fn after(halt: Halt) -> Self {
         Self { halt, since: None, reached: false, moved: false }
     }
@@ -54,13 +53,13 @@ impl Standstill {
         self.reached = now.saturating_sub(since) >= STILL;
     }
 
-    /// Returns `true` if a Stop has not taken full effect yet, although the arm does not move. After a Stop the arm must be
-    /// held, and no motion may be left that can be resumed.
+    /// Returns `true` if a Stop is not yet fully effective, although the arm does not move. After a Stop, the arm must hold its position,
+    /// and there must be no motion that can be resumed.
     fn is_incomplete(&self, status: &Status) -> bool {
         self.halt == Halt::Stop && (status.state == ControllerState::Teaching || is_paused(status))
     }
 
-    /// Starts again to measure the time for which the arm must be still.
+    /// Restarts the measurement of the time for which the arm must be at rest.
     pub(super) fn begin_again(&mut self) {
         (self.since, self.reached) = (None, false);
     }
@@ -70,7 +69,7 @@ impl Standstill {
         self.reached
     }
 
-    /// Returns `true` if the arm has moved since the Stop or Pause.
+    /// Returns `true` if the arm has moved after the Stop or Pause.
     pub fn moved(&self) -> bool {
         self.moved
     }
@@ -88,14 +87,14 @@ mod tests {
         status
     }
 
-    /// Evaluates one status each 50 ms for one second.
+    /// Evaluates one status every 50 ms for one second.
     fn stands_after(halt: Halt, statuses: impl Fn(u32) -> Status) -> bool {
         let mut standstill = Standstill::after(halt);
         (0..20).for_each(|i| standstill.see(Duration::from_millis(50) * i, &statuses(i)));
         standstill.is_reached()
     }
 
-    /// A moving arm is not at rest, whether it has torque or not.
+    /// A moving arm is not at rest, with or without torque.
     #[test]
     fn an_arm_that_moves_does_not_stand_in_any_state() {
         for state in [Error, HoldPos, Init, Operate, Start] {
@@ -104,7 +103,7 @@ mod tests {
                 let reached = stands_after(Halt::Stop, |_| status(state, velocity));
                 assert_eq!(reached, stands, "{state:?} {velocity}");
             }
-            // The arm is still only for moments.
+            // The arm is at rest only for short moments.
             let swings = |i: u32| status(state, if i % 4 == 3 { 0.1 } else { 0.0 });
             assert!(!stands_after(Halt::Stop, swings), "{state:?}");
         }
@@ -119,7 +118,7 @@ mod tests {
             assert!(!stands_after(Halt::Stop, |_| paused(state)), "{state:?}");
             assert!(stands_after(Halt::Pause, |_| paused(state)), "{state:?}");
         }
-        // Without torque a paused motion cannot be resumed.
+        // A paused motion cannot be resumed without torque.
         assert!(stands_after(Halt::Stop, |_| paused(Error)));
     }
 }

@@ -1,12 +1,12 @@
-//! A port whose other end is a closure, for tests and for protocol experiments without a device.
+//! Port with a closure instead of a device, for tests and for protocol experiments without a device.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::{Port, PortError, line_time};
 
-/// Calls `device(now, bytes)` when bytes are written, and, without bytes, after each virtual millisecond of waiting. The
-/// bytes that it returns are received.
+/// Port that calls `device(now, bytes)` when bytes are written. While a call waits, the port calls `device` without bytes after each
+/// virtual millisecond. The port receives the bytes that `device` returns.
 pub struct ScriptedPort<F> {
     device: F,
     now: Duration,
@@ -16,12 +16,12 @@ pub struct ScriptedPort<F> {
 }
 
 impl<F: FnMut(Duration, &[u8]) -> Vec<u8>> ScriptedPort<F> {
-    /// Creates a port to `device`. If `baud` is given, writing takes virtual time.
+    /// Creates a port to `device`. If `baud` is not `None`, writing takes virtual time.
     pub fn new(baud: Option<u32>, device: F) -> Self {
         Self { device, now: Duration::ZERO, inbox: VecDeque::new(), baud, written: Vec::new() }
     }
 
-    /// Returns all bytes written so far.
+    /// Returns all bytes that were written so far.
     pub fn written(&self) -> &[u8] {
         &self.written
     }

@@ -24,8 +24,8 @@ fn an_arm_with_torque_is_not_dropped() {
             asked => assert!(asked.is_ok() && idle, "{state}: {asked:?}"),
         }
     }
-    // A single drive that may hold is sufficient. This includes a transition, the reaction to a fault, and a
-    // calibration.
+    // One drive that may hold the arm is sufficient to refuse flashing. A drive may also hold the arm during a transition, a reaction to a
+    // fault and a calibration.
     board.set_status(|status| status.state = ControllerState::Error.into());
     for code in 0..=255 {
         board.set_status(|status| status.joints[5].state = NodeState::new(code));
@@ -43,8 +43,8 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     for before in [asked(&board, Some(false)), asked(&board, None), Preflight::default()] {
         assert!(before.to_confirm(&new).unwrap().contains("supported"), "{before:?}");
     }
-    // A report on the line of another board is not a report of this board. In addition to the board's own line it does no
-    // harm.
+    // A report on the line of another board is not treated as a report of this board. If the board's own line is also queried, a report on
+    // another line has no effect.
     board.hold(true);
     let silent = asked(&board, Some(true));
     assert_eq!(silent.lines[0].answers, Answers::Nothing { bytes: 0 });
@@ -97,7 +97,7 @@ fn the_question_names_what_no_file_and_no_line_shows() {
     super::super::fake::catalogue(folder.path(), &["nucleo-h743zi2"]);
     let listed = Image::read(&folder.path().join("nucleo-h743zi2.bin")).unwrap();
     assert!(!question(&listed).contains("file is complete"));
-    // The received bytes do not form a status.
+    // The received bytes do not form a status frame.
     let noise = crate::port::test::ScriptedPort::new(None, |_, _| vec![0x55; 3]);
     let answers = look(&mut Session::new(noise)).unwrap();
     assert!(matches!(answers, Answers::Nothing { bytes: 1.. }), "{answers:?}");
@@ -106,13 +106,13 @@ fn the_question_names_what_no_file_and_no_line_shows() {
     assert!(said.contains("--baud"), "{said}");
 }
 
-/// Statuses that were buffered while the operator considered the answer are not used as the current state of the arm.
+/// Status frames that were buffered while the program waited for the operator are not used as the current state of the arm.
 #[test]
 fn a_second_look_sees_what_is_then() {
     let board = Board::running(H745, None);
     let mut session = Session::new(Keeps { port: board.port(), kept: Vec::new() });
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: false, .. }));
-    // Minutes of statuses without torque are buffered. Then a drive is enabled.
+    // Status frames of two minutes, all without torque, are buffered. After these frames, a drive is enabled.
     session.port_mut().keep(Duration::from_secs(120));
     board.set_status(|status| status.joints[0].state = NodeState::ENABLED);
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: true, .. }));
@@ -185,7 +185,7 @@ fn an_image_goes_onto_its_own_board_only() {
     let all = Permissions { assume_board: true, accept_supply: true };
     assert_eq!(ask(H745, &h745, Some(H745), none), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &h745, None, all), Err("other-board"));
-    // The label is cut. The running controller or the operator must identify the board.
+    // The label is truncated. The running controller or the operator must identify the board.
     assert_eq!(ask("nucleo-h743zi2", &cut, None, none), Err("unnamed-board"));
     assert_eq!(ask("nucleo-h743zi2", &cut, None, Permissions { assume_board: true, ..none }), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), none), Ok(()));
@@ -193,10 +193,9 @@ fn an_image_goes_onto_its_own_board_only() {
         ask_over("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), Some(false), none),
         Err("unnamed-board")
     );
-    // If the controller on the line runs on another board than the image's, the flash is always refused, even if the
-    // operator confirms.
+    // If the controller on the line runs on a board that does not match the image, flashing is refused, even if the operator confirms it.
     assert_eq!(ask(H745, &h745, Some("simulator"), all), Err("other-controller"));
-    // The core supply cannot be detected from outside. A program that runs on this board has the right supply.
+    // Software cannot detect the core supply of the board. A program that already runs on this board matches the core supply.
     let ldo = "nucleo-h745zi-q-ldo";
     for (board, other) in [(ldo, H745), (H745, ldo)] {
         assert_eq!(ask(board, &h745, None, none), Err("other-supply"));
@@ -210,8 +209,7 @@ fn an_image_goes_onto_its_own_board_only() {
     }
 }
 
-/// A report that is not understood may come from any board. The controller is not treated like a device that reports
-/// nothing.
+/// A report that the program cannot read may come from any board. Such a controller is not treated like a device without reports.
 #[test]
 fn a_controller_that_does_not_report_its_board_has_an_unknown_supply() {
     let link = StLink::new("NOD_H745ZIQ", &Board::running(H745, None), Behaviour::Ignores);

@@ -1,4 +1,4 @@
-//! Selection of the serial lines. The line of the drive's own board is always asked.
+//! Selection of the serial lines. The line of the drive's own board is always queried.
 
 use std::os::unix::fs::symlink;
 
@@ -7,7 +7,7 @@ use jtc_wire::ControllerState;
 use super::*;
 use crate::port::{Port, PortError};
 
-/// Drive and port of one USB device, and the port of another device.
+/// Test set-up: drive and serial port of one USB device, and the serial port of another device.
 struct Usb {
     folder: tempfile::TempDir,
     places: Places,
@@ -70,7 +70,7 @@ fn the_board_of_the_drive_is_asked_whatever_port_is_named() {
         let asked = may_flash(&image(H745, 2), &usb.drive, &before, all);
         assert!(matches!(&asked, Err(FirmwareError::HasTorque { port, .. }) if port == OWN), "{asked:?}");
     }
-    // The arm on the line that the user gave also prevents the flash.
+    // An arm on the line that the user selected also prevents flashing.
     let mut lines =
         usb.open(Some(OTHER), |port| Ok(if port == OWN { idle.port() } else { holds.port() })).unwrap();
     let asked = may_flash(&image(H745, 2), &usb.drive, &lines.look().unwrap(), Permissions::default());
@@ -95,7 +95,7 @@ fn a_board_that_another_program_has_open_is_not_flashed() {
         assert!(matches!(&error, FirmwareError::NotAsked { port, .. } if port == at), "{error}");
         assert_eq!(error.kind(), ErrorKind::Refused);
     }
-    // The board's own port must be asked, but the port that the user gave may be missing.
+    // The board's own port must be queried, but the port that the user selected may be missing.
     let permission = |port: &str| Err(PortError::Permission { path: port.into() });
     assert!(matches!(usb.open(None, permission), Err(FirmwareError::NotAsked { .. })));
     let gone = |port: &str| match port {

@@ -1,4 +1,4 @@
-//! Diagnosis of link, bus and set-up, in words with the next command.
+//! Diagnosis of the link, the bus and the set-up, as text with the next command.
 
 use std::time::Duration;
 
@@ -11,34 +11,34 @@ use crate::held_stop::{self, HeldStop};
 use crate::port::Port;
 use crate::{Error, Session, labels};
 
-/// Rates that are tried if bytes are received that contain no frame.
+/// Bit rates that are tried if the received bytes do not contain a valid frame.
 pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
 
-/// Interval at which an examination checks if it must end.
+/// Interval at which an examination checks if the caller wants to end it.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Data received on the link.
+/// Observed facts about the link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
-    /// Rate of the port, Bd.
+    /// Bit rate of the port, Bd.
     pub baud: Option<u32>,
     /// Duration of the examination, s.
     pub time_s: f64,
     /// Number of bytes received.
     pub bytes: u64,
-    /// Number of bytes that belong to no status.
+    /// Number of bytes that are not part of a status.
     pub bad_bytes: u64,
-    /// Number of statuses received.
+    /// Number of status frames received.
     pub statuses: u64,
     /// Last status.
     pub status: Option<Status>,
-    /// `true` if a request was confirmed; `None`: no request was sent.
+    /// `true` if a request was confirmed; `None` if no request was sent.
     pub confirmed: Option<bool>,
-    /// Another rate at which statuses were found.
+    /// Another bit rate at which status frames were received.
     pub other_baud: Option<u32>,
     /// Joints that the user has marked as absent (J-53).
     pub absent: Vec<Joint>,
-    /// Report of the controller about held stops and encoders (J-69); `None` if it was not requested or is not supported.
+    /// Report of the controller about a held stop and the encoders (J-69); `None` if it was not requested or is not supported.
     pub reactions: Option<Reactions>,
 }
 
@@ -52,7 +52,7 @@ impl<P: Port> Session<P> {
         self.examine_until(time, || false)
     }
 
-    /// Like [`Session::examine`], but ends early once `ended` returns `true`.
+    /// Like [`Session::examine`], but ends early when `ended` returns `true`.
     ///
     /// # Errors
     ///
@@ -84,7 +84,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the findings, worst first.
+/// Returns the findings of a diagnosis, worst first.
 pub fn findings(seen: &Observation) -> Vec<Finding> {
     let mut all = Findings::default();
     link(seen, &mut all);
@@ -129,7 +129,7 @@ fn link(seen: &Observation, all: &mut Findings) {
         return;
     }
     let bad = seen.bad_bytes as f64 / seen.bytes as f64;
-    // The first status may be incomplete, because listening can begin in the middle of it.
+    // The first status may be incomplete, because the observation can begin in the middle of a status.
     if seen.bad_bytes > 175 && bad > 0.001 {
         all.add(
             Warning,
@@ -159,8 +159,7 @@ fn link(seen: &Observation, all: &mut Findings) {
     }
 }
 
-/// Finds drives that answer although the user has marked their joint as absent. The status has no error bit for this
-/// (J-53).
+/// Finds drives that answer although the user has marked their joint as absent. The status has no error bit for this fault (J-53).
 fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     for joint in joints {
         let state = s.joints[joint.index()].state;
@@ -183,7 +182,7 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     }
 }
 
-/// Finds a held stop and its cause, and joints whose encoder has jumped.
+/// Adds findings about a held stop with its cause, and about joints whose encoder position has jumped.
 fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactions>, all: &mut Findings) {
     if let Some((cause, ago_ms)) = cause {
         all.add(
@@ -207,14 +206,14 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
     }
 }
 
-/// Returns the cause of the present held stop, and its age in ms.
+/// Returns the cause of the current held stop and the age of that cause in ms.
 fn cause<'a>(s: &Status, reactions: Option<&'a Reactions>) -> Option<(&'a StopCause, u32)> {
     let (cause, ago_ms) = reactions?.stop.as_ref()?;
     s.is_held_stop().then_some((cause, *ago_ms))
 }
 
-/// Finds errors in the status. If `told` is `true`, the cause of a held stop already has its own finding, which is more
-/// precise than the errors of the joints.
+/// Finds errors in the status. If `told` is `true`, a finding about the cause of a held stop already exists and is more precise than the
+/// errors of the joints.
 fn errors(s: &Status, told: bool, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & error::EMERGENCY_INPUT != 0 {
@@ -317,7 +316,7 @@ fn set_up(s: &Status, all: &mut Findings) {
     }
 }
 
-/// Bearing temperature above which friction and service life get worse, °C.
+/// Bearing temperature above which friction and service life deteriorate, °C.
 const HOT: u8 = 70;
 
 fn temperatures(s: &Status, all: &mut Findings) {

@@ -1,5 +1,5 @@
-//! Errors of this library, each with its facts, the kind of failure and the next command. Each operation has its own error
-//! enum, and [`Error`] covers all of them.
+//! Errors of this library, each with the facts, the kind of failure and the next command. Each operation has its own error enum, and
+//! [`Error`] covers all of them.
 
 mod check;
 mod extension;
@@ -27,35 +27,35 @@ use crate::arm::ParameterError;
 use crate::file::FileError;
 use crate::port::PortError;
 
-/// Any error of this library, for operations that fail with errors of several enums.
+/// Any error of this library, for operations that can return errors of several enums.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Error of an exchange with the controller.
+    /// Error in the communication with the controller.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// Error of waiting for a state.
+    /// Error while the library waited for a state.
     #[error(transparent)]
     State(#[from] StateError),
-    /// Error of an upload.
+    /// Error in an upload.
     #[error(transparent)]
     Upload(#[from] UploadError),
-    /// Error of an execution.
+    /// Error before or during the execution of a motion.
     #[error(transparent)]
     Motion(#[from] MotionError),
-    /// Error of sending parameters.
+    /// Error while parameters were sent.
     #[error(transparent)]
     Parameters(#[from] ParametersError),
-    /// Error of a check before a run.
+    /// Error from the check of a trajectory.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// Error of reading, sending or storing a whole arm.
+    /// Error while a whole arm was read, sent or stored.
     #[error(transparent)]
     Extension(#[from] ExtensionError),
     /// A file cannot be read or understood.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A number or a count does not fit into its frame.
+    /// A number or a count is out of range for its frame.
     #[error(transparent)]
     Frame(#[from] jtc_wire::EncodeError),
     /// The caller's callback cancelled the operation.

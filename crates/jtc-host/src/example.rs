@@ -14,21 +14,21 @@ use crate::arm::AVENA_TOML;
 use crate::trajectory::{Point, Trajectory};
 pub use demo::demo_motion;
 
-/// Page about the file formats, with an example of each.
+/// Page about the file formats, with an example of each format.
 pub const FORMS: &str = include_str!("example/forms.md");
 
-/// Faults for a simulated run.
+/// Faults for a simulated arm.
 const FAULTS: &str = include_str!("example/faults.toml");
 
 /// Waypoints of a cycle.
 const CYCLE: &str = include_str!("example/cycle.csv");
 
-/// Waypoints with the flange on lines and an arc.
+/// Waypoints between which the flange moves along lines and an arc.
 const LINES: &str = include_str!("example/lines.csv");
 
 /// Largest deflection of each joint in the examples, rad.
 const BEND: [f64; JOINTS] = [0.8, 0.45, -0.7, 0.9, 0.6, -1.2];
-/// Duration of the example motion (s), and time between its points (ms).
+/// Duration of the example motion (s), followed by the time between its points (ms).
 const DURATION_S: f64 = 6.0;
 const STEP_MS: u16 = 10;
 /// Times of the waypoints, s.
@@ -39,11 +39,11 @@ const WAYPOINTS_S: [f64; 9] = [0.0, 0.75, 1.5, 2.25, 3.0, 3.75, 4.5, 5.25, 6.0];
 pub struct Example {
     /// Name of the example.
     pub name: &'static str,
-    /// Name of its file.
+    /// Name of the example file.
     pub file: &'static str,
     /// Description of the example.
     pub what: &'static str,
-    /// Command that uses the example, with `{}` for the file.
+    /// Command that uses the example; `{}` stands for the file name.
     pub next: &'static str,
     text: fn() -> String,
 }
@@ -54,7 +54,7 @@ impl Example {
         (self.text)()
     }
 
-    /// Returns the example with this name.
+    /// Returns the example named `name`.
     pub fn named(name: &str) -> Option<&'static Self> {
         EXAMPLES.iter().find(|example| example.name == name)
     }
@@ -127,7 +127,7 @@ pub const EXAMPLES: [Example; 9] = [
     },
 ];
 
-/// Returns the point at `t` of a `sin⁴` curve over the duration. Velocity and acceleration are 0 at both ends.
+/// Returns the point at `t` of a motion along a `sin⁴` curve over the whole duration. Velocity and acceleration are 0 at both ends.
 fn point(t: f64) -> Point {
     // sin⁴x = (3 − 4 cos 2x + cos 4x) / 8
     let (x, w) = (PI * t / DURATION_S, PI / DURATION_S);
@@ -147,7 +147,7 @@ fn motion() -> Trajectory {
     Trajectory { step_ms: STEP_MS, points }
 }
 
-/// Returns the waypoints of the example motion. The files contain them with rounded numbers.
+/// Returns the waypoints of the example motion. The example files contain these waypoints with rounded numbers.
 fn waypoints() -> impl Iterator<Item = (f64, [f64; JOINTS])> {
     WAYPOINTS_S.into_iter().map(|t| (t, point(t).position))
 }
@@ -155,7 +155,7 @@ fn waypoints() -> impl Iterator<Item = (f64, [f64; JOINTS])> {
 fn row(values: [f64; JOINTS], digits: usize) -> String {
     values
         .map(|v| {
-            // Adding zero turns −0 into 0.
+            // Adding zero changes −0 to 0.
             let scale = 10f64.powi(digits as i32);
             format!("{:.digits$}", (v * scale).round() / scale + 0.0)
         })
@@ -253,7 +253,7 @@ mod tests {
         }
     }
 
-    /// Every code block of the page is a readable file.
+    /// Each code block of the page is a file that the library can read.
     #[test]
     fn the_page_shows_files_that_can_be_read() {
         let arm = Arm::avena();

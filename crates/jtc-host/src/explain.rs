@@ -12,7 +12,7 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, StopKi
 use crate::check::ProblemKind;
 use crate::labels;
 
-/// Declares the families of numbers: meaning, name, key before the colon (as in `can:0x100`), title.
+/// Declares the families of numbers, each with meaning, name, title and the key before the colon (as in `can:0x100`).
 macro_rules! families {
     ($($(#[$meaning:meta])* $name:ident $key:literal, $title:literal;)+) => {
         /// Family of the number that a page explains.
@@ -23,7 +23,7 @@ macro_rules! families {
         }
 
         impl Family {
-            /// All families, in the order in which a number without a family is searched.
+            /// All families, in the order in which the search looks for a number without a family.
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
 
             /// Returns the key before the colon, as in `can:0x100`.
@@ -66,7 +66,7 @@ families! {
     Tes "tes", "trajectory execution state";
     /// States of a node.
     NodeState "node-state", "state of a node";
-    /// Bits of the parameters that a controller has not received.
+    /// Bits that mark the parameters that a controller has not received.
     Missing "missing", "word of missing parameters";
     /// Kinds of problems that the check of a trajectory finds.
     Check "check", "kind of a problem of a trajectory";
@@ -95,7 +95,7 @@ impl Family {
 pub struct Page {
     /// Family of the code.
     pub family: Family,
-    /// Bit number, or the code.
+    /// Bit number or code.
     pub code: u32,
     /// Unique name.
     pub name: &'static str,
@@ -110,12 +110,12 @@ pub struct Page {
 }
 
 impl Page {
-    /// Returns the number as in its word. For a bit this is a mask.
+    /// Returns the number as it appears in the error word or the code. For a bit, the result is a mask.
     pub fn number(&self) -> u32 {
         if self.family.is_bits() { 1 << self.code } else { self.code }
     }
 
-    /// Returns the words that a screen shows for the code. If no screen shows it, returns the name.
+    /// Returns the text that is displayed for the code. If no text is displayed for the code, returns the name of the page.
     pub fn title(&self) -> String {
         own_words(self).unwrap_or_else(|| self.name.replace('-', " "))
     }
@@ -136,7 +136,7 @@ impl std::fmt::Display for Page {
     }
 }
 
-/// Declares pages, family by family: number and name, then meaning, usual cause, remedy, next command.
+/// Declares the pages of each family: number, name, meaning, usual cause, remedy and next command.
 macro_rules! entries {
     ($($family:ident { $($code:literal $name:literal: $($text:literal),+;)+ })+) => {
         pub(super) const PAGES: &[super::Page] =
@@ -156,20 +156,20 @@ pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
     own.chain(check::MISSING).chain(check::FOUND).chain(stops::HELD_STOP).chain(stops::CAUSES)
 }
 
-/// Returns the page with this name.
+/// Returns the page named `name`.
 pub fn named(name: &str) -> Option<&'static Page> {
     pages().find(|page| page.name == name)
 }
 
-/// Returns the names of the pages about the bits that are set in a word of a family.
+/// Returns the names of the pages for the bits that are set in `word`.
 pub fn names(family: Family, word: u32) -> Vec<&'static str> {
     let own = pages().filter(|page| page.family == family && word & page.number() != 0);
     own.map(|page| page.name).collect()
 }
 
-/// Returns the words that commands print for this code.
+/// Returns the texts that commands print for this code.
 fn shown(page: &Page) -> Vec<String> {
-    // A decoded frame has the node numbers of the wire.
+    // A decoded frame contains the node numbers that are used on the CAN bus.
     let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
     own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
 }
@@ -196,22 +196,21 @@ fn own_words(page: &Page) -> Option<String> {
     }
 }
 
-/// Reduces a text to lower-case letters and digits. Case, spaces and punctuation are then ignored in a comparison.
+/// Converts a text to lower case and keeps only letters and digits. So a comparison ignores case, spaces and punctuation.
 fn letters(text: &str) -> String {
     text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
-/// Finds pages for a query. The query is a name (`joint-position-error`), the words on a screen (`HoldPos`,
-/// `over-current`), a number of one family (`can:0x100`, `data:7`), a number without a family, or some words of a name.
-/// Returns an empty list if no page fits.
+/// Finds pages for a query. The query is a name (`joint-position-error`), a displayed text (`HoldPos`, `over-current`), a number of one
+/// family (`can:0x100`, `data:7`), a number without a family, or some words of a name. Returns an empty list if no page matches.
 pub fn find(query: &str) -> Vec<&'static Page> {
-    // In a list of errors each error begins with its joint.
+    // In a displayed list of errors, each error begins with its joint.
     let query = match query.split_once(": ") {
         Some((node, rest)) if node.starts_with("joint ") || node == "gripper" => rest,
         _ => query,
     };
     let query = query.strip_suffix(" not given").unwrap_or(query);
-    // The query is the key of a whole family. This has priority over a word on a screen that equals the key.
+    // The query is the key of a whole family. The key has priority over a displayed text that equals the key.
     if query.strip_suffix(':').is_some_and(|key| Family::ALL.into_iter().any(|family| family.key() == key)) {
         return by_name_or_number(query);
     }
@@ -224,7 +223,7 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         return exact;
     }
     let by_name = by_name_or_number(query);
-    // The query is a part of the words on a screen, such as "does not answer".
+    // The query is a part of a displayed text, such as "does not answer".
     if by_name.is_empty() && as_shown.len() > 3 {
         on_screen(|text, asked| text.contains(asked))
     } else {
@@ -261,7 +260,7 @@ fn by_name_or_number(query: &str) -> Vec<&'static Page> {
     pages().filter(in_family).filter(|p| text.split('-').all(|word| p.name.contains(word))).collect()
 }
 
-/// Returns `true` if all set bits have a page. If not, the number belongs to another family.
+/// Returns `true` if a page exists for each set bit of `number`. Otherwise the number belongs to another family.
 fn known_bits(family: Family, number: u32) -> bool {
     let known = pages().filter(|p| p.family == family).fold(0, |m, p| m | p.number());
     number & !known == 0
@@ -297,7 +296,7 @@ mod tests {
         assert!(find("no-such-thing").is_empty() && find("").is_empty() && find("bogus:1").is_empty());
     }
 
-    /// Each text that a screen shows finds the page of its code.
+    /// A search for each displayed text finds the page of its code.
     #[test]
     fn every_word_on_a_screen_finds_its_page() {
         use jtc_wire::words as w;
@@ -324,7 +323,7 @@ mod tests {
         }
         for kind in ProblemKind::ALL {
             has(kind.words(), Family::Check, kind as usize);
-            // The name in JSON.
+            // Name of the kind in JSON.
             let key = serde_json::to_value(kind).unwrap().as_str().unwrap().to_owned();
             has(&key, Family::Check, kind as usize);
         }
@@ -350,7 +349,7 @@ mod tests {
         assert_eq!(find("HoldPos").len(), 1);
     }
 
-    /// Each set bit of a word has one name, in the order of the texts, and each name finds only its page.
+    /// Each set bit of a word has one name, in the order of the displayed texts. A search for a name finds only the page with that name.
     #[test]
     fn the_bits_of_a_word_have_the_names_of_their_pages() {
         for (family, word, words) in [
@@ -380,7 +379,7 @@ mod tests {
         assert_eq!(count(Family::Tes), TrajectoryState::ALL.len());
         assert_eq!(count(Family::Missing), w::JTC_INIT.len());
         assert_eq!(count(Family::Check), ProblemKind::ALL.len());
-        // The held stop itself also has a page.
+        // There is also a page about the held stop itself.
         assert_eq!(count(Family::Stop), 1 + StopKind::ALL.len());
         assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));
         for (i, p) in pages().enumerate() {
@@ -389,7 +388,7 @@ mod tests {
                 "{}",
                 p.name
             );
-            // A page of another family may have the same words on a screen.
+            // A page of another family may have the same displayed text.
             let found = find(p.name);
             assert!(
                 found.contains(&p) && found.iter().all(|q| q.family != p.family || q == &p),

@@ -1,10 +1,10 @@
-//! Reading of files with numbers. Each error contains file, line, column and value.
+//! Functions that read text files with numbers. Each error contains the file, line, column and value.
 
 use std::path::{Path, PathBuf};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Largest file that is read.
+/// Size limit for files, bytes; a larger file is not read.
 pub const FILE_MAX: u64 = 64 << 20;
 /// Reason why `--deg` is not allowed for a file that states its units.
 pub(crate) const UNITS_KNOWN: &str =
@@ -22,7 +22,7 @@ pub enum FileError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file is larger than every valid file.
+    /// The file is larger than any valid file.
     #[error("{}: {bytes} bytes, more than {FILE_MAX}", path.display())]
     TooLarge {
         /// The file.
@@ -37,7 +37,7 @@ pub enum FileError {
         path: PathBuf,
         /// Line, column, field or key.
         place: Place,
-        /// Problem at this place, with the value.
+        /// Description of the problem, with the value.
         problem: String,
     },
     /// The robot description has more than six joints, so the caller must select the six joints of the arm.
@@ -55,17 +55,17 @@ pub enum FileError {
     Choice {
         /// The file.
         path: PathBuf,
-        /// Joint, if the problem is about one joint.
+        /// Name of the joint, if the problem is about one joint.
         place: Place,
-        /// Problem of the selection.
+        /// Description of the problem with the selection.
         problem: String,
     },
-    /// The robot description has no chain of six rotary joints. No option makes it usable for this controller.
+    /// The robot description has no chain of six rotary joints. No option can make the description usable for this controller.
     #[error("{}: {problem}", path.display())]
     FewJoints {
         /// The file.
         path: PathBuf,
-        /// Joints of the description.
+        /// Description of the joints that were found.
         problem: String,
     },
     /// The file is not in one of the known formats.
@@ -73,7 +73,7 @@ pub enum FileError {
     Form {
         /// The file.
         path: PathBuf,
-        /// Content that was found, and known formats.
+        /// Description of the content, and the known formats.
         problem: String,
     },
 }
@@ -90,19 +90,19 @@ pub struct Place {
 }
 
 impl Place {
-    /// Creates a place from a line.
+    /// Creates a place from a line number.
     pub fn line(line: usize) -> Self {
         Self { line: Some(line), ..Self::default() }
     }
-    /// Creates a place from a cell of a table.
+    /// Creates a place from the line and column of a table cell.
     pub fn cell(line: usize, column: usize) -> Self {
         Self { line: Some(line), column: Some(column), name: None }
     }
-    /// Creates a place from a key or element.
+    /// Creates a place from the name of a key or element.
     pub fn name(name: impl Into<String>) -> Self {
         Self { name: Some(name.into()), ..Self::default() }
     }
-    /// Returns this place with a name.
+    /// Adds a name to this place.
     pub fn named(self, name: impl Into<String>) -> Self {
         Self { name: Some(name.into()), ..self }
     }
@@ -151,7 +151,7 @@ impl Diagnose for FileError {
 }
 
 impl FileError {
-    /// Returns this error with `file` as its file.
+    /// Adds the path `file` to this error.
     pub fn in_file(mut self, file: &Path) -> Self {
         let (FileError::Io { path, .. }
         | FileError::TooLarge { path, .. }
@@ -190,7 +190,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
         .map_err(|_| FileError::form("not a text file (its bytes are not valid UTF-8)").in_file(path))
 }
 
-/// Parses a number in the notations of these files (`20.`, `-9.e-6`, ` 1`). Never returns NaN or infinity.
+/// Parses a number in the notations that occur in these files (`20.`, `-9.e-6`, ` 1`). NaN and infinity are not accepted.
 pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileError> {
     match text.trim().parse::<f64>() {
         Ok(v) if v.is_finite() => Ok(v),
@@ -214,7 +214,7 @@ pub(crate) fn short(text: &str) -> String {
     }
 }
 
-/// Returns rows of comma, semicolon or space separated cells; blank lines and lines that begin with `#` are skipped.
+/// Returns rows of cells that are separated by commas, semicolons or spaces. Blank lines and lines that begin with `#` are skipped.
 pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
     text.trim_start_matches('\u{feff}').lines().enumerate().filter_map(|(i, line)| {
         let line = line.trim();
@@ -226,7 +226,7 @@ pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
 }
 
 fn cells(line: &str) -> Vec<&str> {
-    // If semicolons separate the cells, a comma is part of a number, and the number is then invalid.
+    // If semicolons separate the cells, a comma is part of a number and makes this number invalid.
     match [';', ','].into_iter().find(|c| line.contains(*c)) {
         Some(c) => line.split(c).map(str::trim).collect(),
         None => line.split_whitespace().collect(),

@@ -1,4 +1,4 @@
-//! Frames from the host to the controller, each in its own buffer. `jtc-wire` defines their layout.
+//! Frames from the host to the controller, each in its own buffer. The crate `jtc-wire` defines the layout of the frames.
 
 use jtc_core::{Friction, JOINTS, PidGains};
 use jtc_dynamics::{ArmModel, Origin};
@@ -15,11 +15,11 @@ fn written(
     Ok(bytes)
 }
 
-/// Returns the frame of a segment of a trajectory.
+/// Returns the frame that contains a segment of a trajectory.
 ///
 /// # Errors
 ///
-/// Returns an error for a count or a number that the frame cannot carry.
+/// Returns an error for a count or a number that the frame cannot represent.
 pub fn segment(
     trajectory: u16,
     segment: u16,
@@ -33,7 +33,7 @@ pub fn segment(
     })
 }
 
-/// Returns the frame of the gains of all joints.
+/// Returns the frame that contains the gains of all joints.
 ///
 /// # Errors
 ///
@@ -43,7 +43,7 @@ pub fn pid(gains: &[PidGains; JOINTS]) -> Result<Vec<u8>, EncodeError> {
     written(FRAME_MAX, |out| jtc_wire::pid_param(out, &gains))
 }
 
-/// Returns the frame of kinematics and masses.
+/// Returns the frame that contains the kinematics and masses of an arm model.
 ///
 /// # Errors
 ///
@@ -53,7 +53,7 @@ pub fn arm_model(model: &ArmModel) -> Result<Vec<u8>, EncodeError> {
     written(FRAME_MAX, |out| jtc_wire::arm_model(out, &joints, &links))
 }
 
-/// Returns the numbers of a model in the layout of its frame: the origins of six joints and the flange, and the seven links.
+/// Returns the numbers of a model in the order of its frame: the origins of six joints and the flange, and the seven links.
 pub(crate) fn model_rows(model: &ArmModel) -> ([[f64; 6]; JOINTS + 1], [[f64; 13]; JOINTS + 1]) {
     let origin = |o: &Origin| [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]];
     let joints = model.joints.map(|j| origin(&j));
@@ -67,7 +67,7 @@ pub(crate) fn model_rows(model: &ArmModel) -> ([[f64; 6]; JOINTS + 1], [[f64; 13
     (joints, links)
 }
 
-/// Returns the frame of the friction compensation: the polynomial (six coefficients) or the tables.
+/// Returns the frame that contains the friction compensation: the polynomial (six coefficients) or the tables.
 ///
 /// # Errors
 ///

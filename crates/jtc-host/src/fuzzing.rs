@@ -1,5 +1,5 @@
-//! Bodies of the fuzz targets. Each passes arbitrary bytes to the readers of one file type. A panic or a failed check is a
-//! finding.
+//! Functions that the fuzz targets call. Each function passes arbitrary bytes to the readers of one file type. A panic or a failed check is
+//! a finding of the fuzz test.
 
 use jtc_core::recorder::{Log, sealed_block};
 
@@ -14,14 +14,14 @@ fn text(data: &[u8]) -> Option<&str> {
     std::str::from_utf8(data).ok()
 }
 
-/// Checks a trajectory that was read: its values are finite, it has a step time, and the CSV and JSON writers keep it
-/// unchanged.
+/// Checks a trajectory that was read from a file. All values must be finite, the step time must not be 0, and writing as CSV or JSON must
+/// not change the trajectory.
 fn sound(read: Result<Loaded, FileError>) {
     let Ok(loaded) = read else { return };
     let t = &loaded.trajectory;
     assert!(t.step_ms > 0 && !t.points.is_empty());
     let finite = |v: &[f64; 6]| v.iter().all(|v| v.is_finite());
-    // A spline through huge numbers may overflow. The check then rejects the trajectory because its numbers are out of
+    // A spline through very large numbers may overflow. In this case the check rejects the trajectory, because its numbers are out of
     // range.
     if !t.points.iter().all(|p| finite(&p.position) && finite(&p.velocity) && finite(&p.acceleration)) {
         assert!(t.raw().is_err());
@@ -38,7 +38,7 @@ fn sound(read: Result<Loaded, FileError>) {
 /// Checks that waypoints are read and converted to positions, or rejected with an error.
 fn waypoints(text: &str) {
     let Ok(file) = WaypointFile::parse(text) else { return };
-    // Inverse kinematics of thousands of waypoints takes long and finds nothing more.
+    // Inverse kinematics of thousands of waypoints needs much time and does not find further errors.
     if file.waypoints.len() < 50 {
         let _ = file.positions(&Arm::avena());
     }
@@ -53,8 +53,8 @@ pub fn trajectory_csv(data: &[u8]) {
     waypoints(text);
 }
 
-/// Reads a file of 19 columns without a header. Then builds such a file from `data`, with integers or with decimals, and
-/// reads it.
+/// Reads a file of 19 columns without a header. Then builds a file of this format from `data`, with integers or with decimals, and reads
+/// it.
 pub fn trajectory_table(data: &[u8]) {
     if let Some(text) = text(data) {
         sound(Loaded::parse(text, None));
@@ -89,8 +89,8 @@ pub fn trajectory_yaml(data: &[u8]) {
     sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
 }
 
-/// Checks an arm that was read: its model is physical, and its parameters fit into their frames unless their own check
-/// rejects them.
+/// Checks an arm that was read from a file. Its model must be physically possible, and its parameters must fit into their CAN frames unless
+/// the parameter check rejects them.
 fn sound_arm(read: Result<Arm, FileError>) {
     let Ok(arm) = read else { return };
     assert!(arm.model.check().is_ok());
@@ -116,7 +116,7 @@ pub fn arm_urdf(data: &[u8]) {
     let _ = Arm::from_urdf(text);
 }
 
-/// Reads friction tables, polynomials, gains and models.
+/// Reads friction tables, friction polynomials, gains and arm models.
 pub fn parameter_table(data: &[u8]) {
     let Some(text) = text(data) else { return };
     if let Ok(file) = ParameterFile::parse_table(text) {
@@ -129,7 +129,7 @@ pub fn capture(data: &[u8]) {
     let _ = read_capture(data);
 }
 
-/// Reads logs of flight recorders: log files, and any bits in valid blocks.
+/// Reads logs of flight recorders. The input is used as a log file, and as arbitrary bits in valid blocks.
 pub fn flight_log(data: &[u8]) {
     if let Some(log) = FlightLog::from_bytes(data) {
         assert_eq!(FlightLog::from_bytes(&log.to_bytes()).as_ref(), Some(&log));
@@ -139,7 +139,7 @@ pub fn flight_log(data: &[u8]) {
         .chunks(4)
         .map(|bytes| bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte)))
         .collect();
-    // The first two bytes select the bit at which the snapshot begins. The amount of data sets the number of blocks.
+    // The first two bytes select the bit at which the snapshot begins. The length of the data determines the number of blocks.
     let snapshot = u16::from_be_bytes([head[0], head[1]]);
     let blocks: Vec<_> = words
         .chunks(251)

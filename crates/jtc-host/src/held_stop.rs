@@ -1,4 +1,4 @@
-//! Held stop (J-69) in the form that every front end shows: cause, values and remedy.
+//! Held stop (J-69) as all front ends show it, with cause, values and remedy.
 
 use host_kit::{Next, next};
 use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopKind};
@@ -21,21 +21,21 @@ pub fn after_encoder_jump() -> Next {
 /// Last held stop of a controller.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HeldStop {
-    /// Name of the kind of cause, with hyphens.
+    /// Name of the kind of cause, with hyphens between words.
     pub kind: String,
-    /// Number of the kind on the wire.
+    /// Number of the kind of cause in the protocol.
     pub number: u8,
-    /// Name of the explain page: `jtc explain CODE`.
+    /// Name of the explain page, for `jtc explain CODE`.
     pub code: &'static str,
-    /// First joint with the cause, from 1; `None`: no particular joint.
+    /// First joint with the cause, from 1; `None` if the cause is not in a joint.
     pub joint: Option<u8>,
     /// Measured value; `None` if the kind has no value.
     pub value: Option<f32>,
-    /// Limit of the value; `None` if the kind has no limit.
+    /// Limit for the value; `None` if the kind has no limit.
     pub limit: Option<f32>,
     /// Unit of value and limit; empty if they have no unit.
     pub unit: &'static str,
-    /// Cause in a sentence without a full stop.
+    /// Description of the cause as a sentence without a full stop.
     pub text: String,
     /// Remedy for the cause, without commands.
     pub remedy: String,
@@ -44,7 +44,7 @@ pub struct HeldStop {
 }
 
 impl HeldStop {
-    /// Creates the held stop of a cause that was found `ago_ms` ago.
+    /// Creates the held stop from a cause that the controller detected `ago_ms` ago.
     pub fn new(cause: &StopCause, ago_ms: u32) -> Self {
         let (value, limit) = figures(cause);
         Self {
@@ -78,13 +78,13 @@ pub struct Reacting {
     /// Last held stop; `None` if the arm was not in a held stop since the start or since the occurred errors were
     /// cleared.
     pub last_held_stop: Option<HeldStop>,
-    /// Joints, from 1, that yield or lower their loads.
+    /// Joints, from 1, that yield to a push or lower their loads.
     pub yields: Vec<u8>,
-    /// Joints, from 1, whose encoder has jumped since their drives were configured.
+    /// Joints, from 1, whose encoder has jumped after the last configuration of their drives.
     pub encoder_jumped: Vec<u8>,
-    /// Rate of path time, path seconds per second; 0 if no trajectory is executed.
+    /// Rate of the path time (seconds of path time per second); 0 if no trajectory is executed.
     pub path_rate: f32,
-    /// Total time for which this run has been slowed down because a torque was at its limit, s.
+    /// Total time for which the current execution was slowed down because a torque was at its limit, s.
     pub held_back_s: f64,
 }
 
@@ -108,7 +108,7 @@ impl Reacting {
     }
 }
 
-/// Returns the joints of a mask with one bit for each joint.
+/// Returns the joints whose bits are set in `mask`, which has one bit for each joint.
 pub fn joints(mask: u8) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| mask & 1 << joint.index() != 0).collect()
 }
@@ -118,7 +118,7 @@ pub fn joint(cause: &StopCause) -> Option<Joint> {
     Joint::from_number(cause.joint.into())
 }
 
-/// Returns value and limit of a cause, if its kind has them.
+/// Returns the value and the limit of a cause, if causes of this kind have them.
 pub fn figures(cause: &StopCause) -> (Option<f32>, Option<f32>) {
     let known = match cause.kind {
         StopKind::Approach | StopKind::Gains => (false, false),
@@ -136,22 +136,22 @@ pub fn figures(cause: &StopCause) -> (Option<f32>, Option<f32>) {
     (known.0.then_some(cause.value), (known.1 && cause.limit != 0.0).then_some(cause.limit))
 }
 
-/// Returns the page about a kind.
+/// Returns the explain page about a kind of cause.
 pub fn page(kind: StopKind) -> Option<&'static Page> {
     explain::pages().find(|page| page.family == explain::Family::Stop && page.code == u32::from(kind as u8))
 }
 
-/// Returns the remedy for a cause as part of a sentence, without commands and without a full stop.
+/// Returns the remedy for a cause as a part of a sentence, without commands and without a full stop.
 pub fn remedy(kind: StopKind) -> String {
     page(kind).map_or_else(String::new, |page| clause(page.remedy))
 }
 
-/// Returns the usual reason for a cause as part of a sentence, without a full stop.
+/// Returns the usual reason for a cause as a part of a sentence, without a full stop.
 pub fn usual_cause(kind: StopKind) -> String {
     page(kind).map_or_else(String::new, |page| clause(page.cause))
 }
 
-/// Turns a sentence into a part of another sentence.
+/// Changes a sentence into a form that can be a part of another sentence.
 fn clause(sentence: &str) -> String {
     let mut letters = sentence.trim_end_matches('.').chars();
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(figures(&scale), (Some(2.0), None));
     }
 
-    /// Each kind has its own remedy and a page.
+    /// Each kind of cause has its own remedy and an explain page.
     #[test]
     fn j69_each_kind_has_its_own_remedy() {
         let remedies = StopKind::ALL.map(remedy);

@@ -1,4 +1,4 @@
-//! Text for the controller's codes and bits.
+//! Texts for the codes and bits of the controller.
 
 use host_kit::{Action, Next, next};
 pub use jtc_bus::GRIPPER;
@@ -15,7 +15,7 @@ pub fn node(n: usize) -> String {
     Joint::from_index(n).map_or_else(|| "gripper".into(), |joint| joint.to_string())
 }
 
-/// Returns the name of a request for the user.
+/// Returns the name of a request as shown to the user.
 pub fn request(request: FrameType) -> &'static str {
     match request {
         FrameType::ClearCurrentErrors => "clearing the current errors",
@@ -113,13 +113,12 @@ pub fn is_silent(s: &Status, node: usize) -> bool {
     s.can_current & can_flag::no_answer(node) != 0
 }
 
-/// Returns `true` if the arm is under torque.
+/// Returns `true` if the drives of the arm produce torque.
 pub fn has_torque(s: &Status) -> bool {
     s.state.is_in(&[ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching])
 }
 
-/// Returns `true` if joint `j` (from 0) is marked as absent. While torque is on, only such a joint is in Start (J-20,
-/// J-53).
+/// Returns `true` if joint `j` (from 0) is marked as absent. While torque is on, only an absent joint is in Start (J-20, J-53).
 pub fn is_absent(s: &Status, j: usize) -> bool {
     has_torque(s) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
 }
@@ -151,29 +150,29 @@ pub fn is_awaited(s: &Status, node: usize) -> bool {
     nodes_in(s.node_init).any(|n| n == node)
 }
 
-/// Returns the parameters for which the controller waits in Init: friction, PID, arm model.
+/// Returns the parameters for which the controller waits in Init: friction, PID gains, arm model.
 pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
     list(u32::from(jtc_init), &jtc_wire::words::JTC_INIT)
 }
 
-/// Returns the nodes of a mask with one bit for each node, node 0 first.
+/// Returns the numbers of the nodes whose bits are set in `mask`, starting with node 0.
 pub fn nodes_in(mask: u8) -> impl Iterator<Item = usize> {
     (0..NODES).filter(move |n| mask >> n & 1 == 1)
 }
 
-/// Returns the names of the nodes of a mask.
+/// Returns the names of the nodes whose bits are set in `mask`.
 pub fn node_names(mask: u8) -> Vec<String> {
     nodes_in(mask).map(node).collect()
 }
 
-/// Returns all current errors of a status, the most specific first: nodes that do not answer, the safety input, errors of
-/// each joint and the gripper. The other error bits of the controller are consequences of these.
+/// Returns all current errors of a status, most specific first: nodes that do not answer, the safety input, and the errors of each joint
+/// and the gripper. The other error bits of the controller are consequences of these errors.
 pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
     all.extend(errors(s.errors & error::EMERGENCY_INPUT).into_iter().map(String::from));
     for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
-        // An active safety line switches the torque of a drive off. An unconfigured drive also sets this bit, so the bit is
-        // ignored until the drive is configured.
+        // An active safety line switches the torque of a drive off. An unconfigured drive also sets this bit, so the function ignores the
+        // bit until the drive is configured.
         let line_active = joint.warnings & warning::SAFETY_LINE != 0 && !is_awaited(s, number.index());
         let words = joint_errors(joint.internal)
             .into_iter()
@@ -186,7 +185,7 @@ pub fn causes(s: &Status) -> Vec<String> {
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
-    // In a held stop this bit says no more than the errors of the joints.
+    // During a held stop, this bit does not add information to the errors of the joints.
     let own = if s.is_held_stop() { 0 } else { s.errors & !error::EMERGENCY_INPUT };
     all.extend(errors(own).into_iter().map(String::from));
     all
@@ -197,7 +196,7 @@ pub fn held_stop(s: &Status) -> String {
     causes(s).join(", ")
 }
 
-/// Returns the reason why the arm is held: the cause that the device found, or, without it, the errors in the status.
+/// Returns the reason why the arm is held. This is the cause that the device reported, or, without such a report, the errors in the status.
 pub fn why_held(s: &Status, cause: Option<&StopCause>) -> String {
     cause.map_or_else(|| held_stop(s), ToString::to_string)
 }
@@ -264,7 +263,7 @@ pub fn next_step(s: &Status) -> Next {
     } else if s.is_held_stop() {
         after_removing("remove the cause")
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
-        // The short form of the command, after its long one.
+        // The short form of the command follows the long form.
         next!("{}, or ", RecoverWithArm)
             .then(Next::typed(Action::RecoverWithDefaults, "--defaults"))
             .then(" for the arm that is built into the controller")

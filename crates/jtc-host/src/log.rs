@@ -1,8 +1,8 @@
-//! The flight recorder's log: fetched from a device, stored in a file, and replayed through the controller (J-56).
+//! Log of the flight recorder. The modules fetch the log from a device, store it in a file, and replay it through the controller (J-56).
 //!
-//! [`FlightLog`] contains the data from a device: the blocks of its log, the active arm, and the trajectory points that the
-//! log needs. [`FlightLog::replay`] returns every tick with all values that the controller computed, and marks the ticks
-//! that are known to match the original bit for bit. [`Timeline`] lists the events in order, with the first error at the top.
+//! [`FlightLog`] contains the data from a device: the blocks of its log, the active arm, and the trajectory points that the log needs.
+//! [`FlightLog::replay`] returns every tick with all values that the controller computed, and marks the ticks that are known to equal the
+//! original tick bit for bit. [`Timeline`] lists the events in order, with the first error at the top.
 
 mod container;
 mod replay;
@@ -27,20 +27,20 @@ pub struct FlightLog {
     pub state: LogState,
     /// Blocks, oldest first.
     pub blocks: Vec<Block>,
-    /// Active arm at the time of the fetch: a [`jtc_wire::ArmImage`].
+    /// Active arm when the log was fetched, as a [`jtc_wire::ArmImage`].
     pub arm: Vec<u8>,
-    /// Index of the first of these points in the trajectory.
+    /// Index in the trajectory of the first point in `points`.
     pub first_point: usize,
     /// Points of the trajectory that the log needs.
     pub points: Vec<RawPoint>,
     /// Hash of all points in the memory of the device.
     pub points_hash: u32,
-    /// Device and firmware as text.
+    /// Description of the device and its firmware.
     pub device: String,
 }
 
 impl FlightLog {
-    /// Returns the blocks as a log.
+    /// Returns the blocks in the form of a log.
     pub fn log(&self) -> Log<'_> {
         Log::new(&self.blocks)
     }
@@ -50,8 +50,8 @@ impl FlightLog {
         self.log().next().is_none()
     }
 
-    /// Returns the points that the log needs from the trajectory with this hash, as the index of the first point and a
-    /// number. Returns `None` if the log contains no motion along this trajectory.
+    /// Returns the points that the log needs from the trajectory with this hash, as the index of the first point and the number of points.
+    /// Returns `None` if the log contains no motion along this trajectory.
     pub fn needed_points(&self, hash: u32, total: usize) -> Option<(usize, usize)> {
         let mut needed: Option<(f64, f64)> = None;
         let mut need = |from: f64, to: f64| {
@@ -82,13 +82,13 @@ impl FlightLog {
         }
         let (low, high) = needed?;
         let first = (low.max(0.0) as usize).saturating_sub(1).min(total);
-        // For times after the end the last point is used.
+        // For times after the end of the trajectory, the last point is used.
         let end = ((high as usize).saturating_add(3)).min(total);
         (end > first).then_some((first, end - first))
     }
 }
 
-/// Splits the bytes of log pages into blocks. Drops an incomplete block at the end.
+/// Splits the bytes of log pages into blocks. An incomplete block at the end is ignored.
 pub(crate) fn blocks_of(bytes: &[u8]) -> Vec<Block> {
     let words = bytes.as_chunks::<4>().0;
     words.as_chunks::<BLOCK_WORDS>().0.iter().map(|block| block.map(u32::from_le_bytes)).collect()

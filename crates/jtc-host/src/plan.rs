@@ -1,9 +1,9 @@
-//! Planner: moves to a goal, motions through waypoints, and trajectories at another speed.
+//! Planner for moves to a goal, motions through waypoints, and trajectories at another speed.
 //!
-//! The motions come from `jtc-plan`. The motions are as fast as the limits of velocity, acceleration, jerk and torque
-//! allow. This module turns a motion into a trajectory with points at a fixed step, in the form in which it is sent. Before
-//! the planner returns a trajectory, it must pass the [check](crate::check) that files also pass. If rounding, a pause on
-//! the path (J-33) or friction exceed a limit, the planner slows the motion down and reports this in [`Planned::notes`].
+//! The crate `jtc-plan` computes the motions. These motions are as fast as the limits of velocity, acceleration, jerk and torque allow.
+//! This module converts a motion into a trajectory with points at a fixed time step, as the host sends it. Before the planner returns a
+//! trajectory, it must pass the [check](crate::check) that trajectory files must also pass. If rounding, a Pause on the path (J-33) or
+//! friction would exceed a limit, the planner slows down the motion and reports this in [`Planned::notes`].
 //!
 //! ```
 //! use jtc_host::{Arm, plan::Planner};
@@ -52,46 +52,47 @@ use crate::check::{Checker, Problem, ProblemKind, TEMPERATURE, Verdict};
 use crate::trajectory::{Trajectory, UploadOptions};
 use sampled::{least_s, sampled, step_ms};
 
-/// Step of planned moves, ms.
+/// Time step between the points of planned moves, ms.
 const STEP_MS: u16 = 10;
-/// Time for a change of acceleration without a jerk limit, s. If it were shorter than two steps, the position between the
-/// points (J-32) would accelerate more than the points.
+/// Duration of a change of the acceleration if the jerk is not limited, s. With a duration below two steps, the acceleration between the
+/// points (J-32) would be higher than at the points.
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
-/// Share of the velocity and acceleration limits that a plan uses. The rest is reserved for the rounding in frames.
+/// Share of the velocity and acceleration limits that a plan uses. The remaining 2 % are reserved for the rounding in CAN frames.
 const SHARE: f64 = 0.98;
-/// Time (s) in which the remainder of a trajectory reaches its speed, and longer times that are tried if the check rejects
-/// it.
+/// Time (s) in which the remainder of a trajectory reaches its speed, followed by longer times that are tried if the check rejects the
+/// remainder.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Bearing temperature that a plan assumes, °C: that of a cold hall. Friction is higher than at the usual temperature.
+/// Bearing temperature that a plan assumes, °C; this is the temperature of a cold factory hall. At this temperature friction is higher than
+/// at the usual temperature.
 pub const COLD: f64 = 20.0;
-/// Maximum factor for slowing a motion down. A motion that needs more is rejected.
+/// Maximum factor by which the planner slows down a motion. A motion that needs a larger factor is rejected.
 const SLOWEST: f64 = 50.0;
-/// Minimum and maximum factor for slowing a motion down in one iteration.
+/// Minimum and maximum factor by which the planner slows down a motion in one iteration.
 const SLOWER: (f64, f64) = (1.01, 2.0);
-/// Minimum factor for slowing a motion down in one iteration for the torque margin. The factor is small, because rounding
-/// exceeds the margin only slightly.
+/// Minimum factor by which the planner slows down a motion in one iteration to keep the torque margin. The factor is small, because
+/// rounding exceeds the margin only slightly.
 const SLOWER_FOR_MARGIN: f64 = 1.002;
-/// A motion that is slowed down for the torque margin by more than this factor gets a note.
+/// Slow-down factor above which a note reports that a motion was slowed down for the torque margin.
 const NOTED: f64 = 1.01;
 
-/// Plans motions for an arm and checks them.
+/// Planner that plans motions for an arm and checks them.
 #[derive(Clone, Debug)]
 pub struct Planner<'a> {
-    /// Limits, rotor inertia, gravity, payload.
+    /// Settings with the limits, rotor inertia, gravity and payload.
     pub config: &'a Config,
-    /// Model for the torques. `None`: torque is neither planned nor checked.
+    /// Arm model for the torques. If `None`, torque is neither planned nor checked.
     pub model: Option<&'a ArmModel>,
-    /// Friction compensation that the controller adds to the model torque.
+    /// Friction compensation that the controller adds to the torque of the model.
     pub friction: Option<&'a Friction>,
-    /// Lowest bearing temperature for which friction is planned, °C.
+    /// Lowest bearing temperature for which the plan includes friction, °C.
     pub temperature: f64,
-    /// Speed, 1 to 100 % of the limits.
+    /// Speed of planned motions, 1 to 100 % of the limits.
     pub speed_pct: f64,
-    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. With 0 the arm stops at each
+    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. If the blend is 0, the arm stops at each
     /// waypoint.
     pub blend: f64,
-    /// `true` if the jerk is limited. If not, the acceleration changes within two steps.
+    /// `true` if the jerk is limited. Otherwise the acceleration changes within two steps.
     pub jerk: bool,
     /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each limit, for masses and friction that the model does not contain.
     pub margin_pct: f64,
@@ -99,38 +100,38 @@ pub struct Planner<'a> {
     pub upload: UploadOptions,
 }
 
-/// Limit that binds a motion in an interval of time.
+/// Limit that determines the speed of a motion in an interval of time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// Start of the interval, s from the start of the motion.
+    /// Time from the start of the motion to the start of the interval, s.
     pub from_s: f64,
-    /// End of the interval, s from the start of the motion.
+    /// Time from the start of the motion to the end of the interval, s.
     pub to_s: f64,
     /// Joint concerned.
     pub joint: Joint,
-    /// "velocity", "acceleration", "jerk", "torque", "stop" (distance to stop in time), "friction" (the friction table) or
-    /// "given time".
+    /// Name of the limit: "velocity", "acceleration", "jerk", "torque", "stop" (ability to stop in time), "friction" (range of the friction
+    /// table) or "given time".
     pub limit: &'static str,
 }
 
-/// Motion that passed the check.
+/// Planned motion that passed the check.
 #[derive(Clone, Debug)]
 pub struct Planned {
     /// Trajectory to run.
     pub trajectory: Trajectory,
-    /// Result of the check: figures of each joint, and warnings.
+    /// Result of the check, with the values of each joint and the warnings.
     pub verdict: Verdict,
-    /// Binding limits, ordered by time.
+    /// Limits that determine the speed, ordered by time.
     pub binding: Vec<Bound>,
     /// Times at which the motion is nearest to each waypoint, s.
     pub waypoint_times: Vec<f64>,
-    /// As text: changes that were made to pass the check, and waypoints that rounded corners miss.
+    /// Notes as text about changes that were necessary to pass the check, and about waypoints that the rounded corners miss.
     pub notes: Vec<String>,
 }
 
 impl<'a> Planner<'a> {
-    /// Creates a planner with full speed and a stop at each waypoint. The planner uses only the limits of `config`. If a
-    /// model is set, the planner keeps [`MARGIN_PCT`] of each torque limit free.
+    /// Creates a planner with full speed and a stop at each waypoint. The planner uses only the limits of `config`. If a model is set, the
+    /// planner leaves [`MARGIN_PCT`] of each torque limit unused.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
         Self {
@@ -146,10 +147,10 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Plans a motion from rest to rest between two positions (rad, base to wrist). The motion is straight in joint space,
-    /// unless that is slower. If a joint is outside its limits by up to the start tolerance, the motion begins at the
-    /// nearest position inside (J-58). If the goal is outside by at most the rounding of a frame, it is moved to the limit
-    /// (J-36).
+    /// Plans a motion that starts and ends at rest between two positions (rad, base to wrist). The motion is straight in joint space,
+    /// unless a curved motion is faster. If a joint is outside its limits by at most the start tolerance, the motion begins at the nearest
+    /// position inside the limits (J-58). If the goal is outside the limits by at most the rounding of a CAN frame, it is moved to the
+    /// limit (J-36).
     ///
     /// # Errors
     ///
@@ -163,8 +164,8 @@ impl<'a> Planner<'a> {
         self.checked(&motion, &first, Some(*from), false)
     }
 
-    /// Returns the position inside the limits that is nearest to `place` and from which the controller starts a motion.
-    /// Joints that are outside by more than the start tolerance keep their position.
+    /// Returns the position inside the limits that is nearest to `place` and from which the controller can start a motion. Joints that are
+    /// outside the limits by more than the start tolerance keep their position.
     fn nearest_inside(&self, place: &[f64; JOINTS]) -> [f64; JOINTS] {
         std::array::from_fn(|j| {
             let inside = PathRange::of(self.config, j, 0).nearest_inside(place[j]);
@@ -172,8 +173,8 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// Plans a motion through waypoints, from rest to rest. The legs are straight in joint space, and the corners are
-    /// rounded within the blend. If waypoints have times, the motion keeps them.
+    /// Plans a motion through waypoints that starts and ends at rest. The segments between waypoints are straight in joint space, and the
+    /// corners are rounded within the blend. If waypoints have times, the motion passes the waypoints at these times.
     ///
     /// # Errors
     ///
@@ -196,8 +197,9 @@ impl<'a> Planner<'a> {
         Ok(planned)
     }
 
-    /// Plans the remainder of a trajectory on the same path, beginning at `from_ms` of the path with the arm at `start`.
-    /// After a ramp the motion keeps the times of the trajectory. The shortest ramp that passes the check is used.
+    /// Plans the remainder of a trajectory on the same path, beginning at the time `from_ms` of the path, with the arm at `start`. After a
+    /// ramp the motion follows the original timing of the trajectory. The planner uses the shortest ramp with which the remainder passes
+    /// the check.
     ///
     /// # Errors
     ///
@@ -222,8 +224,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Rejects, before planning, a motion that is too long even at the highest speed. Positions outside the limits and
-    /// invalid blends are left to the planner, which rejects them.
+    /// Rejects a motion before planning if it takes too long even at the highest speed. Positions outside the limits and invalid blends are
+    /// accepted here, because the planner rejects them later.
     fn fits_time(&self, positions: &[[f64; JOINTS]]) -> Result<(), PlanError> {
         let limits = self.limits()?;
         let is_inside = |q: &[f64; JOINTS]| {
@@ -242,13 +244,13 @@ impl<'a> Planner<'a> {
             .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperatures(temperatures))
     }
 
-    /// Returns the checker for a run of an arm at `start`.
+    /// Returns the checker for a motion of an arm that is at `start`.
     fn checker(&self, start: Option<[f64; JOINTS]>) -> Checker<'a> {
         let Self { model, friction, upload, .. } = *self;
         Checker { model, friction, start, upload, ..Checker::new(self.config) }
     }
 
-    /// Plans a motion within the limits. If the margin leaves a joint no torque for the motion, plans without the margin of
+    /// Plans a motion within the limits. If the margin of a joint leaves no torque for the motion, the function plans without the margin of
     /// this joint.
     fn within(
         &self,
@@ -267,7 +269,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Returns the limits that a plan keeps.
+    /// Returns the limits that a plan must respect.
     fn limits(&self) -> Result<Limits, PlanError> {
         if !(1.0..=100.0).contains(&self.speed_pct) {
             return Err(PlanError::Speed { percent: self.speed_pct, most: 100.0 });
@@ -285,8 +287,8 @@ impl<'a> Planner<'a> {
         Ok(Limits { jerk: limits.acceleration.map(|a| a / JUMP_S), ..limits })
     }
 
-    /// Turns the motion into a trajectory that passes the check, and slows it down as far as necessary. If `timed` is set,
-    /// the motion is not slowed down.
+    /// Converts the motion into a trajectory that passes the check, and slows down the motion as far as necessary. If `timed` is set, the
+    /// motion is not slowed down.
     fn checked(
         &self,
         within: &Within,
@@ -301,14 +303,13 @@ impl<'a> Planner<'a> {
         loop {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
-            // Checks with cold bearings first, then at the temperature of a run. If friction helps to brake, less friction
-            // means more torque.
+            // The planner checks with cold bearings first, then with the bearing temperature during operation. If friction helps to brake,
+            // the torque is higher with less friction.
             let cold =
                 Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
             let verdict =
                 if cold.is_ok() { checker.check(&sampled.trajectory).or_less(cold.margin) } else { cold };
-            // The corners are closer together than the steps. A longer trajectory would not help, because its steps would
-            // be longer.
+            // The distance between corners is shorter than a step. A longer trajectory would not help, because its steps would be longer.
             if step > STEP_MS && verdict.warnings().next().is_some() {
                 return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
@@ -322,7 +323,7 @@ impl<'a> Planner<'a> {
                 slowed = Some(worst);
                 continue;
             }
-            // The margin can be exceeded because of the rounding in frames, and between the samples of the plan.
+            // The torque can exceed the margin because of the rounding in CAN frames, and between the samples of the plan.
             let excess = arm.as_ref().filter(|_| !timed);
             let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
             if let Some(excess) = excess {
@@ -360,7 +361,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Returns `place`. A joint that is outside its limits by at most the rounding of a frame is moved to the limit (J-36).
+/// Returns `place`. Moves a joint to its limit if it is outside by at most the rounding of a CAN frame (J-36).
 fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     std::array::from_fn(|j| {
         let range = PathRange::of(config, j, 0);
@@ -368,14 +369,14 @@ fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     })
 }
 
-/// Motion with the limits that it keeps.
+/// Motion with the limits that it respects.
 struct Within {
     motion: Motion,
     limits: Limits,
 }
 
-/// Returns the factor for slowing the motion down to solve the problems. Returns `None` if a slower motion does not solve
-/// them.
+/// Returns the factor by which the motion must be slowed down to solve the problems. Returns `None` if a slower motion does not solve the
+/// problems.
 fn slower(verdict: &Verdict) -> Option<f64> {
     use ProblemKind::{Acceleration, FrictionVelocity, NoStop, PositionSpeed, Torque, Velocity};
     let factors = verdict.refusals().map(|p| {
@@ -402,7 +403,8 @@ fn limit_name(kind: ProblemKind) -> &'static str {
     }
 }
 
-/// Returns the binding limits: those of the plan, or, if the motion was slowed down, the problem that required it.
+/// Returns the limits that determine the speed. If the motion was slowed down, returns the problem that required this instead of the limits
+/// of the plan.
 fn binding(motion: &Motion, scale: f64, slowed: Option<&Problem>) -> Vec<Bound> {
     if let Some(problem) = slowed {
         let (joint, limit) = (problem.joint.unwrap_or(Joint::ALL[0]), limit_name(problem.kind));
@@ -421,7 +423,7 @@ fn slowed_words(problem: &Problem, stretch: f64) -> String {
     format!("slowed down to {:.0} % of the planned speed, to pass the check: {problem}", 100.0 / stretch)
 }
 
-/// Plans a move between two positions at `speed_pct` % of the limits of `config`, like [`Planner::to`] without torques.
+/// Plans a move between two positions at `speed_pct` % of the limits of `config`, like [`Planner::to`], but ignores torques.
 ///
 /// # Errors
 ///

@@ -1,15 +1,14 @@
-//! Recordings of a run. Recordings are written as MCAP or CSV, depending on the extension of the file name, and read
-//! again for reports.
+//! Recordings of the execution of a motion. Recordings are written as MCAP or CSV, depending on the extension of the file name, and are
+//! read again for reports.
 //!
-//! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so
-//! that Foxglove, PlotJuggler and Rerun plot it directly. The parts of the torque are on `/jtc/control`, and the states are
-//! on `/jtc/state`. If the arm is known, its description (URDF) is on `/robot_description`, and the pose of each link is on
-//! `/tf`. The metadata contain the limits, gains and hash of the arm, and the controller's firmware. A CSV file has one row
-//! per sample, and a header with the units. If a run was not finished, lines that begin with `#` at the end of the file
-//! report how it ended.
+//! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so that Foxglove,
+//! PlotJuggler and Rerun can plot the data directly. The topic `/jtc/control` contains the parts of the torque, and `/jtc/state` contains
+//! the states. If the arm is known, the topic `/robot_description` contains its robot description (URDF), and `/tf` contains the pose of
+//! each link. The metadata contain the limits, gains and hash of the arm, and the controller's firmware. A CSV file has one row per sample,
+//! and a header with the units. If a run did not finish, lines that begin with `#` at the end of the file report how the run ended.
 //!
-//! If a file is truncated (the program was killed, or the disk was full), it is read up to the damage. [`Recording::cut`]
-//! then describes the missing part.
+//! A truncated file (after the program was killed, or if the disk was full) is read up to the damage. [`Recording::cut`] describes the
+//! missing part in this case.
 
 #[cfg(feature = "mcap")]
 mod cdr;
@@ -75,7 +74,7 @@ impl Format {
 trait Writer: Send {
     fn write(&mut self, sample: &Sample) -> Result<(), RecordingError>;
     fn flush(&mut self) -> Result<(), RecordingError>;
-    /// Writes how the run ended.
+    /// Writes the reason for the end of the run.
     fn end(&mut self, ending: &Ending) -> Result<(), RecordingError>;
     fn finish(self: Box<Self>) -> Result<(), RecordingError>;
 }
@@ -88,7 +87,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates or replaces the file. Its extension selects the format.
+    /// Creates or replaces the file. The extension of the file name selects the format.
     ///
     /// # Errors
     ///
@@ -98,7 +97,7 @@ impl Recorder {
         Self::on(File::create(path).map_err(|e| RecordingError::io(path, e))?, path, info)
     }
 
-    /// Writes to an open file. The extension of `path` selects the format.
+    /// Creates a recorder that writes to an open file. The extension of `path` selects the format.
     ///
     /// # Errors
     ///
@@ -136,18 +135,18 @@ impl Recorder {
         self.finish()
     }
 
-    /// Writes all samples so far to the operating system, so that they are kept if this program ends.
+    /// Passes all samples so far to the operating system, so that they are not lost if this program ends.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.writer.flush().map_err(|e| e.at(&self.path))
     }
 
-    /// Completes the file like [`Self::finish`], and writes how the run ended.
+    /// Completes the file like [`Self::finish`], and also writes the reason for the end of the run.
     pub fn finish_as(mut self, ending: &Ending) -> Result<u64, RecordingError> {
         self.writer.end(ending).map_err(|e| e.at(&self.path))?;
         self.finish()
     }
 
-    /// Completes the file, in MCAP with index and summary, and returns the number of samples.
+    /// Completes the file and returns the number of samples. In MCAP, this adds the index and the summary.
     ///
     /// # Errors
     ///
@@ -157,7 +156,7 @@ impl Recorder {
     }
 }
 
-/// Writes a complete recording at once.
+/// Writes a complete recording in one call.
 ///
 /// # Errors
 ///
@@ -166,7 +165,7 @@ pub fn write_all(path: &Path, info: &RecordingInfo, samples: &[Sample]) -> Resul
     Recorder::create(path, info)?.finish_with(samples)
 }
 
-/// Writes a complete recording at once to an open file. The extension of `path` selects the format.
+/// Writes a complete recording to an open file in one call. The extension of `path` selects the format.
 ///
 /// # Errors
 ///
@@ -180,7 +179,7 @@ pub fn write_into(
     Recorder::on(file, path, info)?.finish_with(samples)
 }
 
-/// Writes a complete recording as MCAP to an open file, together with the flight recorder log from which it was made. Error
+/// Writes a complete recording as MCAP to an open file, together with the flight recorder log from which the recording was made. Error
 /// messages use `path` as the name of the file.
 ///
 /// # Errors
@@ -210,7 +209,7 @@ pub fn write_with_log(
     }
 }
 
-/// Returns the flight recorder log in an MCAP file. `None` if the recording contains no log.
+/// Returns the flight recorder log in an MCAP file. Returns `None` if the recording does not contain a log.
 ///
 /// # Errors
 ///
@@ -231,12 +230,12 @@ pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
     }
 }
 
-/// A recording that was read from a file.
+/// Recording that was read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Arm, limits and origin; `None` for a CSV file, which does not contain them.
+    /// Arm, limits and source of the samples; `None` for a CSV file, which does not contain these data.
     pub info: Option<RecordingInfo>,
-    /// How the run ended.
+    /// Reason for the end of the run.
     pub ending: Ending,
     /// Samples, oldest first.
     pub samples: Vec<Sample>,
@@ -245,7 +244,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads a file that [`Recorder`] wrote, with all of its samples.
+    /// Reads a file that [`Recorder`] wrote, with all samples.
     ///
     /// # Errors
     ///
@@ -257,12 +256,12 @@ impl Recording {
     }
 }
 
-/// Content of a recording apart from its samples.
+/// Content of a recording without the samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scanned {
-    /// Arm, limits and origin; `None` for a CSV file, which does not contain them.
+    /// Arm, limits and source of the samples; `None` for a CSV file, which does not contain these data.
     pub info: Option<RecordingInfo>,
-    /// How the run ended.
+    /// Reason for the end of the run.
     pub ending: Ending,
     /// Number of samples.
     pub samples: u64,
@@ -270,21 +269,21 @@ pub struct Scanned {
     pub cut: Option<String>,
 }
 
-/// Maximum number of samples that wait for messages later in the file. These are several chunks of the writer.
+/// Maximum number of samples that wait for messages that follow later in the file. This number corresponds to several chunks of the writer.
 const ROOM: usize = 4096;
 
-/// Passes the samples of a file that [`Recorder`] wrote to `see`, oldest first. However long the file is, only a part of it
-/// is in memory.
+/// Calls `see` with each sample of a file that [`Recorder`] wrote, oldest first. Only a part of the file is in memory, independent of the
+/// file size.
 ///
 /// # Errors
 ///
-/// Returns an error if the file cannot be read, is not a recording of this project, or has messages that are far out
-/// of the order of their times. The samples before the error were passed to `see`.
+/// Returns an error if the file cannot be read, is not a recording of this project, or contains messages that are far out of time order.
+/// The function has already passed the samples before the error to `see`.
 pub fn scan(path: &Path, see: impl FnMut(&Sample)) -> Result<Scanned, RecordingError> {
     scan_with(path, ROOM, see)
 }
 
-/// Content of a file except its samples, and the reason if the file is incomplete.
+/// Content of a file without the samples, and the reason if the file is incomplete.
 struct Found {
     info: Option<RecordingInfo>,
     ending: Ending,

@@ -1,7 +1,7 @@
-//! A run: each motion of an [`Order`] is checked, uploaded, executed and followed to its end.
+//! Procedure of a run, in which each motion of an [`Order`] is checked, uploaded, executed and monitored until its end.
 //!
-//! All front ends use this procedure. A front end (the command line, the agent, Python) implements [`Observer`]: it shows
-//! the steps, decides on changes to the motion, and stores the samples.
+//! All front ends use this procedure. A front end (the command line, the agent, Python) implements [`Observer`] to show the steps, to
+//! decide on changes of the motion, and to store the samples.
 mod course;
 mod start;
 
@@ -20,21 +20,20 @@ use crate::trajectory::Trajectory;
 pub use course::{Course, Planned};
 pub use start::{OpenPath, Start, StartError};
 
-/// Motions of a run.
+/// Description of the motions of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Order<'a> {
-    /// Arm of the controller.
+    /// Arm that the controller moves.
     pub arm: &'a Arm,
-    /// Settings of the controller, and options for check and upload of each motion.
+    /// Settings of the controller, and options for the check and upload of each motion.
     pub options: &'a CheckOptions,
     /// Trajectory of the first run.
     pub trajectory: &'a Trajectory,
-    /// Trajectory of the runs after the first one.
+    /// Trajectory of all runs after the first run.
     pub later: &'a Trajectory,
     /// Number of runs. 0 is treated as 1.
     pub runs: u32,
-    /// Speed of an approach, % of the limits. `None`: approaches are not allowed, and the arm must be at the first point of
-    /// each run.
+    /// Speed of an approach, % of the limits. If `None`, approaches are not allowed, and the arm must be at the first point of each run.
     pub approach_pct: Option<f64>,
 }
 
@@ -63,16 +62,16 @@ impl Phase {
     }
 }
 
-/// Motion of a run that has ended.
+/// Ended motion of a run.
 #[derive(Debug)]
 pub struct Leg {
     /// Purpose.
     pub phase: Phase,
-    /// Trajectory and verdict of its check.
+    /// Trajectory of the motion, with the verdict of the check.
     pub checked: CheckedTrajectory,
-    /// Figures of its upload.
+    /// Statistics of the upload of the motion.
     pub upload: UploadReport,
-    /// How the motion ended. If it failed, it is an error of [`Session::execute`] or [`Session::follow`].
+    /// Result of the motion. If the motion failed, the result is an error of [`Session::execute`] or [`Session::follow`].
     pub outcome: Result<Outcome, Error>,
 }
 
@@ -83,34 +82,34 @@ impl Leg {
     }
 }
 
-/// How a run ended.
+/// Result of a run.
 #[derive(Debug)]
 pub struct Ended {
     /// Last motion of the run.
     pub last: Leg,
-    /// `true` if the last motion finished, and the observer cancelled the run before the next one.
+    /// `true` if the last motion finished, and the observer cancelled the run before the next motion.
     pub cut: bool,
 }
 
 /// Receiver of the samples of a motion. The receiver is called while the arm moves.
 pub type SampleReceiver = Box<dyn FnMut(&Sample)>;
 
-/// Front end of a run. [`run`] calls the methods in the order of this list.
+/// Interface of a front end that observes and controls a run. [`run`] calls the methods in the order in which they are listed here.
 pub trait Observer<P: Port> {
     /// Error type of the front end.
     type Failure;
 
-    /// Converts the reason why a motion does not begin into an error of the front end.
+    /// Converts a [`StartError`], the reason why a motion does not begin, into an error of the front end.
     fn refused(&mut self, error: StartError) -> Self::Failure;
 
-    /// Converts an error before a motion began. The error is [`Error::Cancelled`] if [`Observer::is_cancelled`] ended
-    /// the run.
+    /// Converts an error that occurred before a motion began into an error of the front end. The error is [`Error::Cancelled`] if
+    /// [`Observer::is_cancelled`] has ended the run.
     fn failed(&mut self, error: Error) -> Self::Failure;
 
-    /// Returns `true` once the run must end before its next motion. During a motion, [`Observer::status`] decides instead.
+    /// Returns `true` if the run must end before its next motion. During a motion, [`Observer::status`] makes this decision.
     fn is_cancelled(&mut self) -> bool;
 
-    /// Reports that the next motion has passed its check.
+    /// Reports that the next motion has passed the check.
     fn checked(&mut self, phase: Phase, checked: &CheckedTrajectory);
 
     /// Reports that a part of the motion was uploaded.
@@ -119,11 +118,11 @@ pub trait Observer<P: Port> {
     /// Reports that the whole motion was uploaded.
     fn uploaded(&mut self, phase: Phase, upload: &UploadReport);
 
-    /// Reports that the motion begins when this call returns. Returns the receiver of its samples.
+    /// Reports that the motion will begin after this call returns. Returns the receiver for the samples of the motion.
     ///
     /// # Errors
     ///
-    /// If this fails, the run ends with the failure and the motion does not begin.
+    /// If this method returns an error, the run ends with the failure and the motion does not begin.
     fn begins(
         &mut self,
         session: &mut Session<P>,
@@ -131,27 +130,26 @@ pub trait Observer<P: Port> {
         checked: &CheckedTrajectory,
     ) -> Result<SampleReceiver, Self::Failure>;
 
-    /// Evaluates a status during the motion. Returns the next action.
+    /// Evaluates a status during the motion. Returns the action that the run must carry out next.
     fn status(&mut self, phase: Phase, status: &Status) -> Flow;
 
-    /// Reports that the action that [`Observer::status`] returned was carried out, and its result. If the controller
-    /// rejects a speed or a resume, the motion continues.
+    /// Reports the result of the action that [`Observer::status`] returned. If the controller rejects a change of speed or a Resume, the
+    /// motion continues.
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
 
-    /// Reports the end of the motion. The action that [`Observer::status`] returned for the last status was not carried
-    /// out.
+    /// Reports the end of the motion. The run does not carry out the action that [`Observer::status`] returned for the last status.
     ///
     /// # Errors
     ///
-    /// If this fails, the run ends with the failure.
+    /// If this method returns an error, the run ends with the failure.
     fn ended(&mut self, session: &mut Session<P>, leg: &Leg) -> Result<(), Self::Failure>;
 
     /// Reports that run `n` (from 1) has finished and that another run follows.
     fn goes_on(&mut self, _n: u32) {}
 }
 
-/// Runs all motions of `order` until one does not finish. `status` is a status of the arm while it was held. **The arm
-/// moves.**
+/// Executes all motions of `order`, and ends early if a motion does not finish. `status` must show the arm while the drives hold it at
+/// rest. **The arm moves.**
 ///
 /// # Errors
 ///
@@ -197,7 +195,7 @@ fn positions<P: Port, O: Observer<P>>(
     Ok(status.positions())
 }
 
-/// Uploads, executes and follows one motion.
+/// Uploads, executes and monitors one motion.
 fn motion<P: Port, O: Observer<P>>(
     session: &mut Session<P>,
     phase: Phase,

@@ -1,4 +1,4 @@
-//! Summary of the problems of one cause: joints, number of points, first place and worst place.
+//! Summary of the problems with one cause: joints, number of points, first occurrence and worst occurrence.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -20,20 +20,20 @@ pub struct Cause {
     pub unit: &'static str,
     /// Joints with this problem; empty if the problem concerns the whole trajectory.
     pub joints: Vec<Joint>,
-    /// Number of points in the file with the problem at the point or between it and the next point.
+    /// Number of file points with the problem, either at the point or before the next point.
     pub points: usize,
-    /// First place along the path.
+    /// First occurrence along the path.
     pub first: Seen,
-    /// Place with the largest excess over the limit.
+    /// Occurrence with the largest excess over the limit.
     pub worst: Seen,
     /// `true` if the trajectory can run despite the problem.
     pub warning: bool,
 }
 
-/// Points of each kind of problem.
+/// Points at which each kind of problem occurs.
 pub(super) type Places = BTreeMap<ProblemKind, BTreeSet<usize>>;
 
-/// Returns one cause for each kind of `problems`, in their order.
+/// Returns one cause for each kind of `problems`, in the order of the problems.
 pub(super) fn causes(problems: &[Problem], places: &Places) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     let mut excess = Vec::new();
@@ -71,7 +71,7 @@ pub(super) fn causes(problems: &[Problem], places: &Places) -> Vec<Cause> {
 }
 
 impl fmt::Display for Cause {
-    /// Writes one line if the cause has a single place, otherwise three lines.
+    /// Writes one line if the problem occurs at a single place, otherwise three lines.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.warning {
             f.write_str("warning: ")?;
@@ -84,7 +84,7 @@ impl fmt::Display for Cause {
         if self.points > 1 {
             write!(f, ", at {} points", self.points)?;
         }
-        // Omits the words that the line above already contains.
+        // Removes the words that the previous line already contains.
         let short = |words: &str| words.replacen(&format!("{}: ", self.words), "", 1);
         write!(f, "\n    worst: {}", short(&worst))?;
         if self.first != self.worst {
@@ -94,7 +94,7 @@ impl fmt::Display for Cause {
     }
 }
 
-/// Formats joints: "joint 2", "joints 1, 2 and 6".
+/// Formats a list of joints, such as "joint 2", "joints 1, 2 and 6".
 fn joints(joints: &[Joint]) -> String {
     let names: Vec<String> = joints.iter().map(|joint| joint.number().to_string()).collect();
     match names.split_last() {

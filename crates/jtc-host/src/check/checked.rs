@@ -1,4 +1,4 @@
-//! Trajectory that passed the check. A session uploads and executes only this type.
+//! Trajectory that passed the check. A session uploads and executes only trajectories of this type.
 
 use std::fmt;
 use std::sync::Arc;
@@ -16,21 +16,21 @@ use crate::trajectory::{Trajectory, UploadOptions};
 /// Number for the next check that passes. The number distinguishes trajectories that are otherwise equal.
 static PASSED: AtomicU64 = AtomicU64::new(1);
 
-/// Options for the check of a trajectory before a run.
+/// Options for the check of a trajectory before its execution.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {
     /// Division into segments for the upload; the check includes the number of segments.
     pub upload: UploadOptions,
-    /// `true` if the settings that are not sent with friction, gains and arm model (limits, gravity, rotor inertia) may
-    /// differ between arm file and controller. The caller thereby confirms that the controller's values are safe for this
-    /// arm. If `false`, the check refuses such an arm (J-55).
+    /// `true` if the settings that are not sent with friction, gains and arm model (limits, gravity, rotor inertia) may differ between the
+    /// arm file and the controller. With this option the caller confirms that the controller's values are safe for this arm. If `false`,
+    /// the check refuses such an arm (J-55).
     pub accept_device_limits: bool,
-    /// Settings of the controller. The default is the built-in settings. For a controller with extensions use the result of
-    /// [`Session::device_config`](crate::Session::device_config).
+    /// Settings of the controller. By default, these are the built-in settings of the controller. For a controller with extensions , use
+    /// the result of [`Session::device_config`](crate::Session::device_config).
     pub device: Config,
 }
 
-/// Trajectory that may run: it passed the check for an arm, starting at the pose that the arm had at that time.
+/// Trajectory that may be executed, because it passed the check for an arm and for the pose of the arm at that time.
 ///
 /// [`Session::upload`](crate::Session::upload) and [`Session::execute`](crate::Session::execute) accept only this type, and
 /// only [`CheckedTrajectory::check`] creates it. So a program that runs an unchecked trajectory does not compile:
@@ -51,14 +51,13 @@ pub struct CheckOptions {
 ///
 /// # Start pose
 ///
-/// The check compares the first point with the given pose: no joint may deviate by more than the start tolerance, 0.02 rad
-/// (J-34). Pass a pose that was measured just before, from the status that
-/// [`Session::wait_ready`](crate::Session::wait_ready) returns. If the arm is in another pose,
-/// [`Planner::to`](crate::plan::Planner::to) plans a trajectory to the first point. Check and run this approach in the same
-/// way. Then check the motion from the final pose of the approach.
+/// The check compares the first point with the given pose: no joint may deviate by more than the start tolerance, 0.02 rad (J-34). Pass a
+/// pose that was measured immediately before the check, from the status that [`Session::wait_ready`](crate::Session::wait_ready) returns.
+/// If the arm is in another pose, [`Planner::to`](crate::plan::Planner::to) plans a trajectory to the first point. Check and execute this
+/// approach in the same way. Then check the motion from the final pose of the approach.
 ///
-/// The controller compares again when it executes the trajectory. If the arm was moved after the check, the controller
-/// refuses the execution with data status 8, and the arm does not move.
+/// The controller compares the pose with the first point again when it executes the trajectory. If the arm was moved after the check, the
+/// controller refuses the execution with data status 8, and the arm does not move.
 #[derive(Clone)]
 pub struct CheckedTrajectory {
     trajectory: Arc<Trajectory>,
@@ -67,12 +66,12 @@ pub struct CheckedTrajectory {
     verdict: Verdict,
     delay_ticks: u8,
     number: u64,
-    /// Arm and settings of the check.
+    /// Arm and controller settings that were used in the check.
     basis: Arc<(Arm, Config)>,
 }
 
 impl fmt::Debug for CheckedTrajectory {
-    /// Writes a summary without the up to 12 000 points.
+    /// Writes a summary without the points, of which there may be 12 000.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Verdict { points, step_ms, duration_s, .. } = self.verdict;
         write!(
@@ -84,25 +83,26 @@ impl fmt::Debug for CheckedTrajectory {
 }
 
 impl CheckedTrajectory {
-    /// Checks `trajectory` for a run by `arm` from the measured pose `start` (rad, base to wrist).
+    /// Checks `trajectory` for its execution by `arm` from the measured pose `start` (rad, base to wrist).
     ///
-    /// The tighter one of the limits of arm and controller is used ([`Arm::config_on_device`]). The torques come from the
-    /// arm model with the arm's friction, and with the gravity and rotor inertia of the controller.
+    /// The check uses the stricter of the limits of the arm and the controller ([`Arm::config_on_device`]). The torques are computed from
+    /// the arm model with the friction of the arm, and with the gravity and rotor inertia of the controller.
     ///
     /// # Errors
     ///
-    /// [`CheckError::DeviceLimits`] if the controller and the arm have different values, and the options do not accept
-    /// that. [`CheckError::Refused`] with the verdict if the trajectory may not run. Reasons are: a limit is exceeded at or
-    /// between points, a jump, motion at an end, too much torque, a stop that would take too long, too many points or
-    /// segments, or an arm that is not at the first point. [`CheckError::Arm`] if the numbers of the arm are not physical.
-    /// In each case no frame was sent.
+    /// [`CheckError::DeviceLimits`] if the controller and the arm have different values, and the options do not allow the difference.
+    /// [`CheckError::Refused`] with the verdict if the trajectory must not be executed. Possible reasons are an exceeded limit at or
+    /// between points, a jump, motion at the first or last point, too much torque, too long a stop, too many points or segments, or an arm
+    /// that is not at the first point. [`CheckError::Arm`] if the numbers of the arm are not physically possible. After each of these
+    /// errors, no frame was sent.
     pub fn check(
         trajectory: &Trajectory,
         arm: &Arm,
         start: &[f64; JOINTS],
         options: &CheckOptions,
     ) -> Result<Self, CheckError> {
-        // The fields of an arm are public. Numbers that are not physical could make any torque pass.
+        // The fields of [`Arm`] are public, so the check cannot rely on valid numbers. With physically impossible numbers, any torque could
+        // pass the check.
         arm.is_physical()?;
         let differences = arm.device_differences(&options.device);
         if !differences.is_empty() && !options.accept_device_limits {
@@ -127,20 +127,20 @@ impl CheckedTrajectory {
                 number: PASSED.fetch_add(1, Ordering::Relaxed),
                 basis: Arc::new((arm.clone(), config)),
             }),
-            // The verdict already contains a problem for each number that does not fit into a frame.
+            // The verdict already contains a problem for each number that is outside the range of a CAN frame.
             _ => Err(CheckError::Refused(Box::new(verdict))),
         }
     }
 
-    /// Checks the remainder of the path from `from_ms` on, starting at rest. Does nothing if the settings of the controller
-    /// and the payload are the same as in the check (J-36, J-60).
+    /// Checks the remainder of the path from `from_ms` on, starting at rest. Does nothing if the settings of the controller and the payload
+    /// are the same as in the first check (J-36, J-60).
     ///
     /// # Errors
     ///
     /// [`PlanError::Refused`] with the verdict on the remainder.
     pub fn check_rest(&self, device: &Config, from_ms: u32) -> Result<(), PlanError> {
         let (arm, checked_with) = &*self.basis;
-        // A change of the path speed needs no check, because it can only slow the motion down.
+        // A change of the path speed needs no check, because the path speed can only slow down the motion.
         let config = Config { speed: checked_with.speed, ..arm.config_on_device(device) };
         if config == *checked_with {
             return Ok(());
@@ -156,7 +156,7 @@ impl CheckedTrajectory {
         &self.trajectory
     }
 
-    /// Returns the verdict: values of each joint, and warnings that do not prevent the run.
+    /// Returns the verdict, with the values of each joint and the warnings that do not prevent execution.
     pub fn verdict(&self) -> &Verdict {
         &self.verdict
     }
@@ -171,7 +171,7 @@ impl CheckedTrajectory {
         self.delay_ticks
     }
 
-    /// Returns the points in the form in which they are sent.
+    /// Returns the points in the form in which the host sends them.
     pub(crate) fn raw(&self) -> &[RawPoint] {
         &self.raw
     }

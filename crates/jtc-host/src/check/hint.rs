@@ -1,4 +1,4 @@
-//! Advice after a verdict: the next command as text.
+//! Advice after a verdict, with the next command as text.
 
 use host_kit::{Action, Next};
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
@@ -7,9 +7,9 @@ use super::kind::ProblemKind;
 use super::verdict::{Suspicion, Verdict};
 
 impl Verdict {
-    /// Returns the speed (% of the file's own speed) at which no value is too high. Returns `None` if a lower speed does
-    /// not help. The speed is estimated from the worst values. To find the exact speed, use
-    /// [`plan::at_speed`](crate::plan::at_speed) and check again.
+    /// Returns the speed (% of the file's own speed) at which no value exceeds its limit. Returns `None` if a lower speed does not help.
+    /// The speed is estimated from the worst values. To find the exact speed, use [`plan::at_speed`](crate::plan::at_speed) and check
+    /// again.
     pub fn slower(&self, now_pct: f64) -> Option<f64> {
         use ProblemKind::*;
         let mut speed = 1.0f64;
@@ -17,7 +17,7 @@ impl Verdict {
             let over = (p.value / p.limit).abs();
             speed = speed.min(match p.kind {
                 Velocity => 0.95 / over,
-                // The place lies between two points, and the joint may be faster elsewhere.
+                // The problem occurs between two points, and the joint may be faster elsewhere on the path.
                 PositionSpeed => {
                     let peak = p
                         .joint
@@ -30,23 +30,23 @@ impl Verdict {
                 _ => return None,
             });
         }
-        // A speed below 1 % is not advised.
+        // The hint does not suggest a speed below 1 %.
         (speed < 1.0).then(|| (now_pct * speed).floor()).filter(|&percent| percent >= 1.0)
     }
 
-    /// Returns the next command or action that helps. The result contains `FILE` instead of the trajectory's file.
+    /// Returns the next command or action that solves the problem. The result contains `FILE` instead of the name of the trajectory file.
     pub fn hint(&self) -> Next {
         self.hint_for("FILE", 100.0)
     }
 
-    /// Returns the next command or action that helps for a trajectory that was checked at `speed_pct` of its own speed.
-    /// `file` is the file name that the user typed, with its options.
+    /// Returns the next command or action for a trajectory that was checked at `speed_pct` (% of its own speed). `file` is the file name
+    /// that the user typed, including its options.
     pub fn hint_for(&self, file: &str, speed_pct: f64) -> Next {
         self.hint_with(file, speed_pct, self.slower(speed_pct))
     }
 
-    /// Like [`Verdict::hint_for`]. `passes` is the speed (% of the file's own speed) that is known to pass the check, if
-    /// there is one.
+    /// Like [`Verdict::hint_for`]. Like `hint_for`; `passes` is a speed (% of the file's own speed) that is known to pass the check, if
+    /// such a speed is known.
     pub fn hint_with(&self, file: &str, speed_pct: f64, passes: Option<f64>) -> Next {
         let has = |kind| self.problems.iter().any(|p| p.kind == kind);
         let only = |kind| self.refusals().all(|p| p.kind == kind);

@@ -1,9 +1,8 @@
-//! Check that the drives can hold the arm wherever the path stands still: at its start, at its end, and at rests on the
-//! way.
+//! Check that the drives can hold the arm whenever it is at rest: at the start, at the end, and during pauses inside the path.
 //!
-//! An arm that is held close to a torque limit falls after some time, even without a motion. The gains amplify the encoder
-//! noise, so that the commanded torque exceeds the limit again and again. More than 10 ms over the limit within 100 ms is
-//! an error (J-43). A path may pass such a pose without a rest, although a pause could stop the arm there.
+//! If the torque that holds an arm is close to a limit, the arm falls after some time, even without a motion. The gains amplify the encoder
+//! noise, so the commanded torque exceeds the limit repeatedly. More than 10 ms over the limit within 100 ms is an error (J-43). A path may
+//! pass through such a pose without stopping, although a Pause could stop the arm there.
 
 use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
@@ -11,11 +10,11 @@ use jtc_wire::Joint;
 
 use super::{HOLD_SHARE, ProblemKind, Verdict};
 
-/// Joint speed up to which a joint is considered at rest, rad/s. The smallest velocity in a frame is about 0.1 mrad/s.
+/// Joint speed up to which a joint is considered at rest, rad/s. The smallest velocity in a CAN frame is about 0.1 mrad/s.
 const STANDS: f64 = 0.001;
 
-/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit while the path stands still.
-/// If `stands_at_start` is set, the start is not checked, because the arm is held there even without the motion.
+/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit while the arm is at rest on the path. If
+/// `stands_at_start` is set, the start is not checked, because the arm is already at rest in this pose before the motion.
 pub(super) fn holds(
     config: &Config,
     dynamics: &Dynamics,

@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-/// Maximum share of a joint's torque limit for holding the arm, without friction. At 98 % arms have fallen.
+/// Maximum share of a joint's torque limit for holding the arm, without friction. With 98 %, arms have fallen.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Declares the kinds: meaning, name, words, and the unit of value and limit if they have one.
+/// Declares the kinds of problems, each with meaning, name, text, and the unit of value and limit if there is one.
 macro_rules! kinds {
     ($($(#[$meaning:meta])* $name:ident, $words:literal $(in $unit:literal)?;)+) => {
-        /// Kind of a problem.
+        /// Kind of a problem of a trajectory.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
         #[serde(rename_all = "snake_case")]
         pub enum ProblemKind {
@@ -19,14 +19,14 @@ macro_rules! kinds {
             /// All kinds.
             pub const ALL: [Self; [$($words),+].len()] = [$(Self::$name),+];
 
-            /// Returns the kind as text, without the facts.
+            /// Returns the kind as text, without values and places.
             pub fn words(self) -> &'static str {
                 match self {
                     $(Self::$name => $words,)+
                 }
             }
 
-            /// Returns the unit of value and limit; empty for a count.
+            /// Returns the unit of value and limit; the unit of a count is empty.
             pub(super) fn unit(self) -> &'static str {
                 match self {
                     $(Self::$name => concat!($($unit)?),)+
@@ -39,46 +39,46 @@ macro_rules! kinds {
 kinds! {
     /// The trajectory has no points.
     Empty, "no points";
-    /// More points than the controller holds.
+    /// The trajectory has more points than the controller can store.
     TooManyPoints, "too many points";
-    /// More segments than a trajectory may have.
+    /// The trajectory has more segments than allowed.
     TooManySegments, "too many segments";
-    /// Points per segment outside 1..1500.
+    /// The number of points per segment is outside 1..1500.
     SegmentPoints, "points per segment";
     /// The step time is 0.
     StepTime, "step time of 0 ms";
-    /// A position does not fit into a frame.
+    /// A position is outside the range of a CAN frame.
     PositionScale, "position outside the range of a frame" in "rad";
-    /// A velocity does not fit into a frame.
+    /// A velocity is outside the range of a CAN frame.
     VelocityScale, "velocity outside the range of a frame" in "rad/s";
-    /// An acceleration does not fit into a frame.
+    /// An acceleration is outside the range of a CAN frame.
     AccelerationScale, "acceleration outside the range of a frame" in "rad/s²";
     /// Two points are too far apart for the arm to move from one to the other in one step.
     Jump, "jump" in "rad";
-    /// Position over its limit.
+    /// A position exceeds its limit.
     Position, "position over its limit" in "rad";
-    /// Velocity over its limit.
+    /// A velocity exceeds its limit.
     Velocity, "velocity over its limit" in "rad/s";
-    /// Acceleration over its limit.
+    /// An acceleration exceeds its limit.
     Acceleration, "acceleration over its limit" in "rad/s²";
-    /// Torque of the arm model over its limit.
+    /// The torque computed with the arm model exceeds its limit.
     Torque, "torque over its limit" in "N·m";
-    /// Where the path stands still, holding the arm needs nearly all of a joint's torque, so the arm would fall later.
+    /// While the arm is at rest on the path, a joint needs nearly its whole torque limit to hold the arm, so the arm would fall later.
     HoldTorque, "too much torque needed at rest" in "N·m";
     /// A velocity is outside the friction table (J-36).
     FrictionVelocity, "velocity outside the friction table" in "rad/s";
-    /// From this place Pause or Stop cannot bring the arm to rest in time with the available torque (J-33).
+    /// From this point of the path, Pause or Stop cannot bring the arm to rest in time with the available torque (J-33).
     NoStop, "no stop in time" in "N·m";
-    /// The positions move faster than the velocity limit, independent of the velocities in the file.
+    /// The positions in the file change faster than the velocity limit allows, independent of the velocities in the file.
     PositionSpeed, "positions move faster than the velocity limit" in "rad/s";
-    /// The positions move at another speed than the velocities in the file. The problem is a warning if this happens at
-    /// few places.
+    /// The speed at which the positions change differs from the velocities in the file. The problem is a warning if it occurs at few
+    /// places.
     VelocityMismatch, "positions and velocities disagree" in "rad/s";
     /// The first or last point is not at rest.
     NotAtRest, "not at rest at an end" in "rad/s";
     /// The arm is not at the first point (J-34).
     StartPose, "the arm is not at the first point" in "rad";
-    /// Velocities change by other amounts than the accelerations in the file.
+    /// The changes of the velocities differ from the accelerations in the file.
     AccelerationMismatch, "velocities and accelerations disagree" in "rad/s²";
 }
 
@@ -91,7 +91,7 @@ impl ProblemKind {
         }
     }
 
-    /// Returns `true` if the problem ends the motion before an operator could stop it, or if the path cannot run at all.
+    /// Returns `true` if the problem ends the motion before an operator could stop the arm, or if the path cannot be executed at all.
     pub(super) fn stops_at_once(self) -> bool {
         use ProblemKind::*;
         !matches!(

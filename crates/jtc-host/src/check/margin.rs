@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use super::Verdict;
 
-/// Torque margin below which a check warns, % of the limit. With less margin, the torque may reach the limit if the arm has
-/// 10 % more mass and 20 % more friction than its model.
+/// Torque margin below which a check warns, % of the limit. With a smaller margin, the torque may reach the limit if the arm has 10 % more
+/// mass and 20 % more friction than its model.
 pub const MARGIN_LOW_PCT: f64 = 10.0;
 
-/// Smallest share of a torque limit that a motion leaves unused, and the place on the path.
+/// Smallest share of a torque limit that a motion leaves unused, with the place on the path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TorqueMargin {
     /// Margin, % of the limit; negative if the torque is above the limit.
@@ -20,11 +20,12 @@ pub struct TorqueMargin {
     pub joint: Joint,
     /// Time from the start, s.
     pub time_s: f64,
-    /// Torque by the model at that time, N·m.
+    /// Torque of the arm model at this time, N·m.
     pub torque_nm: f64,
     /// Torque limit, N·m.
     pub limit_nm: f64,
-    /// Bearing temperature of the friction, °C. The checked temperature with the greater torque is used.
+    /// Bearing temperature for which the friction was computed, °C. Of the checked temperatures, this is the temperature with the greater
+    /// torque.
     pub temperature_c: f64,
 }
 
@@ -74,7 +75,7 @@ impl Verdict {
         }
     }
 
-    /// Returns the verdict with the smaller margin: its own or `other`. Both belong to the same trajectory.
+    /// Returns the verdict with the smaller margin, either the present margin or `other`. Both margins must belong to the same trajectory.
     pub(crate) fn or_less(mut self, other: Option<TorqueMargin>) -> Self {
         if let Some(other) = other
             && self.margin.is_none_or(|margin| other.percent < margin.percent)

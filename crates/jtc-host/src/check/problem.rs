@@ -1,4 +1,4 @@
-//! Problem of a trajectory: kind, joint, first place and worst place.
+//! Problem of a trajectorywith kind, joint, first occurrence and worst occurrence.
 
 use std::fmt;
 
@@ -7,56 +7,57 @@ use serde::Serialize;
 
 use super::kind::{HOLD_SHARE, ProblemKind};
 
-/// Place of the path with a problem.
+/// Place on the path at which a problem occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Seen {
     /// Joint; `None` if the problem concerns the whole trajectory.
     pub joint: Option<Joint>,
-    /// Point (from 0); with `ms` > 0 the place is between this point and the next.
+    /// Point (from 0); if `ms` > 0, the place is between this point and the next point.
     pub point: usize,
     /// Time after `point`, ms.
     pub ms: f64,
     /// Time along the path, s.
     pub time_s: f64,
-    /// Value, in the unit of the kind of problem.
+    /// Value at this place, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit of the value. For two channels that disagree, the value of the other channel.
+    /// Limit for the value. If two channels disagree, this is the value of the other channel.
     pub limit: f64,
 }
 
-/// Problems of one kind in one joint; jumps are listed one by one.
+/// Problems of one kind in one joint; each jump is a separate problem.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Problem {
     /// Kind of the problem.
     pub kind: ProblemKind,
     /// Joint; `None` if the problem concerns the whole trajectory.
     pub joint: Option<Joint>,
-    /// First place along the path.
+    /// First occurrence along the path.
     pub first: Seen,
-    /// Point (from 0) of the worst place.
+    /// Point (from 0) at or before the worst occurrence.
     pub point: usize,
-    /// Time from `point` to the worst place, ms.
+    /// Time from `point` to the worst occurrence, ms.
     pub ms: f64,
-    /// Time along the path of the worst place, s.
+    /// Time of the worst occurrence along the path, s.
     pub time_s: f64,
     /// Worst value, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit of the value. For two channels that disagree, the value of the other channel.
+    /// Limit for the value. If two channels disagree, this is the value of the other channel.
     pub limit: f64,
-    /// Number of milliseconds (or points, or steps) with the problem.
+    /// Number of milliseconds, points or steps with the problem.
     pub count: usize,
-    /// `true` if the trajectory can run despite the problem. Then only the feed-forward is less accurate.
+    /// `true` if the trajectory can be executed despite the problem. In this case only the feed-forward torque is less accurate.
     pub warning: bool,
 }
 
 impl Problem {
-    /// Returns the worst place.
+    /// Returns the worst occurrence of the problem.
     pub(super) fn worst(&self) -> Seen {
         let Self { joint, point, ms, time_s, value, limit, .. } = *self;
         Seen { joint, point, ms, time_s, value, limit }
     }
 
-    /// Returns the excess over the limit, relative to the limit if the problem has one.
+    /// Returns the value relative to its limit, for sorting. If the problem has no limit, returns the absolute value or the difference of
+    /// two channels.
     pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
@@ -128,7 +129,7 @@ impl Seen {
 /// Formats a number with three significant digits.
 fn three_digits(value: f64) -> String {
     let before = if value > 0.0 { value.log10().floor() } else { 0.0 };
-    // Seven decimals are finer than the resolution of every frame.
+    // Seven decimals are finer than the resolution of every CAN frame.
     let decimals = (2.0 - before).clamp(0.0, 7.0) as usize;
     format!("{value:.decimals$}")
 }

@@ -1,8 +1,8 @@
-//! Check that the arm can stop from every place of a path within the stop time of Pause and Stop (J-33).
+//! Check that the arm can stop from every point of a path within the stop time of Pause and Stop (J-33).
 //!
-//! If a path runs at the rate r, and r changes with the slope s, the model's torque is g + r²·f + s·h. Here g holds the
-//! arm, f is for the motion at full speed, and h for the change of rate (Bobrow 1985; Pham & Pham 2018). All three are
-//! computed once per place. A ramp to standstill then needs only a few sums.
+//! If a path is executed at the rate r, and r changes with the slope s, the model's torque is g + r²·f + s·h. Here g is the torque that
+//! holds the arm, f the torque of the motion at full speed, and h the torque for the change of rate (Bobrow 1985; Pham & Pham 2018). These
+//! three torques are computed once per place. Each ramp to standstill then needs only a few additions.
 
 use std::collections::VecDeque;
 
@@ -14,15 +14,14 @@ use super::{ProblemKind, Verdict};
 
 /// Distance between the checked places, along the path and along each ramp, ms.
 const SPACING: f64 = 10.0;
-/// Lengths of the ramps that are tried from every place, as shares of the allowed time. A single feasible ramp is
-/// sufficient.
+/// Durations of the ramps that are tried from every place, as shares of the allowed stop time. One feasible ramp is sufficient.
 const LENGTHS: [f64; 3] = [1.0, 0.7, 0.4];
-/// Share of a ramp's time in which its slope rises, and in which it falls again.
+/// Share of the ramp time in which the slope increases. The slope decreases in an equal share at the end.
 const CORNER: f64 = 0.2;
 
 /// Parts of the torque at a place of the path, N·m.
 struct Place {
-    /// Point before the place, and time after that point in ms.
+    /// Last point before the place, and the time since that point in ms.
     point: usize,
     ms: f64,
     hold: [f64; JOINTS],
@@ -30,7 +29,7 @@ struct Place {
     slope: [f64; JOINTS],
 }
 
-/// Torque of the joint that comes closest to its limit on a ramp.
+/// Torque of the joint that comes closest to its limit during a ramp.
 #[derive(Clone, Copy)]
 struct Load {
     share: f64,
@@ -38,8 +37,8 @@ struct Load {
     torque: f64,
 }
 
-/// Adds a problem for every place from which no tried ramp within `config.stop_ms` keeps the model's torque, without
-/// friction, within the limits.
+/// Adds a problem for every place from which no tried ramp within `config.stop_ms` keeps the torque of the arm model, without friction,
+/// within the limits.
 pub(super) fn stops(
     config: &Config,
     dynamics: &Dynamics,
@@ -91,7 +90,7 @@ fn place(config: &Config, dynamics: &Dynamics, step_ms: u16, points: &[SetPoint]
     }
 }
 
-/// Returns the greatest load on a ramp of `length` ms from the first place of `window`.
+/// Returns the greatest load during a ramp of `length` ms that begins at the first place of `window`.
 fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     let mut worst = Load { share: 0.0, joint: Joint::ALL[0], torque: 0.0 };
     let samples = (length / SPACING).ceil().max(2.0);
@@ -121,8 +120,8 @@ fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     worst
 }
 
-/// Returns the completed share of a ramp when the share `x` of its time has passed, and the slope at that time. The ramp is
-/// a straight line with rounded ends.
+/// Returns how much of the ramp is complete (as a share) after the share `x` of the ramp time, and the slope at that time. The ramp is a
+/// straight line with rounded ends.
 fn profile(x: f64) -> (f64, f64) {
     let steepest = 1.0 / (1.0 - CORNER);
     let end = 1.0 - x;

@@ -1,4 +1,4 @@
-//! Verdicts on generated and on existing trajectories.
+//! Tests of the check with generated and existing trajectories.
 
 use jtc_core::Config;
 
@@ -47,7 +47,7 @@ fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     assert!(!Checker { start: Some(start), ..Checker::new(&config) }.check(&smooth()).is_ok());
 }
 
-/// J-32: both points are within the limits, but the controller's interpolation between them exceeds one.
+/// J-32: both points are within the limits, but the controller's interpolation between them exceeds a limit.
 #[test]
 fn j32_limits_are_checked_between_points() {
     let at = |q: f64, v: f64| Point {
@@ -55,7 +55,7 @@ fn j32_limits_are_checked_between_points() {
         velocity: [0.0, v, 0.0, 0.0, 0.0, 0.0],
         ..Point::default()
     };
-    // Joint 2 swings over its position limit (1.57 rad), although both points are below the limit.
+    // Joint 2 overshoots its position limit (1.57 rad), although both points are below the limit.
     let t =
         Trajectory { step_ms: 1000, points: vec![at(1.5, 0.0), at(1.5, 1.0), at(1.5, -1.0), at(1.5, 0.0)] };
     let verdict = check(&t);
@@ -93,7 +93,7 @@ fn all_problems_are_reported_with_their_worst_place() {
     );
 }
 
-/// With all velocities 0 the arm would stop at every point.
+/// If all velocities are 0, the arm would stop at every point.
 #[test]
 fn channels_that_contradict_each_other_all_along_are_refused() {
     let mut t = smooth();
@@ -125,7 +125,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     let arm = Arm::avena();
     let mut config = arm.config();
     config.joints[1].torque_max = 100.0;
-    // In the horizontal pose joint 2 carries about 130 N·m.
+    // In the horizontal pose joint 2 needs about 130 N·m to hold the arm.
     let t = plan::joint_move(&[0.0; 6], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     let verdict = Checker { model: Some(&arm.model), ..Checker::new(&config) }.check(&t);
     assert_eq!(
@@ -135,7 +135,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     );
 }
 
-/// Two points that are too far apart are reported as too fast, with the speed that passes.
+/// Two points that are too far apart are reported as too fast, with a speed that passes the check.
 #[test]
 fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     let to = Point { position: [0.0, 0.0, 2.5, 0.0, 0.0, 0.0], ..Point::default() };
@@ -147,7 +147,7 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
         (ProblemKind::PositionSpeed, Joint::from_number(3)),
         "{verdict}"
     );
-    // The peak is 15/8 of 2.5 rad in 0.3 s. The peak lies between the points.
+    // The peak velocity is 15/8 of the mean velocity, 2.5 rad in 0.3 s. The peak velocity occurs between the points.
     assert!((verdict.joints[2].velocity_peak_rad_s - 15.625).abs() < 0.01);
     assert!(verdict.hint().to_string().contains("--speed 9`"), "{}", verdict.hint());
     let slow = check(&plan::at_speed(&t, 9.0).unwrap());
@@ -175,12 +175,12 @@ fn degrees_are_recognised() {
     assert!(verdict.to_string().lines().count() < 30, "{verdict}");
 }
 
-/// A single cause summarises all joints and points, with the first and the worst place.
+/// A single cause summarises all joints and points, with the first and the worst occurrence.
 #[test]
 fn long_lists_are_summed_by_cause() {
     let mut t = smooth();
     let n = t.points.len();
-    // Joint 2 is too fast at three points in the middle, joint 6 at one point before them.
+    // Joint 2 is too fast at three points in the middle, and joint 6 at one earlier point.
     for (i, joint, velocity) in [(n / 2, 1, 1.6), (n / 2 + 1, 1, -1.9), (n / 2 + 2, 1, 1.7), (n / 4, 5, 1.8)]
     {
         t.points[i].velocity[joint] = velocity;
@@ -195,7 +195,7 @@ fn long_lists_are_summed_by_cause() {
         "{verdict}"
     );
     assert!((cause.worst.value + 1.9).abs() < 1e-3, "{verdict}");
-    // The controller's velocity exceeds the limit before the point is reached.
+    // The velocity that the controller interpolates exceeds the limit before this point.
     assert_eq!((cause.first.joint, cause.first.point), (Joint::from_number(6), n / 4 - 1), "{verdict}");
     let time = (cause.first.point as f64 * f64::from(t.step_ms) + cause.first.ms) * 1e-3;
     assert_eq!(cause.first.time_s, time);
@@ -213,7 +213,7 @@ fn long_lists_are_summed_by_cause() {
     assert_eq!(config.joints[1].velocity_max, 1.5);
 }
 
-/// J-36: the check refuses a trajectory that the controller refuses, with the same words in all cases.
+/// J-36: the check refuses a trajectory that the controller refuses, with the same text in all cases.
 #[test]
 fn j36_nothing_passes_that_the_controller_refuses() {
     let mut t = smooth();
@@ -222,7 +222,7 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     let bump = verdict.refusals().next().expect("refused");
     assert_eq!((bump.kind, bump.joint), (ProblemKind::PositionSpeed, Joint::from_number(5)), "{verdict}");
     assert!((19..=20).contains(&bump.point) && bump.ms > 0.0, "{verdict}");
-    // Limits beyond the drives' working area.
+    // Limits beyond the range of the drives.
     let mut config = Config::avena();
     config.joints[0].position_max = 3.05;
     let mut out = Trajectory { step_ms: 100, points: vec![Point::default(); 3] };
@@ -231,8 +231,8 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     assert_eq!((verdict.problems[0].kind, verdict.problems[0].limit), (ProblemKind::Position, 2.9905));
 }
 
-/// Returns settings in which the limits of joint 2 lie between two positions that a frame can carry. The nearest ones,
-/// 1.150041 and −0.550044 rad, are outside the limits.
+/// Returns settings in which the limits of joint 2 lie between two positions that a CAN frame can represent. The nearest representable
+/// positions, 1.150041 and −0.550044 rad, are outside the limits.
 fn between_steps() -> Config {
     let mut config = Config::avena();
     (config.joints[1].position_min, config.joints[1].position_max) = (-0.55, 1.15);
@@ -252,12 +252,12 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
             let verdict = Checker::new(&config).check(&t);
             assert!(verdict.is_ok() && verdict.problems.is_empty(), "{verdict}");
         }
-        // The next position that a frame can carry is outside.
+        // The next position that a CAN frame can represent is outside the limit.
         let verdict = Checker::new(&config).check(&of_joint_2(from, limit + 96e-6 * f64::signum(limit)));
         let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
         assert_eq!((problem.kind, problem.limit), (ProblemKind::Position, limit));
     }
-    // A motion to the limit can also be planned, and it ends exactly at the limit.
+    // A motion to the limit can also be planned, and ends exactly at the limit.
     let planned = plan::joint_move(&[0.0; 6], &[0.0, 1.15, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     assert_eq!(planned.points.last().unwrap().position[1], 1.15);
 }
@@ -265,7 +265,7 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
 #[test]
 fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     let config = between_steps();
-    // The frames contain the positions 11 997, −5 739, 12 100 and 15 000. The rounding of the velocities adds some µrad.
+    // The CAN frames contain the raw positions 11 997, −5 739, 12 100 and 15 000. The rounding of the velocities adds some µrad.
     for (end, excess) in [(1.150233, 0.000233), (-0.550236, 0.000236), (1.160108, 0.0101), (1.438151, 0.288)]
     {
         let verdict = Checker::new(&config).check(&of_joint_2(0.2, end));
@@ -280,8 +280,7 @@ fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     }
 }
 
-/// Like the controller, the check accepts a path that starts outside the limits by up to the start tolerance and leads back
-/// inside.
+/// Like the controller, the check accepts a path that starts outside the limits by at most the start tolerance and returns inside.
 #[test]
 fn j36_j58_a_path_from_outside_the_limits_inwards_passes() {
     let config = between_steps();
@@ -319,7 +318,7 @@ fn j36_the_friction_table_bounds_the_speed() {
     assert!(verdict.hint().to_string().contains("--speed"), "{}", verdict.hint());
 }
 
-/// Returns a motion along a quintic, at rest at both ends.
+/// Returns a motion along a quintic polynomial that starts and ends at rest.
 fn gentle(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> Trajectory {
     let steps = (seconds * 100.0).round() as usize;
     let point = |k: usize| {
@@ -336,17 +335,17 @@ fn gentle(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> Trajectory {
     Trajectory { step_ms: 10, points: (0..=steps).map(point).collect() }
 }
 
-/// J-33: the torque is sufficient for the motion, but not for a stop while the stretched arm moves down.
+/// J-33: the torque is sufficient for the motion, but not for a stop during the downward motion of the stretched arm.
 #[test]
 fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     let arm = Arm::avena();
     let mut config = arm.config();
-    // Up to 1.1 rad/s through the horizontal, with a smooth start and end.
+    // The arm passes the horizontal pose at up to 1.1 rad/s, with a smooth start and end.
     let t = gentle(&[0.0, 0.2, 0.0, 0.0, 0.0, 0.0], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], 2.25);
     let verdict = |config: &Config| Checker { model: Some(&arm.model), ..Checker::new(config) }.check(&t);
     let peak = verdict(&config).joints[1].torque_peak_nm.unwrap();
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
-    // The limit is just above the torque of the motion itself.
+    // The torque limit is just above the peak torque of the motion itself.
     config.joints[1].torque_max = peak + 0.5;
     let refused = verdict(&config);
     let stop = refused.refusals().next().expect("refused");
@@ -362,7 +361,7 @@ fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
 }
 
-/// An arm that is held with nearly all of a torque limit falls later, even without a motion.
+/// If holding an arm needs nearly a whole torque limit, the arm falls later, even without a motion.
 #[test]
 fn j43_torque_is_in_hand_where_the_arm_stands() {
     let arm = Arm::avena();
@@ -389,7 +388,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     let last = there.points.len() - 1;
     for share in [0.98, 0.975] {
         let (joint, point, over, hint) = refusal(&there, share, None).expect("at its end");
-        // In the last points the arm is already slow enough to be considered at rest.
+        // At the last points, the speed is already so low that the arm is considered at rest.
         assert!(
             joint == Joint::from_number(2) && over && (last - 5..=last).contains(&point),
             "{point} of {last}"
@@ -415,7 +414,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     }
     let text = check(&there, 0.98, None).to_string();
     assert!(text.contains("joint 2: rest at point") && text.contains("98.0 % of the torque limit"), "{text}");
-    // Joint 1 turns about the vertical meanwhile, so the arm is not at rest in that pose.
+    // Joint 1 rotates about the vertical axis at the same time, so the arm is not at rest in that pose.
     let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
     for (i, point) in both.points.iter_mut().enumerate() {
         let (sin, cos) = (std::f64::consts::PI * i as f64 / n).sin_cos();
@@ -441,7 +440,7 @@ fn the_existing_trajectories_pass() {
         let checker =
             Checker { model: Some(&arm.model), friction: friction.as_ref(), ..Checker::new(&config) };
         let verdict = checker.check(&t);
-        // At five seams the positions are one sample ahead of the velocities.
+        // At five places where pieces of the trajectory join, the positions are one sample ahead of the velocities.
         assert!(verdict.is_ok(), "{name}: {verdict}");
         assert!(
             verdict.warnings().all(|p| p.kind == ProblemKind::VelocityMismatch && p.count == 5),

@@ -1,4 +1,4 @@
-//! Result of a check: all problems in groups, the worst first.
+//! Result of a checkwith all problems in groups, worst first.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Number of places with contradicting channels that is tolerated. Existing files have such places between their pieces.
+/// Number of places with contradictory channels that the check tolerates. Existing files contain such places between joined pieces.
 const SEAMS: usize = 20;
 
 /// Values of a joint along the path.
@@ -26,7 +26,7 @@ pub struct JointFigures {
     pub velocity_peak_rad_s: f64,
     /// Peak acceleration, rad/s².
     pub acceleration_peak_rad_s2: f64,
-    /// Peak torque by the model, N·m; `None`: not computed.
+    /// Peak torque of the arm model, N·m; `None` if it was not computed.
     pub torque_peak_nm: Option<f64>,
 }
 
@@ -60,15 +60,16 @@ impl JointFigures {
 pub enum Suspicion {
     /// No particular fault.
     Nothing,
-    /// Positions are far outside the range of a joint. Divided by 57.3 they would be normal.
+    /// Positions are far outside the range of a joint. After division by 57.3, the positions would be plausible, so they are probably in
+    /// degrees.
     Degrees,
-    /// The trajectory consists of pieces that do not meet.
+    /// The trajectory consists of pieces whose ends do not match.
     Pieces,
-    /// The trajectory may pass at another speed.
+    /// The trajectory may pass the check at another speed.
     TooFast,
 }
 
-/// Result of a check.
+/// Result of the check of a trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
     /// Number of points.
@@ -77,9 +78,9 @@ pub struct Verdict {
     pub step_ms: u16,
     /// Time from the first to the last point, s.
     pub duration_s: f64,
-    /// Problems, worst first: one for each kind and joint, and each jump.
+    /// Problems, worst first: one entry for each kind and joint, and one for each jump.
     pub problems: Vec<Problem>,
-    /// Problems summarised by kind. The kind with the strongest effect on an arm comes first.
+    /// Problems summarised by kind. The first entry is the kind with the strongest effect on an arm.
     pub causes: Vec<Cause>,
     #[serde(skip)]
     places: Places,
@@ -135,7 +136,7 @@ impl Verdict {
         }
     }
 
-    /// Sorts the problems: kinds by their effect on an arm, jumps along the path, and other problems by their excess.
+    /// Sorts the problems by the effect of their kind on an arm. Jumps are sorted along the path, other problems by their excess.
     pub(super) fn done(mut self) -> Self {
         self.part_haste_from_seams();
         let seams = SEAMS.max(self.points / 50);
@@ -157,21 +158,21 @@ impl Verdict {
         self
     }
 
-    /// Distinguishes moves that are too fast from pieces that do not meet. Pieces that do not meet cause single jumps
-    /// between two samples. Jumps belong to moves that are too fast in three cases:
+    /// Distinguishes moves that are too fast from pieces whose ends do not match. Pieces whose ends do not match cause single jumps between
+    /// two samples. Jumps belong to moves that are too fast in three cases:
     ///
     /// - At least every fifth step has a jump: the whole path is too fast, or its positions are not in radians.
     /// - The step is 100 ms or more: the points are waypoints.
     /// - There are three or more jumps in a row.
     ///
-    /// The jumps of such moves become one problem per joint.
+    /// The jumps of a move that is too fast become one problem per joint.
     fn part_haste_from_seams(&mut self) {
         let is_jump = |p: &Problem| p.kind == ProblemKind::Jump;
         let mut places: Vec<usize> = self.problems.iter().filter(|p| is_jump(p)).map(|p| p.point).collect();
         places.sort_unstable();
         places.dedup();
         let all = 5 * places.len() >= self.points || self.step_ms >= WAYPOINTS_MS;
-        // Pieces meet at one step. Jumps in many consecutive steps belong to one move.
+        // The join between two pieces affects only one step. Jumps in many consecutive steps belong to one move.
         let on_the_way = |point: usize| {
             let has = |p: Option<usize>| p.is_some_and(|p| places.binary_search(&p).is_ok());
             let (before, after) = (point.checked_sub(1), Some(point + 1));
@@ -192,12 +193,12 @@ impl Verdict {
         }
     }
 
-    /// Returns `true` if no problem prevents the run.
+    /// Returns `true` if no problem prevents the execution.
     pub fn is_ok(&self) -> bool {
         self.problems.iter().all(|p| p.warning)
     }
 
-    /// Returns `true` if the only problem that prevents the run is that the arm is not at the first point.
+    /// Returns `true` if the only problem that prevents the execution is that the arm is not at the first point.
     pub fn is_only_elsewhere(&self) -> bool {
         !self.is_ok() && self.refusals().all(|p| p.kind == ProblemKind::StartPose)
     }
@@ -232,19 +233,19 @@ impl Verdict {
         }
     }
 
-    /// Returns the joint whose position is furthest from zero, and this position, rad.
+    /// Returns the joint whose position is farthest from zero, with this position (rad).
     fn furthest(&self) -> Option<(Joint, f64)> {
         let ends = Joint::ALL.into_iter().zip(&self.joints);
         let ends = ends.flat_map(|(j, f)| [(j, f.position_min_rad), (j, f.position_max_rad)]);
         ends.filter(|(_, q)| q.is_finite()).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// Returns the problems that prevent the run.
+    /// Returns the problems that prevent the execution.
     pub fn refusals(&self) -> impl Iterator<Item = &Problem> {
         self.problems.iter().filter(|p| !p.warning)
     }
 
-    /// Returns the problems that do not prevent the run.
+    /// Returns the problems that do not prevent the execution.
     pub fn warnings(&self) -> impl Iterator<Item = &Problem> {
         self.problems.iter().filter(|p| p.warning)
     }
@@ -258,7 +259,7 @@ impl fmt::Display for Verdict {
         let (mut shown, mut left) = (self.causes.len(), 0);
         if let (Suspicion::Degrees, Some(far)) = (self.suspicion(), self.furthest()) {
             write!(f, "\n  the positions look like degrees: {} is at {:.1}", far.0, far.1)?;
-            // The other problems are consequences of the wrong unit.
+            // All other problems are consequences of the wrong unit.
             shown = self.causes.iter().take_while(|c| c.kind <= ProblemKind::Position).count().max(1);
             left = self.causes.len().saturating_sub(shown);
         }

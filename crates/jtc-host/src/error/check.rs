@@ -1,4 +1,4 @@
-//! Errors of a check for a run.
+//! Errors from the check of a trajectory before its execution.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 
@@ -7,7 +7,7 @@ use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::file::FileError;
 
-/// Reason why a trajectory may not run; no frame was sent.
+/// Reason why a trajectory must not be executed; no frame was sent.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckError {
@@ -23,7 +23,7 @@ pub enum CheckError {
         /// Values that differ.
         differences: Vec<Difference>,
     },
-    /// The numbers of the arm are not physical.
+    /// The numbers of the arm are not physically possible.
     #[error(transparent)]
     Arm(#[from] FileError),
 }

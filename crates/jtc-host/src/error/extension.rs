@@ -1,4 +1,4 @@
-//! Errors of reading, sending and storing a whole arm.
+//! Errors when a whole arm is read, sent or stored.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_core::settings::SettingError;
@@ -11,13 +11,13 @@ use crate::arm::Difference;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExtensionError {
-    /// The arm changed while it was read, so the parts do not belong to one arm.
+    /// The arm in the device changed while the program read it, so the parts do not belong to one arm.
     #[error("the arm of the device changed while it was read")]
     Changed,
     /// The device does not have an arm that this program can read.
     #[error("the arm of the device cannot be read: {why}")]
     NoArm {
-        /// Fault of the device's arm.
+        /// Fault of the arm in the device.
         why: String,
     },
     /// The arm file is incomplete.
@@ -25,13 +25,13 @@ pub enum ExtensionError {
     Incomplete {
         /// Name of the arm.
         arm: String,
-        /// Parts that a controller needs and that are missing in the file.
+        /// Names of the parts that a controller needs and that are missing in the file.
         missing: Vec<&'static str>,
     },
-    /// The device has another arm than the file gives (J-55).
+    /// The arm in the device differs from the arm in the file (J-55).
     #[error("the controller has another arm than {arm}: {}", listed(differences))]
     Differs {
-        /// Name of the arm of the file.
+        /// Name of the arm in the file.
         arm: String,
         /// Every value that differs.
         differences: Vec<Difference>,
@@ -42,7 +42,7 @@ pub enum ExtensionError {
         /// State of the device.
         state: Code<ControllerState>,
     },
-    /// The settings are not valid for any controller, or not in combination with the settings of this one (J-53).
+    /// The settings are invalid for every controller, or invalid in combination with the settings of this controller (J-53).
     #[error("{0}")]
     Setting(#[source] SettingError),
     /// The payload is not a valid body, or outside the range of the controller (J-60).
@@ -51,14 +51,14 @@ pub enum ExtensionError {
         /// Fault of the payload.
         why: String,
     },
-    /// A joint cannot hold the payload in the present pose (J-60).
+    /// A joint cannot hold the payload in the current pose (J-60).
     #[error("a payload of {mass} kg needs {torque:.1} N·m at {joint} in the present pose, limit {limit} N·m")]
     TooHeavy {
         /// Mass of the payload, kg.
         mass: f64,
         /// Joint whose torque exceeds its limit the most.
         joint: Joint,
-        /// Torque to hold the payload, N·m.
+        /// Torque that is necessary to hold the payload, N·m.
         torque: f64,
         /// Torque limit of the joint, N·m.
         limit: f64,
@@ -66,7 +66,7 @@ pub enum ExtensionError {
     /// The payload cannot change while a motion runs (J-60).
     #[error("the payload cannot change during a motion (state {state}, trajectory {trajectory})")]
     PayloadInMotion {
-        /// State of the controller at that time.
+        /// State of the controller when the payload was sent.
         state: Code<ControllerState>,
         /// Trajectory execution state at that time.
         trajectory: Code<TrajectoryState>,
@@ -74,7 +74,7 @@ pub enum ExtensionError {
     /// The memory of the device does not contain the arm.
     #[error("the arm was not stored: {state}")]
     NotStored {
-        /// State of the memory as reported by the device.
+        /// State of the memory that the device reports.
         state: StoreState,
     },
 }

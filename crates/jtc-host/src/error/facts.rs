@@ -1,4 +1,4 @@
-//! Facts of errors: joint, value, limit and cause.
+//! Facts about errors: joint, value, limit and cause.
 
 use host_kit::{Facts, HeldStopFacts};
 use jtc_core::ConfigError;
@@ -11,12 +11,12 @@ use crate::held_stop::HeldStop;
 use crate::plan::{MARGIN_PCT_MAX, PlanError};
 use crate::{explain, held_stop, labels};
 
-/// Returns the cause from the explain page for these words.
+/// Returns the cause from the explain page for the text `words`.
 fn cause(words: &str) -> Option<&'static str> {
     explain::find(words).first().map(|page| page.cause)
 }
 
-/// Returns the facts of a joint value that exceeds its limit, with the usual cause of this kind of problem.
+/// Returns the facts of a joint value that exceeds its limit, with the usual cause of a problem of this kind.
 fn problem(joint: Joint, value: f64, limit: f64, kind: ProblemKind) -> Facts {
     Facts { cause: cause(kind.words()), ..Facts::beyond(value, limit).at_joint(joint.number()) }
 }
@@ -42,7 +42,7 @@ fn nearest(value: f64, low: f64, high: f64) -> f64 {
     if value < low { low } else { high }
 }
 
-/// Returns the facts of a motion that cannot be planned.
+/// Returns the facts about a motion that cannot be planned.
 pub(crate) fn of_plan(error: &PlanError) -> Facts {
     use jtc_plan::PlanError as Of;
     match error {
@@ -68,7 +68,7 @@ pub(crate) fn of_plan(error: &PlanError) -> Facts {
     }
 }
 
-/// Returns the facts of a pose that the flange cannot reach.
+/// Returns the facts about a pose that the flange cannot reach.
 pub(crate) fn of_pose(error: &PoseError) -> Facts {
     match error {
         PoseError::Waypoint { source, .. } | PoseError::Leg { source, .. } => of_pose(source),
@@ -83,8 +83,7 @@ pub(crate) fn of_pose(error: &PoseError) -> Facts {
     }
 }
 
-/// Returns the facts of a held stop (J-69): the cause that the controller reports, or, without a report, the errors in its
-/// status.
+/// Returns the facts about a held stop (J-69). If the controller does not report the cause, the facts come from the errors in the status.
 pub(super) fn of_held_stop(status: &Status, cause: Option<&StopCause>) -> Facts {
     let Some(cause) = cause else { return of_status(status) };
     let stop = HeldStop::new(cause, 0);
@@ -98,7 +97,7 @@ pub(super) fn of_held_stop(status: &Status, cause: Option<&StopCause>) -> Facts 
     }
 }
 
-/// Returns the facts of a rejected setting.
+/// Returns the facts about a rejected setting.
 pub(super) fn of_setting(error: &SettingError) -> Facts {
     match *error {
         SettingError::Unknown { joint, .. } => {
@@ -155,13 +154,13 @@ mod tests {
         let facts = refused.expect_err("it is over its limit").facts();
         assert_eq!((facts.joint, facts.point), (Some(2), Some(0)));
         assert_eq!(facts.limit, Some(limit));
-        // The value has the resolution of a frame.
+        // The resolution of the value is the resolution of a CAN frame.
         assert!(facts.value.is_some_and(|value| (value - limit - 0.5).abs() < 1e-3), "{:?}", facts.value);
         assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
     }
 
-    /// A rejected plan has the same facts as a rejected check. Covers a position outside the limits, a position that needs
-    /// too much torque, and a path that starts outside the limits.
+    /// A rejected plan has the same facts as a trajectory that the check rejected. The test covers a position outside the limits, a
+    /// position that needs too much torque, and a path that starts outside the limits.
     #[test]
     fn what_planning_refuses_has_joint_value_limit_and_cause() {
         let arm = Arm::avena();

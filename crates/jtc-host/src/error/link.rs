@@ -1,4 +1,4 @@
-//! Errors of an exchange with the controller.
+//! Errors in the communication with the controller.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Response, TrajectoryState};
@@ -6,7 +6,7 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Respon
 use crate::labels;
 use crate::port::PortError;
 
-/// Reason why a request got no answer, or not the expected answer.
+/// Reason why a request received no answer, or an unexpected answer.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
@@ -18,14 +18,14 @@ pub enum LinkError {
     NoLink {
         /// Name of the port.
         port: String,
-        /// Rate of the line, Bd.
+        /// Bit rate of the serial line, Bd.
         baud: Option<u32>,
         /// Waiting time, s.
         waited_s: f64,
-        /// Number of bytes received in that time.
+        /// Number of bytes received while the program waited for a status.
         bytes: u64,
     },
-    /// A request was not confirmed, although statuses are received.
+    /// A request was not confirmed, although status frames are received.
     #[error("{}: not confirmed in {tries} tries", labels::request(*request))]
     NotConfirmed {
         /// The request.
@@ -41,7 +41,7 @@ pub enum LinkError {
         /// The request.
         request: FrameType,
     },
-    /// The request did not reach the controller, because the line is shared.
+    /// The shared line rejected the request, so the request did not reach the controller.
     #[error("{}: not sent: {reason}", labels::request(*request))]
     Denied {
         /// The request.
@@ -56,7 +56,7 @@ pub enum LinkError {
         request: FrameType,
         /// Reason.
         code: DataStatus,
-        /// State of the controller at that time.
+        /// State of the controller when it refused the request.
         state: Code<ControllerState>,
         /// Trajectory execution state at that time.
         trajectory: Code<TrajectoryState>,
@@ -164,7 +164,7 @@ impl Diagnose for LinkError {
 }
 
 impl LinkError {
-    /// Returns `true` if the line or the port failed, so that the controller may or may not have received the request.
+    /// Returns `true` if the line or the port failed, so that it is unknown if the controller received the request.
     pub(crate) fn is_loss(&self) -> bool {
         !matches!(
             self,
@@ -210,8 +210,8 @@ fn after_refused_execution(
     })
 }
 
-/// Returns `true` if the code means that the arm is in the wrong position. Without extended codes on the line, the
-/// controller sends code 6 instead of 7 and 8 (J-51).
+/// Returns `true` if the code means that the arm is not in the required position. If extended codes are not enabled on the line, the
+/// controller sends code 6 instead of the codes 7 and 8 (J-51).
 fn is_place(code: DataStatus) -> bool {
     matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
 }
@@ -246,7 +246,7 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> N
     }
 }
 
-/// Returns `true` if the response confirms its frame.
+/// Returns `true` if the response confirms the frame that it belongs to.
 pub(crate) fn accepted(r: &Response) -> bool {
     r.status == FrameStatus::NoError && r.data == DataStatus::NoError
 }

@@ -1,4 +1,4 @@
-//! Errors of an execution: before it begins, and during the motion.
+//! Errors before and during the execution of a motion.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, Next, next};
 use jtc_wire::{Code, ControllerState, Status, StopCause, StopKind, TrajectoryState};
@@ -11,8 +11,7 @@ use crate::{held_stop, labels};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionError {
-    /// Execution was requested for a trajectory that this session did not upload, or that the controller has lost since. No frame
-    /// was sent.
+    /// Execution was requested for a trajectory that this session did not upload, or that the controller no longer has. No frame was sent.
     #[error(
         "the controller does not have this trajectory: it was not uploaded, another upload replaced it, or an error deleted it; nothing was sent"
     )]
@@ -25,12 +24,12 @@ pub enum MotionError {
         /// Trajectory execution state.
         trajectory: Code<TrajectoryState>,
     },
-    /// The remainder of a paused motion no longer passes the check; no frame was sent.
+    /// The check refuses the remainder of a paused motion; no frame was sent.
     #[error("the remainder of the motion from {:.3} s fails the check with the present settings and payload: {why}; nothing was sent", f64::from(*point) * 1e-3)]
     RestRefused {
         /// Index of the 1 ms point at which the motion is paused.
         point: u32,
-        /// Result of the check.
+        /// Error from the check of the remainder.
         why: Box<PlanError>,
     },
     /// The motion did not end as requested.
@@ -38,17 +37,17 @@ pub enum MotionError {
     RunFault {
         /// Index of the 1 ms point at which the motion ended.
         point: u32,
-        /// The status with the errors.
+        /// Status with the errors.
         status: Box<Status>,
     },
-    /// The controller stopped the motion, and holds the arm (J-69).
+    /// The controller stopped the motion, and holds the arm in position (J-69).
     #[error("the controller stopped the motion at point {point} ({:.3} s) and holds the arm: {}", f64::from(*point) * 1e-3, why_held(before, status, cause.as_ref()))]
     HeldStop {
         /// Index of the 1 ms point at which the motion is paused.
         point: u32,
         /// Errors of each joint that had occurred before the motion.
         before: [u16; 6],
-        /// The status with the errors.
+        /// Status with the errors.
         status: Box<Status>,
         /// First cause, with its value and limit, if the device reports it.
         cause: Option<StopCause>,
@@ -58,15 +57,15 @@ pub enum MotionError {
     LinkLost {
         /// Last status that was received.
         last: Option<Box<Status>>,
-        /// `true` if a stop was written to the port afterwards.
+        /// `true` if a Stop was written to the port after the loss of the link.
         stop_sent: bool,
         /// Failure of the link.
         source: Box<LinkError>,
     },
 }
 
-/// Returns the cause of the held stop in one line. If the status no longer shows it, returns the errors that have occurred
-/// since the start.
+/// Returns the cause of the held stop in one line. If the status no longer shows the cause, returns the errors that have occurred since the
+/// start of the motion.
 fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
     if status.is_held_stop() || cause.is_some() {
         labels::why_held(status, cause)
@@ -75,7 +74,7 @@ fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> St
     }
 }
 
-/// Returns the next step after a held stop in a motion.
+/// Returns the next step after a held stop during a motion.
 fn after_held_stop(cause: Option<&StopCause>) -> Next {
     let remedy = match cause.map(|cause| cause.kind) {
         None => "remove the obstacle, or set the payload".to_owned(),
@@ -195,8 +194,8 @@ impl Diagnose for MotionError {
 mod tests {
     use super::*;
 
-    /// J-34: after a Pause request the trajectory state stays Execute until the arm is at rest. A Resume in this time has
-    /// its own message.
+    /// J-34: after a Pause request the trajectory state stays Execute until the arm has stopped. A Resume command during this time has its
+    /// own error message.
     #[test]
     fn a_resume_too_early_is_told_from_one_without_a_pause() {
         let early = MotionError::NotPaused {

@@ -1,4 +1,4 @@
-//! Errors of sending friction, gains and arm model to the controller.
+//! Errors when friction, gains and arm model are sent to the controller.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{DataStatus, FrameType};
@@ -10,10 +10,10 @@ use crate::labels;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParametersError {
-    /// A value does not fit into its frame or is not physical.
+    /// A value is out of range for its CAN frame, or is not physically possible.
     #[error(transparent)]
     Value(#[from] ParameterError),
-    /// The controller refused a parameter, which is beyond the bounds of known controllers.
+    /// The controller refused a parameter that is out of the bounds of known controllers.
     #[error("{}: {}: {beyond}", labels::request(*request), labels::data_status(DataStatus::IncorrectValue))]
     BeyondBounds {
         /// The request.
@@ -21,17 +21,17 @@ pub enum ParametersError {
         /// Joint, value and bounds.
         beyond: Beyond,
     },
-    /// The gains do not keep the arm stable.
+    /// The arm is unstable with these gains.
     #[error("{arm}: {problem}; nothing was sent")]
     Unstable {
         /// Name of the arm.
         arm: String,
-        /// Joint, value and its limit.
+        /// Joint, value and limit, as text.
         problem: String,
         /// Next step for the operator.
         next: Next,
     },
-    /// The controller needs parameters, but the caller gave no source for them.
+    /// The controller needs parameters, but the caller did not provide them.
     #[error("the controller lacks parameters: {}; nothing was sent", missing.join(", "))]
     NoSource {
         /// Missing parameters.

@@ -1,4 +1,4 @@
-//! Errors of waiting for a state.
+//! Errors while the library waits for a state.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_wire::{Code, ControllerState, Joint, Status, StopCause};
@@ -13,13 +13,13 @@ pub enum StateError {
     /// The controller reports errors.
     #[error("the controller reports an error: {}", labels::errors_line(status))]
     Device {
-        /// The status with the errors.
+        /// Status with the errors.
         status: Box<Status>,
     },
     /// The arm is in a held stop (J-69): the drives hold the arm, and no motion is possible until the cause is cleared.
     #[error("the arm is in a held stop: {}", labels::why_held(status, cause.as_ref()))]
     HeldStop {
-        /// The status with the causes.
+        /// Status with the causes.
         status: Box<Status>,
         /// First cause, with its value and limit, if the device reports it.
         cause: Option<StopCause>,
@@ -37,11 +37,11 @@ pub enum StateError {
     /// The controller is not in HoldPos, and it is not starting up to that state.
     #[error("{}", labels::waiting_for(status))]
     NotReady {
-        /// Status at that time.
+        /// Status in which the controller was not ready.
         status: Box<Status>,
     },
-    /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the drive's speed has another scale. The
-    /// controller executes no trajectory until the drives have been configured again.
+    /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the drive's speed has another scale. The controller executes
+    /// no trajectory until the drives are configured again.
     #[error(
         "{}: the position is not reliable, because the encoder has jumped or the speed of the drive does not match; the controller executes no \
          trajectory until the drive is reset",

@@ -6,7 +6,7 @@ use jtc_wire::{Code, ControllerState, DataStatus, TrajectoryState};
 use super::link::after_refusal;
 use crate::labels;
 
-/// Reason why the controller does not hold the whole trajectory.
+/// Reason why the controller has not stored the whole trajectory.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UploadError {
@@ -26,7 +26,7 @@ pub enum UploadError {
         trajectory
     )]
     Incomplete {
-        /// Number of segments that are known to have arrived.
+        /// Number of segments that the controller has confirmed.
         confirmed: usize,
         /// Number of segments.
         segments: usize,

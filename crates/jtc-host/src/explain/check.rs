@@ -20,8 +20,8 @@ pub(super) const MISSING: &[Page] = &[
     missing(2, "missing-arm-model", "The controller has no masses and frames of the arm, and waits in Init."),
 ];
 
-/// Declares the pages of the check: kind and name, then meaning, usual cause, remedy, and the next command. The default
-/// command is another check.
+/// Declares the pages of the check, each with kind, name, meaning, usual cause, remedy and next command. By default, the next command is
+/// another check.
 macro_rules! found {
     (@next) => { "jtc traj check FILE" };
     (@next $command:literal) => { $command };

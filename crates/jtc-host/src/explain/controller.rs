@@ -1,4 +1,4 @@
-//! Pages about the controller: errors, CAN flags, states.
+//! Pages about the controller: errors, CAN flags and states.
 
 use super::entries;
 

@@ -1,4 +1,4 @@
-//! Pages about drives and gripper: errors, warnings, faults, states.
+//! Pages about the drives and the gripper: errors, warnings, faults and states.
 
 use super::entries;
 

@@ -1,11 +1,11 @@
-//! Pages about the causes of a held stop (J-69). Number 0 is the page about the held stop itself.
+//! Pages about the causes of a held stop (J-69). The page with number 0 is about the held stop itself.
 
 use jtc_wire::StopKind;
 
 use super::{Family, Page, page};
 
-/// Declares the pages of the causes: kind and name, then meaning, usual cause, remedy, and the next command. The default
-/// command is `jtc clear`.
+/// Declares the pages of the causesof a held stop, each with kind, name, meaning, usual cause, remedy and next command. By default, the
+/// next command is `jtc clear`.
 macro_rules! stops {
     (@next) => { "jtc clear" };
     (@next $command:literal) => { $command };
@@ -33,7 +33,7 @@ pub(super) const HELD_STOP: &[Page] = &[page(
     ],
 )];
 
-/// Pages about the causes, in the order of their numbers.
+/// Pages about the causes, in the order of the cause numbers.
 pub(super) const CAUSES: &[Page] = &KINDS;
 
 stops! {

@@ -1,4 +1,4 @@
-//! Encoding of a log as bytes. A recording contains these bytes, so the log can be replayed from the file.
+//! Encoding of a log as bytes. A recording contains these bytes, so the log in a recording file can be replayed.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::recording::{self, RecordingError};
 /// Magic bytes at the start, including the version.
 const MAGIC: &[u8; 8] = b"JTCLOG\0\x01";
 
-/// Kinds of the parts.
+/// Kinds of the parts of an encoded log.
 mod part {
     pub(super) const STATE: u8 = 1;
     pub(super) const BLOCKS: u8 = 2;
@@ -81,7 +81,8 @@ impl FlightLog {
         log.ok_or_else(|| LogFileError::NoLog { path: path.to_owned() })
     }
 
-    /// Decodes a log. Skips parts that a later version has added. Returns `None` if the bytes are not a valid log.
+    /// Decodes a log. Decodes a log, and skips parts that a later version of the format has added. Returns `None` if the bytes are not a
+    /// valid log.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut rest = bytes.strip_prefix(MAGIC)?;
         let mut log = Self::default();

@@ -13,30 +13,31 @@ use crate::sample::{JointSample, Sample};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Worth {
-    /// Identical to the original, bit for bit.
+    /// The tick is identical to the original tick, bit for bit.
     Same,
     /// The original controller computed different outputs.
     Differs,
-    /// Computed while an input was missing. The values may differ from the original until the next snapshot. Measured
+    /// The tick was computed while an input was missing. The values may differ from the original until the next snapshot. The measured
     /// values are correct.
     Unsure,
-    /// Not computed, because the arm or the trajectory of that time is missing. Only the measured values are present.
+    /// The tick was not computed, because the arm or the trajectory used at that time is missing. The tick contains only the measured
+    /// values.
     Measured,
 }
 
-/// A tick of a log.
+/// A replayed tick of a log.
 #[derive(Clone, Debug)]
 pub struct Tick {
-    /// Ticks since the start of the device.
+    /// Number of ticks since the start of the device.
     pub tick: u64,
-    /// Starts of the device.
+    /// Number of starts of the device.
     pub boots: u32,
     /// Values at the time of `tick`.
     pub sample: Sample,
-    /// Status that the controller would have reported, with the errors of the drives, as far as the replay
-    /// could compute it.
+    /// Status that the controller would have reported, with the errors of the drives. The status contains only what the replay could
+    /// compute.
     pub status: Status,
-    /// Inputs of the tick. `None` for the state in a snapshot.
+    /// Inputs of the tick. `None` if the tick is the state in a snapshot.
     pub inputs: Option<RecordedInputs>,
     /// Reliability of the tick.
     pub worth: Worth,
@@ -51,10 +52,10 @@ pub struct Gap {
     pub before: u64,
 }
 
-/// First tick that differs.
+/// First replayed tick that differs from the log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// Ticks since the start of the device.
+    /// Number of ticks since the start of the device.
     pub tick: u64,
     /// State of the controller in the replay.
     pub state: &'static str,
@@ -67,23 +68,23 @@ pub struct Difference {
 pub struct Replayed {
     /// Ticks in order.
     pub ticks: Vec<Tick>,
-    /// Configuration of a controller that has the arm of the log.
+    /// Configuration of a controller that uses the arm of the log.
     pub config: Option<Box<Config>>,
-    /// Number of ticks that are known to match the original.
+    /// Number of ticks that are known to equal the original ticks.
     pub same: usize,
-    /// First tick that differs from the original.
+    /// First tick that differs from the original tick.
     pub difference: Option<Difference>,
     /// Number of ticks that were computed while an input was missing.
     pub unsure: usize,
-    /// Number of ticks that were recorded with another arm than the available one.
+    /// Number of ticks that were recorded with another arm than the available arm.
     pub other_arm: usize,
-    /// Number of ticks along a trajectory that is not available.
+    /// Number of ticks during a trajectory that is not available.
     pub other_points: usize,
     /// Gaps in the log.
     pub gaps: Vec<Gap>,
-    /// Hashes of arms in the log other than the available one.
+    /// Hashes of the arms in the log that differ from the available arm.
     pub arms: Vec<u64>,
-    /// `true` if the log contains a state that no controller can reach. The replay ends there.
+    /// `true` if the log contains a state that no controller can reach. The replay ends at this state.
     pub broken: bool,
 }
 
@@ -104,7 +105,7 @@ impl FlightLog {
             Replayed { config: Some(Box::new(controller.config().clone())), ..Replayed::default() };
         let mut replay = Replay::new(self.log(), controller, points);
         let own = replay.arm();
-        // A forged file may contain a state that no controller can reach. The replay ends there.
+        // A manipulated file may contain a state that no controller can reach. The replay ends at this state.
         let all = std::panic::AssertUnwindSafe(|| {
             while let Some(step) = replay.next() {
                 let tick = tick(&step, &replay);
@@ -178,7 +179,7 @@ fn tick(step: &Step, replay: &Replay<'_, Vec<RawPoint>>) -> Tick {
     Tick { tick: step.telemetry.tick, boots: step.boots, sample, status, inputs: step.inputs, worth }
 }
 
-/// Returns the values that come from the answers of the drives.
+/// Returns the values that the drives reported in their answers.
 fn measured(sample: &Sample, inputs: Option<&RecordedInputs>, config: &Config) -> Sample {
     let mut joints = [JointSample::UNKNOWN; JOINTS];
     let scale = Scale { velocity: config.velocity_full_scale };

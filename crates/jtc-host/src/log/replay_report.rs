@@ -1,4 +1,4 @@
-//! A replayed log with its timeline and the recording that is made from it.
+//! A replayed log with its timeline and the recording that is created from it.
 
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::report::RunFailure;
 pub struct Account {
     /// The log.
     pub log: FlightLog,
-    /// All ticks of the log, replayed.
+    /// All ticks of the log after the replay.
     pub replayed: Replayed,
     /// Events of the log in order.
     pub story: Timeline,
@@ -24,7 +24,7 @@ pub struct Account {
 }
 
 impl Account {
-    /// Replays a log. `other` is an arm with its image. This arm is used instead of the arm that is stored with the log.
+    /// Replays a log. `other` is an arm together with its image. The replay uses this arm instead of the arm that is stored with the log.
     /// `source` is the location from which the log was read.
     pub fn of(log: FlightLog, other: Option<(Arm, Vec<u8>)>, source: &str) -> Self {
         let (arm, image) = other.unzip();
@@ -45,7 +45,7 @@ impl Account {
         Self { log, replayed, story, info, failure }
     }
 
-    /// Writes the recording with the log as MCAP. Error messages use `path` as its name.
+    /// Writes the recording with the log as MCAP. Error messages use `path` as the name of the file.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Timeline of a log: the events in order, with the first error at the top.
+//! Timeline of a log, with all events in order and the first error at the top.
 
 use std::fmt::Write;
 
@@ -16,19 +16,19 @@ use crate::sample::{JointSample, Sample};
 /// An event in a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Event {
-    /// Ticks since the start of the device.
+    /// Number of ticks since the start of the device.
     pub tick: u64,
     /// Time of `tick`, s.
     pub time_s: f64,
     /// Description.
     pub text: String,
-    /// `true` if an error begins here.
+    /// `true` if an error begins with this event.
     pub error: bool,
     /// Joints concerned.
     pub joints: Vec<Joint>,
 }
 
-/// Timeline of a log.
+/// Events of a log in the order of time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Timeline {
     /// Events in order.
@@ -59,7 +59,7 @@ impl Timeline {
         Self { events, first }
     }
 
-    /// Returns the first error and the errors of the same tick, for a report.
+    /// Returns the first error and all errors in the same tick, for a report.
     pub fn failure(&self, info: &RecordingInfo, samples: &[Sample]) -> Option<RunFailure> {
         let first = self.events.get(self.first?)?;
         let with = self.events.iter().filter(|event| event.error && event.tick == first.tick);
@@ -67,7 +67,8 @@ impl Timeline {
         Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joints.first().copied()))
     }
 
-    /// Returns the first error and the events after it, each with its delay. The events before the error follow.
+    /// Returns the first error and the events after it, each with its delay after the error. The events before the error follow in the
+    /// list.
     pub fn lines(&self) -> Vec<String> {
         let Some(first) = self.first else {
             return self
@@ -81,7 +82,7 @@ impl Timeline {
         for event in &self.events[first + 1..] {
             lines.push(format!("{}: {}", after(event.tick - at.tick), event.text));
         }
-        // The nearest event comes first. The number of events is limited.
+        // The event nearest to the error comes first. The number of listed events is limited.
         let near = |event: &&Event| at.tick - event.tick <= BEFORE_MS;
         let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
         if !before.is_empty() {
@@ -94,7 +95,7 @@ impl Timeline {
     }
 }
 
-/// Time window before an error, ms, and the maximum number of events that are listed from this window.
+/// Time window before an error (ms), followed by the maximum number of events that are listed from this window.
 const BEFORE_MS: u64 = 3_000;
 const BEFORE: usize = 20;
 
@@ -118,7 +119,7 @@ fn names(joints: &[Joint]) -> String {
     }
 }
 
-/// Consecutive frames of the same type within this time are one event, ms.
+/// Consecutive frames of the same type within this time (ms) are one event.
 const SAME_MS: u64 = 50;
 /// Number of ticks without an answer after which a silent joint becomes an event.
 const SILENT: u32 = 3;
@@ -128,7 +129,7 @@ struct Narrator<'a> {
     events: &'a mut Vec<Event>,
     /// Number of ticks for which each joint has not answered.
     silent: [u32; 6],
-    /// Last frame from a host, and its tick.
+    /// Type of the last frame from a host, and the tick of that frame.
     sent: Option<(FrameType, u64)>,
 }
 
@@ -138,7 +139,7 @@ impl Narrator<'_> {
         self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joints: Vec::new() });
     }
 
-    /// Adds an event of a joint. If several joints have the same event in one tick, they share it.
+    /// Adds an event of a joint. If several joints have the same event in one tick, the timeline contains one event for all of them.
     fn push_joint(&mut self, tick: &Tick, error: bool, joint: Joint, text: impl Into<String>) {
         let text = text.into();
         let same =
@@ -278,7 +279,7 @@ impl Narrator<'_> {
                 self.push_joint(tick, false, joint, "safety line active");
             }
         }
-        // Errors that no event of a joint, the bus or an input explains.
+        // Errors that are not explained by an event of a joint, the bus or an input.
         let begins = tick.sample.errors & !last.sample.errors;
         if begins != 0 && !self.events.iter().rev().any(|event| event.tick == tick.tick && event.error) {
             self.push(tick, true, labels::errors(begins).join(", "));
@@ -317,8 +318,8 @@ impl Narrator<'_> {
     fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
         let name = labels::joint_errors(bit).first().copied().unwrap_or("an unnamed error");
         let j = joint.index();
-        // In the tick of the error the controller removes the torque, and with it the commanded value. So the tick before
-        // is also used.
+        // In the tick of the error the controller removes the torque, and the commanded value becomes 0. So the function also uses the
+        // previous tick.
         let larger = |value: fn(&JointSample) -> f64| {
             let values = [value(&last.sample.joints[j]), value(&tick.sample.joints[j])];
             if values[1].abs() > values[0].abs() { values[1] } else { values[0] }
@@ -352,7 +353,7 @@ impl Narrator<'_> {
     }
 }
 
-/// Returns the torque of the control law before it is limited.
+/// Returns the torque of the control law before the torque limit is applied.
 fn computed(s: &JointSample) -> f64 {
     s.torque_model + s.torque_p + s.torque_i + s.torque_d + s.torque_friction
 }

@@ -1,4 +1,4 @@
-//! Motion from the arm's position to the first point of a trajectory.
+//! Motion from the current position of the arm to the first point of a trajectory.
 
 use jtc_core::JOINTS;
 
@@ -8,10 +8,10 @@ use crate::check::{CheckOptions, CheckedTrajectory};
 use crate::error::CheckError;
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Maximum speed, % of the limits. No user has checked this path for obstacles.
+/// Maximum speed of an approach, % of the limits. No user has checked this path for obstacles.
 const FASTEST_PCT: f64 = 50.0;
 
-/// Reason why the first point cannot be reached. The trajectory itself may be valid.
+/// Reason why the arm cannot reach the first point. The trajectory itself may be valid.
 #[derive(Debug, thiserror::Error)]
 pub enum ApproachError {
     /// No motion to the first point can be planned.
@@ -22,8 +22,8 @@ pub enum ApproachError {
     Check(#[from] CheckError),
 }
 
-/// Plans a straight motion in joint space from `here` to the first point of `trajectory`, and checks it like any other
-/// motion. The speed is `speed_pct` % of the limits of `arm` on this controller, but at most 50 %.
+/// Plans a straight motion in joint space from `here` to the first point of `trajectory`, and checks it like any other motion. The speed is
+/// `speed_pct` % of the limits of `arm` on this controller, limited to 50 %.
 ///
 /// # Errors
 ///
@@ -44,7 +44,7 @@ pub fn approach(
         ..Planner::new(&config)
     };
     let path = planner.to(here, &first)?.trajectory;
-    // The number of points per segment was requested for the trajectory and not for this motion.
+    // The number of points per segment applies only to the trajectory, and not to this approach.
     let upload = UploadOptions { points_per_segment: None, ..options.upload };
     Ok(CheckedTrajectory::check(&path, arm, here, &CheckOptions { upload, ..options.clone() })?)
 }

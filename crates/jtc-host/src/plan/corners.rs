@@ -1,17 +1,17 @@
-//! Rounded corners: the range of the blend, and notes on how far the motion misses the waypoints.
+//! Rounded corners: range of the blend, and notes about the distance between the motion and the waypoints.
 
 use jtc_core::JOINTS;
 use jtc_plan::furthest_joint;
 
 use super::{PlanError, Planned};
 
-/// Largest blend, rad. A larger value is probably an angle in degrees.
+/// Largest blend, rad. Largest blend, rad. A larger value is probably an angle in degrees.
 pub const BLEND_MAX: f64 = 0.5;
 /// Largest blend of corners between lines and arcs, m. A larger value is probably a length in mm.
 pub const BLEND_M_MAX: f64 = 0.5;
-/// A waypoint that is missed by more than this distance gets a note, rad.
+/// Distance (rad) above which a note reports that the motion misses a waypoint.
 const NOTED: f64 = 0.05;
-/// Maximum number of waypoints in a note.
+/// Maximum number of waypoints that one note lists.
 const NAMED: usize = 3;
 
 /// Rejects blends that are probably in a wrong unit. The planner rejects negative values and NaN.
@@ -27,8 +27,8 @@ pub(super) fn within_reason(blend: f64, blend_m: f64) -> Result<(), PlanError> {
     }
 }
 
-/// Returns notes on the corners of a motion through `positions`: waypoints that the motion misses by more than 0.05
-/// rad, and corners that are rounded by less than `blend` because a leg is too short.
+/// Returns notes on the corners of a motion through `positions`. The notes list waypoints that the motion misses by more than 0.05 rad, and
+/// corners rounded by less than `blend` because a segment is too short.
 pub(super) fn notes(planned: &Planned, positions: &[[f64; JOINTS]], blend: f64) -> Vec<String> {
     [missed(planned, positions), cut(positions, blend)].into_iter().flatten().collect()
 }
@@ -60,7 +60,7 @@ fn missed(planned: &Planned, positions: &[[f64; JOINTS]]) -> Option<String> {
     (!named.is_empty()).then(|| format!("rounded corners: {}", named.join(", ")))
 }
 
-/// Returns a note with the corners whose legs are shorter than twice the blend.
+/// Returns a note with the corners whose segments are shorter than twice the blend.
 fn cut(positions: &[[f64; JOINTS]], blend: f64) -> Option<String> {
     let leg = |a: &[f64; JOINTS], b: &[f64; JOINTS]| {
         let length = furthest_joint(a, b).1;
@@ -103,7 +103,7 @@ mod tests {
         Planner { blend, jerk: false, ..Planner::new(&config) }.through(&waypoints)
     }
 
-    /// Returns a corner between two legs of this length. On each leg a single joint moves.
+    /// Returns a corner between two segments of this length. Only one joint moves in each segment.
     fn corner(length: f64) -> [[f64; JOINTS]; 3] {
         [[0.0; JOINTS], [length, 0.0, 0.0, 0.0, 0.0, 0.0], [length, length, 0.0, 0.0, 0.0, 0.0]]
     }
@@ -158,7 +158,7 @@ mod tests {
         let there_and_back = [a, b, c, b, a, b, c, a, b, c, a, b];
         let note = cut(&there_and_back, 0.2).unwrap();
         assert!(note.contains("waypoints 2, 4, 6 and "), "{note}");
-        // A straight continuation and a reversal at a stop have no corner.
+        // A straight continuation and a reversal with a stop are not corners.
         let [straight, back] = [[a, b, b.map(|q| 2.0 * q)], [a, b, a]];
         assert_eq!((cut(&straight, 0.2), cut(&back, 0.2)), (None, None));
     }
@@ -166,7 +166,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(8))]
 
-        /// A search for the nearest position at each millisecond gives the same distances as the notes.
+        /// The notes contain the same distances as a search for the nearest position at each millisecond.
         #[test]
         fn notes_name_the_waypoints_that_are_missed(
             positions in prop::collection::vec(prop::array::uniform6(-1.0..1.0f64), 3..6), blend in 0.0..0.5f64

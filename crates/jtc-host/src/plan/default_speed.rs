@@ -1,4 +1,4 @@
-//! Speed of a motion for which the user gives none.
+//! Default speed of a motion if the user does not set the speed.
 
 use jtc_wire::{Info, SIMULATOR};
 
@@ -6,9 +6,9 @@ use crate::error::LinkError;
 use crate::port::Port;
 use crate::session::Session;
 
-/// Default on a simulator, % of the limits.
+/// Default speed on a simulator, % of the limits.
 const SIMULATED_PCT: f64 = 25.0;
-/// Default on every other controller, % of the limits.
+/// Default speed on every other controller, % of the limits.
 const DEFAULT_PCT: f64 = 10.0;
 
 /// Speed of a move or an approach.
@@ -16,22 +16,21 @@ const DEFAULT_PCT: f64 = 10.0;
 pub struct MoveSpeed {
     /// Speed, % of the limits.
     pub percent: f64,
-    /// `true` if the user gave no speed.
+    /// `true` if the user did not set the speed.
     pub is_default: bool,
 }
 
 impl MoveSpeed {
-    /// Returns the speed that the user gave, or else the default for the controller with this identity. The default for a
-    /// simulator is 25 % of the limits. The default is 10 % for every other controller, including one that reports no
-    /// identity.
+    /// Returns the speed that the user set, or otherwise the default speed for the controller with this identity. The default for a
+    /// simulator is 25 % of the limits. The default is 10 % for every other controller, including one that reports no identity.
     pub fn of(named: Option<f64>, info: Option<&Info>) -> Self {
         let is_simulated = info.is_some_and(|info| info.board.as_str() == SIMULATOR);
         let default = if is_simulated { SIMULATED_PCT } else { DEFAULT_PCT };
         Self { percent: named.unwrap_or(default), is_default: named.is_none() }
     }
 
-    /// Returns a note for the user about the default speed, or `None` if the user gave a speed. `option` is the option that
-    /// sets the speed; it may be empty.
+    /// Returns a note for the user about the default speed, or `None` if the user set the speed. `option` is the option that sets the
+    /// speed, or an empty string.
     pub fn note(&self, option: &str) -> Option<String> {
         let sets = if option.is_empty() { String::new() } else { format!("; {option} sets it") };
         self.is_default.then(|| format!("at {} % of the limits{sets}", self.percent))
@@ -39,11 +38,11 @@ impl MoveSpeed {
 }
 
 impl<P: Port> Session<P> {
-    /// Returns the speed of a move or an approach on this controller: the speed that the user gave, or the default.
+    /// Returns the speed of a move or an approach on this controller. This is the speed that the user set, or the default speed.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::info`] if the user gave no speed.
+    /// Returns the errors of [`Session::info`] if the user did not set the speed.
     pub fn move_speed(&mut self, named: Option<f64>) -> Result<MoveSpeed, LinkError> {
         let info = if named.is_none() { self.info()? } else { None };
         Ok(MoveSpeed::of(named, info.as_ref()))
@@ -56,7 +55,7 @@ mod tests {
 
     use super::*;
 
-    /// A controller that does not report that it is a simulator is treated as a real one.
+    /// A controller that does not report that it is a simulator is treated as a real controller.
     #[test]
     fn the_default_speed_is_low_unless_the_controller_is_known_to_be_a_simulator() {
         let boards = [
@@ -76,7 +75,7 @@ mod tests {
         };
         for (board, percent) in boards {
             assert_eq!(of(board, None), MoveSpeed { percent, is_default: true }, "{board}");
-            // A speed that the user gives is used for every controller.
+            // The speed that the user sets is used for every controller.
             for named in [1.0, 5.0, 60.0, 100.0] {
                 assert_eq!(of(board, Some(named)), MoveSpeed { percent: named, is_default: false });
             }

@@ -12,7 +12,7 @@ use crate::error::facts;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// The motion is not possible. The error contains waypoint, joint, value and limit.
+    /// The motion is not possible. The error contains the waypoint, joint, value and limit.
     #[error(transparent)]
     Plan(#[from] jtc_plan::PlanError),
     /// All waypoints are equal.
@@ -47,7 +47,7 @@ pub enum PlanError {
         value: f64,
         /// Maximum.
         most: f64,
-        /// Unit: rad, or m for corners between lines and arcs.
+        /// Unit of the blend: rad, or m for corners between lines and arcs.
         unit: &'static str,
     },
     /// The waypoints have more corners than the points of a trajectory can represent.
@@ -55,22 +55,22 @@ pub enum PlanError {
         "too many sharp corners: {corners}, expected at most {most} for the {POINTS_MAX} points of a trajectory"
     )]
     TooManyCorners {
-        /// Number of corners found.
+        /// Number of corners in the waypoints.
         corners: usize,
         /// Maximum number of corners.
         most: usize,
     },
-    /// The motion takes too long: the points of its trajectory are too far apart for its corners.
+    /// The motion takes so long that the points of its trajectory are too far apart for its corners.
     #[error(
         "the motion is too long for its corners: in {seconds:.0} s, {POINTS_MAX} points are {step_ms} ms apart"
     )]
     TooFine {
         /// Duration, s.
         seconds: f64,
-        /// Step of the points, ms.
+        /// Time step between the points, ms.
         step_ms: u16,
     },
-    /// The motion takes longer than a trajectory can.
+    /// The motion takes longer than the longest possible trajectory.
     #[error(
         "the motion is too long: it takes {seconds:.0} s or more, which {POINTS_MAX} points cannot cover"
     )]
@@ -81,7 +81,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Returns the number of the waypoint in the error, counted from 1, if the message contains one.
+    /// Returns the number of the waypoint in the error, counted from 1, if the message contains a waypoint.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::Plan(error) => error.waypoint(),
@@ -89,8 +89,8 @@ impl PlanError {
         }
     }
 
-    /// Returns the remedy for a move whose goal or start is outside the limits. Returns `None` if the remedy of
-    /// [`Diagnose`] applies.
+    /// Returns the remedy for a move whose goal or start is outside the limits. Returns `None` if the general remedy of [`Diagnose`]
+    /// applies.
     pub fn next_of_move(&self) -> Option<Next> {
         match self {
             Self::Plan(jtc_plan::PlanError::Position { waypoint: 1, .. }) => {
@@ -104,7 +104,7 @@ impl PlanError {
         }
     }
 
-    /// Returns the message for a move. Its first waypoint is the position of the arm, and its second one is the goal.
+    /// Returns the error message for a move. In a move, the first waypoint is the position of the arm, and the second waypoint is the goal.
     pub fn of_move(&self) -> String {
         use jtc_plan::PlanError as Of;
         use kinematics::PoseError as Pose;

@@ -1,4 +1,4 @@
-//! Motions with the flange on lines and arcs, and the distance of the flange from the line in other motions.
+//! Motions in which the flange follows lines and arcs, and the distance of the flange from the straight line in other motions.
 
 use jtc_core::{JOINTS, SetPoint, interpolate};
 use jtc_dynamics::ArmModel;
@@ -8,23 +8,23 @@ use jtc_plan::{Limits, on_route};
 use super::{PlanError, Planned, Planner, corners};
 use crate::trajectory::Trajectory;
 
-/// Maximum deviation of the flange from its line between two points of a trajectory, m.
+/// Maximum deviation of the flange from its path between two points of a trajectory, m.
 const ASIDE_M: f64 = 1e-4;
 /// Number of positions checked between two points.
 const PARTS: usize = 4;
 
-/// Deviation of a leg in joint space from the straight line between its ends.
+/// Deviation of the flange, during a joint-space segment, from the straight line between the ends of the segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aside {
-    /// Waypoint at the end of the leg, counted from 1.
+    /// Waypoint at the end of the segment, counted from 1.
     pub waypoint: usize,
     /// Largest distance of the flange from the line, m.
     pub distance_m: f64,
 }
 
 impl Planner<'_> {
-    /// Plans a motion through the waypoints of a route, from rest to rest. The motion is straight in joint space, or the
-    /// flange moves on lines and arcs. If waypoints have times, the motion keeps them.
+    /// Plans a motion through the waypoints of a route that starts and ends at rest. The motion is straight in joint space, or the flange
+    /// moves along lines and arcs. If waypoints have times, the motion passes the waypoints at these times.
     ///
     /// # Errors
     ///
@@ -33,8 +33,8 @@ impl Planner<'_> {
         self.along_route(route, times, None)
     }
 
-    /// Plans a motion from rest at `from` (rad) to `target`. The motion is straight in joint space, or the flange moves on
-    /// a straight line.
+    /// Plans a motion from rest at `from` (rad) to `target`. The motion is straight in joint space, or the flange moves along a straight
+    /// line.
     ///
     /// # Errors
     ///
@@ -86,8 +86,8 @@ impl Planner<'_> {
     }
 }
 
-/// Returns the largest deviation of the flange from its path between two points, with the interpolation of the controller
-/// (J-32), m. Only the deviation across the path is measured.
+/// Returns the largest deviation of the flange from its path between two points, with the interpolation of the controller (J-32), m. Only
+/// the deviation perpendicular to the path is measured.
 fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -> [f64; JOINTS]) -> f64 {
     const MOMENT: f64 = 1e-4;
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
@@ -107,7 +107,8 @@ fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -
     most
 }
 
-/// Returns the joint-space leg to one of the waypoints `legs` on which the flange deviates most from the straight line.
+/// Returns the joint-space segment with the largest deviation of the flange from the straight line. `legs` are the waypoints at the ends of
+/// the compared segments.
 pub fn furthest_aside(planned: &Planned, model: &ArmModel, legs: &[usize]) -> Option<Aside> {
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
     let times = &planned.waypoint_times;

@@ -1,9 +1,9 @@
-//! Torque margin of a plan: the part of each torque limit that is left free for effects that the model does not contain.
+//! Torque margin of a plan: the part of each torque limit that stays unused as a reserve for effects that the model does not contain.
 //!
-//! A plan keeps the model torque, including friction, below (100 % − margin) of each limit. This holds at the lowest
-//! bearing temperature of the plan and at the usual one. If gravity and breakaway friction alone leave little or
-//! nothing below that, the motion may instead use a quarter of the torque that they leave of the whole limit, and at least
-//! 2 % of the limit ([`ArmDynamics::usable_torque`]). So a pose that the arm can hold can also be reached and left.
+//! A plan keeps the model torque, including friction, below (100 % − margin) of each limit. This applies at the lowest bearing temperature
+//! of the plan and at the usual bearing temperature. If gravity and breakaway friction alone need nearly all of this reduced limit, another
+//! rule applies ([`ArmDynamics::usable_torque`]). The motion may then use a quarter of the torque that gravity and friction leave of the
+//! whole limit, and at least 2 % of the limit. So the arm can also reach and leave every pose that it can hold.
 //! [`Verdict::margin`](crate::check::Verdict::margin) reports the margin of a motion.
 
 use jtc_core::JOINTS;
@@ -18,7 +18,7 @@ use crate::trajectory::Trajectory;
 pub const MARGIN_PCT: f64 = 15.0;
 /// Largest torque margin, % of each limit.
 pub const MARGIN_PCT_MAX: f64 = 100.0 * jtc_plan::MARGIN_MAX;
-/// A margin that is smaller than requested by more than this value gets a note, % of the limit.
+/// Difference between requested and actual margin (% of the limit) above which a note reports the smaller margin.
 const SHORT_PCT: f64 = 0.1;
 /// Relative rounding error of a torque that is still accepted as within the limit.
 const ROUNDING: f64 = 1e-9;
@@ -46,15 +46,15 @@ pub fn margin_in_range(percent: f64) -> Result<(), PlanError> {
     if (0.0..=MARGIN_PCT_MAX).contains(&percent) { Ok(()) } else { Err(PlanError::Margin { percent }) }
 }
 
-/// Joint whose torque violates the margin of its plan.
+/// Joint whose torque does not respect the margin of the plan.
 pub(super) struct Excess {
     /// The joint.
     pub joint: Joint,
-    /// Factor for the duration of the motion at which the torque is within the margin.
+    /// Factor for the duration of the motion at which the torque respects the margin.
     pub stretch: f64,
 }
 
-/// Returns a note if gravity makes the margin smaller than requested.
+/// Returns a note if the margin is smaller than requested because of gravity.
 pub(super) fn note(
     verdict: &Verdict,
     margin_pct: f64,
@@ -70,8 +70,8 @@ pub(super) fn note(
     ))
 }
 
-/// Checks the margin of `limits` at each millisecond of the trajectory, with the values that the controller computes.
-/// Returns the joint that needs the slowest motion to keep it, or `None` if all joints keep it.
+/// Checks the margin of `limits` at each millisecond of the trajectory, with the values that the controller computes. Returns the joint
+/// that needs the slowest motion to respect the margin, or `None` if all joints respect it.
 pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics) -> Option<Excess> {
     let mut worst = None::<Excess>;
     let end = (trajectory.duration_s() * 1e3).round() as u32;

@@ -1,4 +1,4 @@
-//! The remainder of an interrupted trajectory, on the same path from a standstill to the end.
+//! Remainder of an interrupted trajectory, on the same path, from rest to the end.
 
 use jtc_core::{POINTS_MAX, SetPoint, interpolate};
 
@@ -6,9 +6,9 @@ use super::PlanError;
 use super::sampled::step_ms;
 use crate::trajectory::{Point, Trajectory};
 
-/// Returns the path from `from_ms` on. The motion accelerates from standstill in `ramp_s` seconds, then keeps the times of
-/// the trajectory. Its first point is the position of the path at `from_ms`, and its last point is the last one of the
-/// trajectory.
+/// Returns the part of the path that begins at the time `from_ms`. The motion starts at rest, reaches full speed after `ramp_s` seconds,
+/// and then follows the original timing of the trajectory. The first point of the result is the position of the path at `from_ms`, and the
+/// last point is the last point of the trajectory.
 ///
 /// # Errors
 ///
@@ -16,7 +16,7 @@ use crate::trajectory::{Point, Trajectory};
 pub fn remainder(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<Trajectory, PlanError> {
     let from_s = f64::from(from_ms) * 1e-3;
     let left = (trajectory.duration_s() - from_s).max(0.0);
-    // During the ramp the path time advances by half of the ramp's duration.
+    // During the ramp the path time advances by half of the ramp duration.
     let ramp = ramp_s.min(2.0 * left).max(1e-3);
     let seconds = left + 0.5 * ramp;
     let step_ms = step_ms(seconds)?;
@@ -41,8 +41,8 @@ pub fn remainder(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<T
     Ok(Trajectory { step_ms, points })
 }
 
-/// Returns the path time after `t` seconds, its rate, and the derivative of the rate. The rate rises from 0 to 1 in `ramp`
-/// seconds.
+/// Returns the path time after `t` seconds, the rate of the path time, and the derivative of this rate. The rate rises from 0 to 1 within
+/// `ramp` seconds.
 fn ramped(t: f64, ramp: f64) -> (f64, f64, f64) {
     let u = t / ramp;
     if u >= 1.0 {
@@ -75,7 +75,7 @@ mod tests {
         (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max)
     }
 
-    /// From any position, the remainder begins at rest, stays on the path, ends at its end, and passes the check.
+    /// From any position, the remainder begins at rest, stays on the path, ends at the end of the path, and passes the check.
     #[test]
     fn the_rest_begins_at_rest_and_stays_on_the_path() {
         let (whole, config) = (demo_motion(), Config::avena());
@@ -89,7 +89,7 @@ mod tests {
             assert!(verdict.is_ok(), "{from_ms}: {verdict}");
             for ms in (0..(rest.duration_s() * 1e3) as u32).step_by(7) {
                 let at = rest.at_ms(ms).unwrap().position;
-                // The test compares positions and ignores the path time.
+                // The test compares only the positions and ignores the path time.
                 let aside = (from_ms.saturating_sub(5)..=10_000)
                     .map(|k| near(&at, &whole.at_ms(k).unwrap().position));
                 let aside = aside.fold(f64::INFINITY, f64::min);

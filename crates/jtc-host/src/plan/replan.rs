@@ -7,24 +7,23 @@ use crate::plan::PlanError;
 use crate::trajectory::Trajectory;
 use crate::waypoints::thinned;
 
-/// Maximum distance of a dropped point from the leg between its neighbours, rad. Noise of encoders and of a guiding hand is
-/// smaller.
+/// Maximum distance of a dropped point from the segment between the neighbouring points, rad. The noise of encoders and of hand guidance is
+/// smaller than this distance.
 const THINNED: f64 = 0.005;
-/// Rounding of the corners between legs, rad.
+/// Blend of the corners between segments, rad.
 const BLEND: f64 = 0.02;
 
 impl Planner<'_> {
     /// Maximum deviation of the new motion from the path, in the joint with the largest deviation, rad.
     pub const ASIDE: f64 = THINNED + BLEND;
 
-    /// Plans a motion on the path of a trajectory, independent of the times of the trajectory. The motion is within the
-    /// limits, begins and ends at rest, deviates by at most [`Planner::ASIDE`], and is not faster than the original. The
-    /// method is meant for measured paths: their splines contain encoder noise, and their ends may be in motion.
+    /// Plans a motion on the path of a trajectory, independent of the timing of the trajectory. The motion is within the limits, begins and
+    /// ends at rest, deviates by at most [`Planner::ASIDE`], and is not faster than the original. The method is intended for measured
+    /// paths. Their splines contain encoder noise, and the arm may be moving at their ends.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Planner::through`]. The waypoint numbers in them refer to the points that remain after
-    /// thinning.
+    /// Returns the errors of [`Planner::through`]. The waypoint numbers in these errors refer to the points that remain after thinning.
     pub fn anew(&self, way: &Trajectory) -> Result<Planned, PlanError> {
         let positions: Vec<_> = way.points.iter().map(|point| point.position).collect();
         let place = |i: usize| positions.get(i).map(|q| Waypoint { position: *q, time: None });
@@ -34,7 +33,7 @@ impl Planner<'_> {
         if share < 1.0 {
             planned.trajectory = at_speed(&planned.trajectory, (100.0 * share).max(1.0))?;
             planned.waypoint_times.iter_mut().for_each(|t| *t /= share);
-            // The motion was slowed down to the duration of the original, so no limit binds it.
+            // The motion was slowed down to the duration of the original, so no limit determines its speed.
             planned.binding.clear();
         }
         Ok(planned)
@@ -50,7 +49,7 @@ mod tests {
     use crate::check::Checker;
     use crate::trajectory::fit::Samples;
 
-    /// Replans two motions on their paths: one at twice the velocity limit that is cut off in the middle, and a slow one.
+    /// Replans two motions on their paths: a motion at twice the velocity limit that ends abruptly in the middle, and a slow motion.
     #[test]
     fn a_way_that_is_too_fast_is_gone_within_the_limits() {
         let arm = Arm::avena();

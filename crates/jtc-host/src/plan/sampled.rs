@@ -1,4 +1,4 @@
-//! Sampling of a motion as a trajectory: points at a fixed step.
+//! Sampling of a motion as a trajectory with points at a fixed time step.
 
 use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate};
 use jtc_plan::{Motion, State};
@@ -6,27 +6,26 @@ use jtc_plan::{Motion, State};
 use super::{PlanError, STEP_MS};
 use crate::trajectory::{Point, Trajectory};
 
-/// Minimum number of steps of a motion, unless the step would be too short.
+/// Minimum number of steps of a motion, unless the steps would be too short.
 const STEPS_MIN: f64 = 20.0;
-/// Shortest step, ms. In a shorter step a position would change by less than its rounding.
+/// Shortest step, ms. Shortest step, ms. In a shorter step, a position would change by less than its rounding.
 const STEP_MIN_MS: f64 = 2.0;
 /// Longest step that a trajectory frame can contain, ms.
 const STEP_MAX_MS: f64 = 1000.0;
 /// Maximum deviation of a trajectory from the motion, between the points, rad.
 const ASIDE: f64 = 1e-3;
-/// Minimum number of points for each sharp corner. With fewer points the trajectory deviates more from the motion. A
-/// corner is sharp if it turns by more than the given share of the path, and its legs are longer than the given length
-/// (rad).
+/// Minimum number of points for each sharp corner. With fewer points the trajectory deviates more from the motion. A corner is sharp if the
+/// change of direction exceeds the given share, and its segments are longer than the given length (rad).
 const CORNER_POINTS: usize = 3;
 const CORNER_TURN: f64 = 0.5;
 const CORNER_LEG: f64 = 0.05;
-/// Number of positions checked in each interval.
+/// Number of positions that are checked in each interval.
 const PARTS: usize = 4;
 
-/// A motion as a trajectory.
+/// A motion in the form of a trajectory.
 pub(super) struct Sampled {
     pub trajectory: Trajectory,
-    /// Times of the trajectory, divided by times of the motion.
+    /// Ratio of the times in the trajectory to the times in the motion.
     pub scale: f64,
 }
 
@@ -34,7 +33,7 @@ pub(super) struct Sampled {
 ///
 /// # Errors
 ///
-/// [`PlanError::TooLong`] if the motion does not fit into the controller.
+/// [`PlanError::TooLong`] if the controller cannot store a motion of this duration.
 pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     let fits = (seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil();
     let short = (seconds * 1e3 / STEPS_MIN).floor().clamp(STEP_MIN_MS, f64::from(STEP_MS));
@@ -42,9 +41,9 @@ pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     if step <= STEP_MAX_MS { Ok(step as u16) } else { Err(PlanError::TooLong { seconds }) }
 }
 
-/// Samples the motion, stretched in time by `stretch`. A trajectory has a whole number of steps, so the motion is stretched
-/// further to fill the last step. If `kept` is set, the arm rests for the remainder of the last step instead. The first
-/// point is `first`, and the last one is exactly the end of the motion.
+/// Samples the motion after its time is stretched by the factor `stretch`. A trajectory has a whole number of steps, so the motion is
+/// stretched further to fill the last step. If `kept` is set, the motion is not stretched further, and the arm is at rest for the remainder
+/// of the last step. The first point is `first`, and the last point is exactly the end of the motion.
 ///
 /// # Errors
 ///
@@ -64,8 +63,8 @@ pub(super) fn sampled(
     let rest = Point { position: end.position, ..Point::default() };
     let at = |t: f64| slowed(&motion.at(t / scale), scale);
     let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
-    // Both ends are exactly the requested positions. If the acceleration jumps at the start, either side of the jump is
-    // correct.
+    // Both ends are exactly the requested positions. If the acceleration jumps at the start, the value before and the value after the jump
+    // are both correct.
     if let Some(point) = points.first_mut() {
         (point.position, point.velocity) = (*first, [0.0; JOINTS]);
     }
@@ -115,7 +114,7 @@ fn slowed(state: &State, scale: f64) -> Point {
     }
 }
 
-/// Returns the largest deviation between the controller's curve and the motion, between the points, rad.
+/// Returns the largest deviation between the curve of the controller and the motion, measured between the points, rad.
 fn aside(points: &[Point], h: f64, at: impl Fn(f64) -> Point) -> f64 {
     let mut most = 0.0f64;
     for (i, pair) in points.windows(2).enumerate() {

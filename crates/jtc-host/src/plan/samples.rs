@@ -1,4 +1,4 @@
-//! A plan in the form of the samples that its run would record, as far as they are known in advance.
+//! Samples of a plan, like the samples that its execution would record, as far as they are known in advance.
 
 use jtc_core::JOINTS;
 use jtc_dynamics::Dynamics;
@@ -10,8 +10,8 @@ use crate::sample::{JointSample, Sample};
 use crate::trajectory::{Point, Trajectory};
 
 impl Planner<'_> {
-    /// Returns the commanded values at each point of a trajectory, with the model torques, and with friction at the
-    /// planner's temperature. Measured values are unknown.
+    /// Returns the commanded values at each point of a trajectory, with the torques of the model and the friction at the temperature of the
+    /// planner. Measured values are unknown.
     pub fn samples(&self, trajectory: &Trajectory) -> Vec<Sample> {
         let dynamics =
             self.model.map(|model| Dynamics::with_payload(model, self.config.gravity, &self.config.payload));

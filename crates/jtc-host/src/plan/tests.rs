@@ -1,4 +1,4 @@
-//! Every plan passes the check, and impossible motions are rejected with the reason.
+//! Tests that every plan passes the check, and that impossible motions are rejected with the reason.
 
 use host_kit::{Diagnose, ErrorKind};
 use jtc_core::{POINTS_MAX, SetPoint};
@@ -32,8 +32,8 @@ proptest! {
         prop_assert!(plan.points.len() <= POINTS_MAX);
     }
 
-    /// The plans use torques, friction and stopping distance. If the arm cannot be held, or cannot be stopped at any speed,
-    /// an error says so.
+    /// The plans consider torques, friction and stopping distance. If the arm cannot be held, or cannot be stopped at any speed, the
+    /// planner returns an error with this reason.
     #[test]
     fn plans_of_an_arm_pass_its_check(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.3f64, jerk: bool) {
         let arm = Arm::avena();
@@ -72,7 +72,7 @@ fn a_target_outside_the_limits_is_refused() {
     }
 }
 
-/// An arm without brakes has fallen to an end stop outside its limits. A motion leads back inside.
+/// An arm without brakes has fallen onto an end stop outside its position limits. A planned motion moves the arm back inside the limits.
 #[test]
 fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     let arm = Arm::avena();
@@ -104,7 +104,7 @@ fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     }
 }
 
-/// An int16 file rounds 1.57 rad up to the position number 16 376, which is 1.570077 rad.
+/// An int16 file rounds 1.57 rad up to the raw position 16 376, which is 1.570077 rad.
 #[test]
 fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     let config = Config::avena();
@@ -116,7 +116,7 @@ fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     }
 }
 
-/// Like a move, an approach to a trajectory begins at the nearest position inside.
+/// Like a move, an approach to a trajectory begins at the nearest position inside the limits.
 #[test]
 fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let arm = Arm::avena();
@@ -131,11 +131,11 @@ fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let points = &start.checked.trajectory().points;
     assert_eq!(points[0].position, [0.0, 1.57, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(points.last().unwrap().position, t.points[0].position);
-    // From beyond the start tolerance only a jog leads back.
+    // From a position outside the start tolerance, only a jog can move the arm back.
     assert!(order.start(1, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0]).is_err());
 }
 
-/// A motion whose torque would be too high is planned slower.
+/// A motion whose torque would be too high is planned at a lower speed.
 #[test]
 fn moves_slow_down_for_torque() {
     let arm = Arm::avena();
@@ -153,7 +153,7 @@ fn moves_slow_down_for_torque() {
     assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
 }
 
-/// Long and slow motions have longer steps. The limit is the capacity of the controller.
+/// Long and slow motions have longer time steps. The duration is limited by the memory of the controller.
 #[test]
 fn any_length_fits_or_is_refused() {
     let config = Config::avena();
@@ -169,7 +169,7 @@ fn any_length_fits_or_is_refused() {
     assert!(matches!(error, PlanError::TooManyCorners { .. }), "{error}");
 }
 
-/// Times of waypoints are kept, or rejected with the shortest possible time.
+/// The planner respects the times of waypoints, or rejects them with the shortest possible time.
 #[test]
 fn given_times_are_kept_or_refused() {
     let config = Config::avena();
@@ -196,8 +196,8 @@ fn lowered_with(mass: f64) -> Result<Planned, PlanError> {
     planner.through(&waypoints(&places))
 }
 
-/// A pose that needs the whole torque limit to be held and left can be planned, although plans use less of the limit
-/// elsewhere.
+/// The planner accepts a pose even if holding and leaving it needs the whole torque limit, although plans otherwise use a smaller part of
+/// the limit.
 #[test]
 fn a_pose_that_can_be_held_can_be_left() {
     let (arm, mut masses) = (Arm::avena(), 0);
@@ -219,7 +219,7 @@ fn a_pose_that_can_be_held_can_be_left() {
     assert!(masses > 0);
 }
 
-/// The error contains the waypoint that cannot be held, its torque, and the share of the limit that holding may use.
+/// The error contains the waypoint that cannot be held, its torque, and the share of the limit that may be used to hold the arm.
 #[test]
 fn too_much_payload_names_the_pose_that_cannot_be_held() {
     let error = lowered_with(8.0).unwrap_err();
@@ -248,8 +248,8 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
-/// A motion that is too long even at the highest speed is rejected before planning. So the planner does not find that the
-/// last pose cannot be held. Waypoints in degrees are reported as such.
+/// A motion that is too long even at the highest speed is rejected before planning. So the planner does not reach the check that the last
+/// pose can be held. Waypoints that are probably in degrees are reported as waypoints in degrees.
 #[test]
 fn too_long_a_way_is_refused_at_once() {
     let arm = Arm::avena();
@@ -271,7 +271,7 @@ fn too_long_a_way_is_refused_at_once() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// The lower bound of the time is not longer than the plan, even if most waypoints lie within a blend.
+    /// The lower bound of the duration never exceeds the duration of the plan, even if most waypoints are inside a blend.
     #[test]
     fn no_plan_is_shorter_than_the_least_time(places in prop::collection::vec(pose(), 2..20), dense: bool, blend in 0.0..BLEND_MAX, speed in 20.0..100.0f64) {
         let config = Config::avena();
@@ -284,8 +284,7 @@ proptest! {
         prop_assert!(least <= planned.trajectory.duration_s(), "{least} s");
     }
 
-    /// Even without a jerk limit, the position that the controller computes between the points (J-32) keeps the
-    /// acceleration limit.
+    /// Even without a jerk limit, the position that the controller computes between the points (J-32) respects the acceleration limit.
     #[test]
     fn j32_the_position_between_points_keeps_the_acceleration(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.2f64, jerk: bool) {
         let config = Config::avena();

@@ -1,26 +1,26 @@
-//! Path through the waypoints of a file. The path goes through joint positions, or along lines and arcs of the flange.
+//! Path through the waypoints of a file. The path consists of joint positions, or of lines and arcs of the flange.
 
 use super::kinematics::Route;
 use super::{Aside, PlanError, Planned, Planner, Waypoint, corners, furthest_aside};
 use crate::arm::Arm;
 use crate::waypoints::{WaypointError, WaypointFile};
 
-/// A larger deviation of the flange from a straight line is reported, m.
+/// Deviation of the flange from a straight line (m) above which a note is written.
 const ASIDE_M: f64 = 5e-4;
 
 /// Options for the path through waypoints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WayOptions {
-    /// If `true`, the flange moves on a straight line on each leg for which the file does not specify the motion.
+    /// If `true`, the flange moves on a straight line in each segment for which the file does not specify the motion.
     pub line: bool,
-    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. With 0 the arm stops at each
+    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. If this value is 0, the arm stops at each
     /// waypoint.
     pub blend: f64,
-    /// Rounding of the corner between two lines or arcs, m. With 0 the arm stops there.
+    /// Rounding of the corner between two lines or arcs, m. If this value is 0, the arm stops at each of these corners.
     pub blend_m: f64,
 }
 
-/// Path of a plan.
+/// Path that is planned.
 #[derive(Debug)]
 pub struct WaypointPath<'a> {
     file: &'a WaypointFile,
@@ -46,7 +46,7 @@ impl<'a> WaypointPath<'a> {
         corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
-            // A stop is within every blend. Near a sharp corner it may be faster than a small blend, so both routes are
+            // A stop at a waypoint satisfies every blend. At a sharp corner, a stop may be faster than a small blend, so both routes are
             // planned.
             let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
             Course::Lines([rounded].into_iter().chain(sharp).collect(), times)
@@ -56,7 +56,7 @@ impl<'a> WaypointPath<'a> {
         Ok(Self { file, options, course })
     }
 
-    /// Returns `true` if the flange moves on a line or an arc on any leg.
+    /// Returns `true` if the flange moves along a line or an arc in any segment.
     pub fn has_lines(&self) -> bool {
         matches!(self.course, Course::Lines(..))
     }
@@ -84,9 +84,10 @@ impl<'a> WaypointPath<'a> {
         fastest.unwrap_or(Err(PlanError::Nowhere { count: 0 }))
     }
 
-    /// Returns the largest deviation of the flange from the straight line between two of its poses, if above 0.5 mm.
+    /// Returns the largest deviation of the flange from the straight line between two poses of the flange, if the deviation is above 0.5
+    /// mm.
     pub fn off_the_line(&self, planned: &Planned, arm: &Arm) -> Option<Aside> {
-        // With the option `line`, the user has chosen joint space for each remaining leg.
+        // If the option `line` is set, the user has explicitly selected joint space for each remaining segment.
         let legs = if self.options.line { Vec::new() } else { self.file.legs_between_flange_poses() };
         furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)
     }

@@ -1,5 +1,5 @@
-//! Little-endian CDR, the encoding of ROS 2 messages. Each value is aligned to its size, and offsets begin after the 4-byte
-//! header.
+//! Encoder and decoder for little-endian CDR, the encoding of ROS 2 messages. Each value is aligned to its size, and offsets begin after
+//! the 4-byte header.
 
 /// Encoder of a message.
 #[derive(Default)]
@@ -10,7 +10,7 @@ pub(super) struct Encoder {
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
 impl Encoder {
-    /// Starts a message, reusing the memory of the previous one.
+    /// Starts a message, and reuses the memory of the previous message.
     pub(super) fn start(&mut self) -> &mut Self {
         self.bytes.clear();
         self.bytes.extend(HEADER);
@@ -56,13 +56,13 @@ impl Encoder {
         self.u8(0)
     }
 
-    /// Writes a sequence: its length, then its values.
+    /// Writes a sequence as its length followed by its values.
     pub(super) fn f64s(&mut self, values: [f64; 6]) -> &mut Self {
         self.u32(6);
         self.array(values)
     }
 
-    /// Writes a fixed-length array: values only.
+    /// Writes a fixed-length array, which consists only of its values.
     pub(super) fn array(&mut self, values: [f64; 6]) -> &mut Self {
         for v in values {
             self.f64(v);
@@ -83,7 +83,7 @@ pub(super) struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// Creates a decoder. Returns `None` unless the message is little-endian CDR.
+    /// Creates a decoder. Creates a decoder. Returns `None` if the message is not little-endian CDR.
     pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
         let body = bytes.strip_prefix(&HEADER[..2])?.get(2..)?;
         Some(Self { body, at: 0 })

@@ -1,6 +1,6 @@
-//! CSV files: a header with units, then one row per sample. An unknown value is an empty field. If a run was not finished,
-//! comment lines that begin with `#` report how it ended. These lines follow after all rows, so that a reader without
-//! support for comments still gets the whole table.
+//! CSV files with a header that contains the units, followed by one row per sample. An unknown value is an empty field. If a run did not
+//! finish, comment lines that begin with `#` report how the run ended. These lines follow after all rows, so that a reader without support
+//! for comments can still read the whole table.
 
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use jtc_wire::{Code, NodeState};
 use super::{Ending, Found, RecordingError, Writer};
 use crate::sample::{JointSample, Sample};
 
-/// A value of a joint: column name after `q1_` and so on, and its accessor.
+/// Value of a joint: column name after the prefix (`q1_` and so on), and accessor.
 type Column = (&'static str, fn(&mut JointSample) -> &mut f64);
 
 const COLUMNS: [Column; 13] = [
@@ -32,7 +32,7 @@ const COLUMNS: [Column; 13] = [
 
 const SAMPLE_COLUMNS: [&str; 6] = ["time_s", "state", "tes", "point", "errors", "can_current"];
 
-/// Prefixes of the comments at the end.
+/// Prefixes of the comments at the end of the file.
 const OUTCOME: &str = "# outcome: ";
 const REASON: &str = "# reason: ";
 const LOST: &str = "# lost samples: ";
@@ -107,7 +107,7 @@ impl<W: Write + Send> Writer for CsvWriter<W> {
     }
 }
 
-/// Formats a number with nine decimals. This is 1 nrad, far below the resolution of any sensor, and needs half the space of
+/// Formats a number with nine decimals. The resolution of 1 nrad is far below that of any sensor, and needs half the space of a number with
 /// all digits.
 fn number(row: &mut String, value: f64) {
     use std::fmt::Write as _;
@@ -117,7 +117,7 @@ fn number(row: &mut String, value: f64) {
     }
 }
 
-/// Maximum length of a line, bytes. The lines of the writer have about 1,500 bytes.
+/// Maximum length of a line, bytes. The lines that this program writes have about 1,500 bytes.
 const LINE_MAX: u64 = 1 << 20;
 
 /// Destination of the values of a column.
@@ -129,7 +129,7 @@ enum Target {
     Point,
     Errors,
     CanCurrent,
-    /// Joint, and index into [`COLUMNS`].
+    /// Value of a joint: index of the joint, and index into [`COLUMNS`].
     Value(usize, usize),
     Node(usize),
     Internal(usize),
@@ -186,8 +186,8 @@ fn whole<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
 
-/// Parses a number like [`str::parse`], but faster for short numbers such as those of the writer. If a float can hold both
-/// the digits and the power of ten exactly, the quotient is rounded only once, so it is correct (Clinger 1990).
+/// Parses a number like [`str::parse`], but faster for short numbers such as the numbers that this program writes. If the digits and the
+/// power of ten are exact as floats, the quotient is rounded only once and is therefore correct (Clinger 1990).
 fn decimal(field: &[u8]) -> Option<f64> {
     const POWERS: [f64; 16] =
         [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
@@ -196,7 +196,7 @@ fn decimal(field: &[u8]) -> Option<f64> {
         digits => (false, digits),
     };
     let (mut number, mut decimals) = (0_u64, None);
-    // 15 digits are below 2⁵³.
+    // Numbers of 15 digits are below 2⁵³, so a float represents them exactly.
     if digits.len() <= 16 && digits.first().is_some_and(u8::is_ascii_digit) {
         for (i, byte) in digits.iter().enumerate() {
             match byte {
@@ -221,8 +221,7 @@ struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// Returns the next line without its line end, and `true` if the line end was present. Returns `None` after the last
-    /// line.
+    /// Returns the next line without the line ending, and `true` if the line ending was present. Returns `None` after the last line.
     fn next(&mut self) -> Result<Option<(&[u8], bool)>, RecordingError> {
         self.line.clear();
         self.number += 1;
@@ -240,7 +239,7 @@ fn failure(line: usize, column: Option<&str>, problem: &'static str) -> Recordin
     RecordingError::Line { path: PathBuf::new(), line, column: column.map(str::to_owned), problem }
 }
 
-/// Reads the rows in order. The columns may be in any order. Unknown columns are ignored, and values of missing columns are
+/// Reads the rows in the order of the file. The columns may be in any order. Unknown columns are ignored, and values of missing columns are
 /// unknown.
 pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<Found, RecordingError> {
     let mut lines = Lines { file, line: Vec::new(), number: 0 };
@@ -258,7 +257,7 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
     while let Some((row, ended)) = lines.next()? {
         let row = row.trim_ascii();
         if !ended {
-            // A line without a line end was not written completely.
+            // A line without a line ending was not written completely.
             within_line = !row.is_empty();
             break;
         }
@@ -292,7 +291,7 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
     Ok(Found { info: None, ending, cut: cut.map(str::to_owned) })
 }
 
-/// Reads how the run ended, from a comment.
+/// Reads the reason for the end of the run from a comment.
 fn take_comment(ending: &mut Ending, row: &str) {
     for (head, value) in [(OUTCOME, &mut ending.outcome), (REASON, &mut ending.reason)] {
         if let Some(text) = row.strip_prefix(head) {

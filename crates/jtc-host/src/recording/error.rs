@@ -45,10 +45,10 @@ pub enum RecordingError {
     Mcap {
         /// The file.
         path: PathBuf,
-        /// Problem that the reader found.
+        /// Description of the problem.
         problem: String,
     },
-    /// The messages of an MCAP file are far out of the order of their times.
+    /// The messages of an MCAP file are far out of time order.
     Disorder {
         /// The file.
         path: PathBuf,
@@ -71,7 +71,7 @@ impl RecordingError {
         RecordingError::Io { path: path.to_owned(), source }
     }
 
-    /// Returns the error with the path of the file set.
+    /// Adds the path of the file to the error.
     pub(super) fn at(mut self, file: &Path) -> Self {
         let (RecordingError::UnknownFormat { path }
         | RecordingError::BuiltWithout { path }

@@ -1,16 +1,16 @@
-//! Poses of the arm's links as transforms for viewers: the frame of each joint in its parent frame. The names are those of
-//! the description.
+//! Poses of the arm's links as transforms for viewers. Each transform gives the frame of a joint in its parent frame. The frame names are
+//! the names in the robot description.
 
 use super::RecordingInfo;
 use super::cdr::Encoder;
 use crate::arm::frame_name;
 use crate::sample::Sample;
 
-/// Length of the intervals of time with at most one message of transforms each, ns. The intervals correspond to the
-/// display rate of a viewer.
+/// Length of a time interval in which at most one message with transforms is written, ns. The interval corresponds to the display rate of a
+/// viewer.
 const EVERY_NS: u64 = 20_000_000;
 
-/// A rotation as a unit quaternion: x, y, z, w.
+/// Rotation as a unit quaternion in the order x, y, z, w.
 type Quaternion = [f64; 4];
 
 /// Returns the rotation `b` followed by `a`.
@@ -37,7 +37,7 @@ fn from_rpy([roll, pitch, yaw]: [f64; 3]) -> Quaternion {
     product(about(2, yaw), product(about(1, pitch), about(0, roll)))
 }
 
-/// Frame with its pose in the parent frame.
+/// Frame with the pose in its parent frame.
 struct Placed {
     xyz: [f64; 3],
     rotation: Quaternion,
@@ -47,7 +47,7 @@ struct Placed {
 
 /// Writer of `tf2_msgs/msg/TFMessage`.
 pub(super) struct Frames {
-    /// The frames of the six joints, and of the flange, which is fixed.
+    /// Frames of the six joints, followed by the frame of the fixed flange.
     placed: [Placed; 7],
     last: Option<u64>,
 }
@@ -67,7 +67,8 @@ impl Frames {
         Self { placed: std::array::from_fn(placed), last: None }
     }
 
-    /// Writes the message of a sample if one is due. Leaves out joints whose position is unknown.
+    /// Writes the message with the transforms of a sample if the interval has passed. The message does not contain joints whose position is
+    /// unknown.
     pub(super) fn write<'a>(
         &mut self,
         cdr: &'a mut Encoder,
@@ -81,7 +82,7 @@ impl Frames {
             return None;
         }
         self.last = Some(turn);
-        // The flange does not move relative to its parent, so its pose is always known.
+        // The flange does not move relative to its parent frame, so its pose is always known.
         cdr.start().u32(known as u32 + 1);
         for (i, placed) in self.placed.iter().enumerate().filter(|(i, _)| position(*i).is_finite()) {
             cdr.header(stamp_ns, &placed.parent).string(&placed.child);

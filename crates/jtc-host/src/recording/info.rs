@@ -1,4 +1,4 @@
-//! Header of a recording: the arm, its limits, and the source of the samples.
+//! Header of a recording, with the arm, the limits, and the source of the samples.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::{Arm, Trajectory};
 /// Name and limits of a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointInfo {
-    /// Name as in the arm file.
+    /// Name of the joint as in the arm file.
     pub name: String,
     /// Minimum position, rad.
     pub position_min_rad: f64,
@@ -22,7 +22,7 @@ pub struct JointInfo {
     pub torque_max_nm: f64,
     /// Maximum tracking error, rad.
     pub position_error_max_rad: f64,
-    /// Origin of the joint in its parent's frame: x, y, z in m, then roll, pitch, yaw in rad.
+    /// Origin of the joint in the parent frame: x, y, z in m, followed by roll, pitch, yaw in rad.
     pub origin: [f64; 6],
 }
 
@@ -40,14 +40,14 @@ impl Default for JointInfo {
     }
 }
 
-/// How the recorded run ended. Empty if the recording does not contain it.
+/// Reason for the end of the recorded run. The fields are empty if the recording does not contain the reason.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ending {
-    /// `finished`, `stopped` or `fault`.
+    /// Result of the run: `finished`, `stopped` or `fault`.
     pub outcome: String,
-    /// Reason why the run did not reach its end, as text.
+    /// Text with the reason why the run did not reach its end.
     pub reason: String,
-    /// Number of samples lost because the disk was too slow.
+    /// Number of samples that were lost because the disk was too slow.
     pub lost_samples: u64,
 }
 
@@ -58,7 +58,7 @@ impl Ending {
     }
 }
 
-/// Identity of the device that the samples come from.
+/// Identity of the device that sent the samples.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceIdentity {
     /// Board.
@@ -79,12 +79,12 @@ impl From<&Info> for DeviceIdentity {
     }
 }
 
-/// Source and context of the samples.
+/// Source of the samples, and data about the arm and the run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordingInfo {
     /// Name of the arm.
     pub arm: String,
-    /// "simulator", or the serial port.
+    /// Source of the samples: "simulator", or the name of the serial port.
     pub source: String,
     /// Client that commanded the motion, if several clients share the line. Otherwise empty.
     pub commanded_by: String,
@@ -92,31 +92,32 @@ pub struct RecordingInfo {
     pub trajectory: String,
     /// Wall-clock time of sample time 0, ns since 1970; 0 for a recording in virtual time.
     pub start_unix_ns: u64,
-    /// Joints, base to wrist.
+    /// Names and limits of the joints, base to wrist.
     pub joints: [JointInfo; 6],
-    /// Origin of the flange in the last joint's frame, as in [`JointInfo::origin`].
+    /// Origin of the flange in the frame of the last joint, as in [`JointInfo::origin`].
     pub flange: [f64; 6],
-    /// Robot description (URDF) of the arm, in MCAP files. If it is present, the file also contains the poses of the links.
+    /// Robot description (URDF) of the arm; only in MCAP files. If the description is present, the file also contains the poses of the
+    /// links.
     pub description: Option<Arc<str>>,
-    /// Gains, base to wrist, in MCAP files.
+    /// Gains of the joints, base to wrist; only in MCAP files.
     pub gains: Option<[PidGains; JOINTS]>,
-    /// Hash of all parameters that determine the arm's motion (J-52), in MCAP files.
+    /// Hash of all parameters that determine the arm's motion (J-52); only in MCAP files.
     pub hash: Option<u64>,
-    /// Controller, in MCAP files; `None` if it did not report its identity.
+    /// Identity of the controller, only in MCAP files; `None` if the controller did not report its identity.
     pub device: Option<DeviceIdentity>,
-    /// End of the run.
+    /// Reason for the end of the run.
     pub ending: Ending,
-    /// Complete trajectory of the run, in MCAP files. The trajectory is needed to resume an interrupted run.
+    /// Complete trajectory of the run; only in MCAP files. The trajectory is necessary to resume an interrupted run.
     pub commanded: Option<Arc<Trajectory>>,
-    /// Number of runs that the user requested, including the first, in MCAP files. `None` if not recorded.
+    /// Number of runs that the user requested, including the first run; only in MCAP files. `None` if the number was not recorded.
     pub runs: Option<u32>,
-    /// Trajectory of all runs except the first, if it differs from `commanded`. The first run was then the remainder of a
-    /// run.
+    /// Trajectory of all runs except the first run, if it differs from `commanded`. In this case the first run was the remainder of an
+    /// interrupted run.
     pub then: Option<Arc<Trajectory>>,
 }
 
 impl RecordingInfo {
-    /// Returns names, limits, gains and frames of an arm. Source, trajectory, start time and ending are empty.
+    /// Returns the header with the names, limits, gains and frames of an arm. The source, trajectory, start time and ending stay empty.
     pub fn of(arm: &Arm) -> Self {
         let origin = |i: usize| {
             let o = &arm.model.joints[i];
@@ -142,7 +143,7 @@ impl RecordingInfo {
         }
     }
 
-    /// Returns the name of joint `j`, or `joint_1` and so on if it has none.
+    /// Returns the name of joint `j`, or `joint_1` and so on if the joint does not have a name.
     pub fn joint_name(&self, j: usize) -> String {
         match self.joints.get(j) {
             Some(joint) if !joint.name.is_empty() => joint.name.clone(),

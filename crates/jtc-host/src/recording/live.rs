@@ -1,6 +1,6 @@
-//! Recording that is written during the run, so that a killed program loses only the last moments.
+//! Recording that is written during the run, so that only the last samples are lost if the program is killed.
 //!
-//! A separate thread writes the file. So a slow or full disk does not delay the caller.
+//! A separate thread writes the file. Therefore a slow or full disk does not delay the caller.
 
 use std::fs::File;
 use std::path::Path;
@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 use super::{Ending, Recorder, RecordingError, RecordingInfo};
 use crate::sample::Sample;
 
-/// Maximum delay until recorded samples are written to the operating system.
+/// Maximum delay until recorded samples are passed to the operating system.
 pub const FLUSH: Duration = Duration::from_millis(200);
-/// Maximum number of samples that wait for the disk. This is 16 s of a simulator, or many minutes of a serial line.
+/// Maximum number of samples that wait to be written to the disk. This number corresponds to 16 s with a simulator, or to many minutes on a
+/// serial line.
 const WAITING_MAX: usize = 1 << 14;
 
 enum Message {
@@ -22,12 +23,12 @@ enum Message {
     Abandon,
 }
 
-/// Receiver of samples during the run.
+/// Receiver for the samples during a run.
 #[derive(Clone)]
 pub struct SampleSink(SyncSender<Message>);
 
 impl SampleSink {
-    /// Passes a sample to the recorder. After an error, which was reported when it occurred, samples are dropped.
+    /// Passes a sample to the recorder. After an error, which the recorder has already reported, further samples are ignored.
     pub fn write(&self, sample: &Sample) {
         let _ = self.0.send(Message::Sample(Box::new(*sample)));
     }
@@ -40,8 +41,8 @@ pub struct LiveRecorder {
 }
 
 impl LiveRecorder {
-    /// Writes the header, so that an error of the disk is reported here. The extension of `path` selects the format. The
-    /// writing thread calls `on_error` once, as soon as writing fails.
+    /// Creates the file and writes the header, so that this function reports an error of the disk. The extension of `path` selects the
+    /// format. If writing fails, the writing thread calls `on_error` once.
     pub fn begin(
         file: File,
         path: &Path,
@@ -64,7 +65,7 @@ impl LiveRecorder {
         self.sink.clone()
     }
 
-    /// Completes the file with the ending of the run. Returns the number of samples, or an error if the file is incomplete.
+    /// Writes the ending of the run and completes the file. Returns the number of samples, or an error if the file is incomplete.
     pub fn finish(self, ending: &Ending) -> Result<u64, RecordingError> {
         self.end(Message::End(ending.clone()))
     }
@@ -80,7 +81,7 @@ impl LiveRecorder {
     }
 }
 
-/// Writes until the end message arrives.
+/// Writes samples until the end message arrives.
 fn write(mut recorder: Recorder, messages: &Receiver<Message>) -> Result<u64, RecordingError> {
     let (mut due, mut fresh) = (Instant::now() + FLUSH, false);
     loop {
@@ -120,8 +121,7 @@ mod tests {
         }
     }
 
-    /// The recording is never ended. As after `kill -9`, the file contains only the data that were passed to the operating
-    /// system.
+    /// The test never ends the recording. As after `kill -9`, the file contains only the data that were passed to the operating system.
     #[test]
     fn what_was_recorded_is_readable_while_it_goes_on() {
         let dir = tempfile::tempdir().unwrap();
@@ -138,7 +138,7 @@ mod tests {
             assert!(whole, "{name}: {:?}", Recording::read(&path).map(|r| r.samples.len()));
             let read = Recording::read(&path).unwrap();
             assert!(read.cut.unwrap().contains("0.149 s"), "{name}");
-            // A sink that an observer still holds does not keep the recording open.
+            // The recording can be completed even if an observer still has a sink.
             let ending = Ending { outcome: "stopped".into(), reason: "by hand".into(), ..Ending::default() };
             assert_eq!(live.finish(&ending).unwrap(), 150);
             let read = Recording::read(&path).unwrap();

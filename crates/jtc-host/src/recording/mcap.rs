@@ -1,4 +1,4 @@
-//! MCAP files with ROS 2 schemas, in CDR.
+//! MCAP files with ROS 2 schemas and CDR encoding.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
@@ -24,9 +24,9 @@ const METADATA: &str = "openjtc";
 const END: &str = "openjtc_end";
 /// Topic of a flight recorder log, with the bytes that were fetched from the device (J-56).
 const LOG_TOPIC: &str = "/jtc/log";
-/// Topic of the executed trajectory, in the form of 19 columns of integers without a header.
+/// Topic of the executed trajectory, as a table with 19 columns of integers and without a header.
 const TRAJECTORY_TOPIC: &str = "/jtc/trajectory";
-/// Topic of the trajectory of the later runs, in the same form.
+/// Topic of the trajectory of the later runs, in the same format as the executed trajectory.
 const THEN_TOPIC: &str = "/jtc/trajectory_then";
 
 impl From<McapError> for RecordingError {
@@ -38,12 +38,12 @@ impl From<McapError> for RecordingError {
     }
 }
 
-/// Topic of the arm's robot description, at the beginning.
+/// Topic of the robot description, which is written at the beginning of the file.
 const DESCRIPTION_TOPIC: &str = "/robot_description";
 /// Topic of the poses of the links.
 const TRANSFORMS_TOPIC: &str = "/tf";
 
-/// Writer of samples. Each sample is written as four messages.
+/// Writer of samples. Writer of MCAP files, which writes each sample as four messages.
 pub(super) struct McapWriter<W: Write + Seek> {
     out: mcap::Writer<W>,
     states: u16,
@@ -52,7 +52,7 @@ pub(super) struct McapWriter<W: Write + Seek> {
     state: u16,
     names: Vec<String>,
     start_ns: u64,
-    /// Frames of the arm and their channel, if the arm is known.
+    /// Frames of the arm and the channel of the transforms, if the arm is known.
     frames: Option<(Frames, u16)>,
     sequence: u32,
     cdr: Encoder,
@@ -103,7 +103,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Writes a robot description in the form that robot viewers read.
+/// Writes a robot description in the format that robot viewers read.
 fn describe<W: Write + Seek>(
     out: &mut mcap::Writer<W>,
     description: &str,
@@ -131,7 +131,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Returns the flight recorder log in a file. `None` if the file contains no log.
+/// Returns the flight recorder log in a file. Returns `None` if the file does not contain a log.
 pub(super) fn read_log(file: impl Read) -> Result<Option<Vec<u8>>, RecordingError> {
     let (mut channel, mut log) = (None, None);
     let read = each_record(file, |record| {
@@ -196,13 +196,13 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
     }
 }
 
-/// Topics of a sample. Each has a bit in the mask of received messages.
+/// Topics of the messages of a sample. Each topic has a bit in the mask of received messages.
 const SAMPLE_TOPICS: [&str; 4] = [STATES_TOPIC, COMMANDS_TOPIC, CONTROL_TOPIC, STATE_TOPIC];
 
-/// Content of a channel of a file.
+/// Content of one channel of an MCAP file.
 #[derive(Clone, Copy)]
 enum Carries {
-    /// Messages of samples. The number is the index into [`SAMPLE_TOPICS`].
+    /// Messages of samples. Part of a sample; the number is the index into [`SAMPLE_TOPICS`].
     Sample(u8),
     Trajectory,
     Then,
@@ -222,7 +222,7 @@ impl Carries {
     }
 }
 
-/// Returns the header of a file. `None` if the file is truncated before the header.
+/// Returns the header of a file. Returns `None` if the file is truncated before the header.
 ///
 /// The whole file is searched, because a program that rewrote the file may have moved the header to the end.
 pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
@@ -230,7 +230,7 @@ pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     let mut see = |record: records::Record<'_>| match record {
         records::Record::Metadata(metadata) if metadata.name == METADATA => {
             info = Some(RecordingInfo::from_map(&metadata.metadata));
-            // The header was found, and the error ends the search.
+            // The header was found, and this error value ends the search.
             Err(RecordingError::Empty { path: PathBuf::new() })
         }
         _ => Ok(()),
@@ -239,9 +239,8 @@ pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     info
 }
 
-/// Reads the output of [`McapWriter`] up to the first damage. Ignores messages of other topics. Passes the samples to `see`
-/// in the order of their times. Up to `room` samples wait for messages that follow later in the file. `info` is the result
-/// of [`read_info`].
+/// Reads a file that [`McapWriter`] wrote, up to the first damage. Messages of other topics are ignored. Calls `see` with each sample in
+/// time order. Up to `room` samples wait for messages that follow later in the file. `info` is the result of [`read_info`].
 pub(super) fn scan(
     file: impl Read,
     mut info: Option<RecordingInfo>,

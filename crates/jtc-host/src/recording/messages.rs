@@ -1,5 +1,5 @@
-//! Messages about an arm, in CDR with ROS 2 schemas. The messages are used in recordings, and live for viewers that can
-//! also show recordings.
+//! Messages about an arm, with ROS 2 schemas and CDR encoding. The messages are used in recordings, and for the live display in viewers
+//! that can also show recordings.
 
 use super::cdr::Encoder;
 use super::frames::Frames;
@@ -23,11 +23,11 @@ pub enum Topic {
     States,
     /// Commanded joint values.
     Commands,
-    /// Parts of the control law.
+    /// Torque parts of the control law.
     Control,
-    /// State, error words and point of the trajectory.
+    /// Controller state, error words and point index of the trajectory.
     State,
-    /// Robot description (URDF) of the arm. The description does not change.
+    /// Robot description (URDF) of the arm. The description does not change during a run.
     Description,
     /// Poses of the arm's links.
     Transforms,
@@ -81,12 +81,12 @@ pub(super) fn measured(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.position), j.map(|j| j.velocity), j.map(|j| j.torque)]
 }
 
-/// Returns the commanded values. The effort is the torque of the model; feedback and friction compensation are added to it.
+/// Returns the commanded values. The effort is the torque of the model, to which feedback and friction compensation are added.
 pub(super) fn commanded(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.set_position), j.map(|j| j.set_velocity), j.map(|j| j.torque_model)]
 }
 
-/// Writes the parts of the control law.
+/// Writes the torque parts of the control law.
 pub(super) fn control(cdr: &mut Encoder, stamp_ns: u64, j: &[JointSample; 6]) {
     cdr.start()
         .header(stamp_ns, "")
@@ -101,7 +101,7 @@ pub(super) fn control(cdr: &mut Encoder, stamp_ns: u64, j: &[JointSample; 6]) {
         .array(j.map(|j| j.temperature));
 }
 
-/// Writes states, error words and the point.
+/// Writes the states, the error words and the point index.
 pub(super) fn state(cdr: &mut Encoder, stamp_ns: u64, s: &Sample) {
     cdr.start()
         .header(stamp_ns, "")
@@ -138,8 +138,8 @@ impl MessageWriter {
         }
     }
 
-    /// Returns the message of a sample at a time (ns since 1970). Returns `None` if the sample has no data for the topic,
-    /// or if transforms were already written in the same 20 ms of time.
+    /// Returns the message of `topic` for a sample at the time `stamp_ns` (ns since 1970). Returns `None` if the sample has no data for the
+    /// topic, or if transforms were already written in the same interval of 20 ms.
     pub fn write(&mut self, topic: Topic, stamp_ns: u64, sample: &Sample) -> Option<&[u8]> {
         let (cdr, j) = (&mut self.cdr, &sample.joints);
         match topic {

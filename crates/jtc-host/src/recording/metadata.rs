@@ -1,4 +1,4 @@
-//! Header of a recording as the key-value pairs of an MCAP metadata record.
+//! Conversion of the header of a recording to and from the key-value pairs of an MCAP metadata record.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +6,14 @@ use jtc_core::{JOINTS, PidGains};
 
 use super::{DeviceIdentity, Ending, JointInfo, RecordingInfo};
 
-/// Keys of a joint's gains: N·m/rad, N·m/(rad·s), N·m·s/rad, and the bounds of the integral of the error.
+/// Keys of a joint's gains in N·m/rad, N·m/(rad·s) and N·m·s/rad, followed by the bounds of the integral of the error.
 const GAINS: [&str; 5] = ["kp", "ki", "kd", "int_min_rad_s", "int_max_rad_s"];
 
 fn listed(gains: &PidGains) -> [f64; 5] {
     [gains.kp, gains.ki, gains.kd, gains.int_min, gains.int_max]
 }
 
-/// Returns the gains of all joints; `None` if one is missing.
+/// Returns the gains of all joints, or `None` if one of the gains is missing.
 fn gains(map: &BTreeMap<String, String>) -> Option<[PidGains; JOINTS]> {
     let mut all = [PidGains::default(); JOINTS];
     for (i, gains) in all.iter_mut().enumerate() {
@@ -80,7 +80,7 @@ impl RecordingInfo {
         map
     }
 
-    /// Reverses `to_map`. Missing or unreadable values keep their defaults.
+    /// Reverses `to_map`. Reads the header from key-value pairs. Missing or unreadable values keep their defaults.
     pub(super) fn from_map(map: &BTreeMap<String, String>) -> Self {
         let text = |key: &str| map.get(key).cloned().unwrap_or_default();
         let number = |key: String| map.get(&key).and_then(|v| v.parse().ok()).unwrap_or(f64::NAN);

@@ -1,4 +1,4 @@
-//! Reassembly of samples from their messages, in the order of their times. The messages may be in any order in the file.
+//! Reassembly of samples from messages, in time order. The messages may be in any order in the file.
 
 use std::collections::VecDeque;
 
@@ -12,23 +12,23 @@ struct Reassembled {
     came: u8,
 }
 
-/// Reassembles samples. If the buffer of `room` samples is full, the oldest sample is released, because no further message
-/// of it is expected.
+/// Reassembles samples. Buffer of at most `room` incomplete samples. If the buffer is full, the oldest sample is released, because no
+/// further message of this sample is expected.
 ///
-/// In a recording of this project, the messages of a sample follow each other. A program that rewrites a file may group
-/// messages by topic. Messages that are up to a chunk apart are still matched.
+/// In a recording of this project, the messages of a sample follow each other. A program that rewrites a file may group messages by topic.
+/// Messages of one sample are still matched if their distance in the file is at most one chunk.
 pub(super) struct Reassembler {
     /// Incomplete samples, sorted by time.
     waiting: VecDeque<Box<Reassembled>>,
     room: usize,
     /// Time of the last released sample.
     given_ns: Option<u64>,
-    /// Largest number of messages that a sample has had so far.
+    /// Largest number of messages received for a sample so far.
     most: u32,
     spare: Option<Box<Reassembled>>,
 }
 
-/// The message arrived too late: its sample, or a later one, has already been released.
+/// Error if a message arrived after its sample, or a later sample, was released.
 #[derive(Debug)]
 pub(super) struct Late;
 
@@ -38,8 +38,8 @@ impl Reassembler {
         Self { waiting: VecDeque::new(), room, given_ns: None, most: 0, spare: None }
     }
 
-    /// Returns the sample of this time, to which the message `bit` belongs. If a sample must be released to make space, it
-    /// is passed to `give`.
+    /// Returns the sample at this time, to which the message `bit` belongs. If a sample must be released to make space, the sample is
+    /// passed to `give`.
     pub(super) fn at(
         &mut self,
         time_ns: u64,
@@ -85,8 +85,8 @@ impl Reassembler {
         self.waiting.is_empty() && self.given_ns.is_none()
     }
 
-    /// Releases the remaining samples at the end of the file. If the file is truncated (`cut`), the last sample is dropped
-    /// if some of its messages are missing.
+    /// Releases the remaining samples at the end of the file. If the file is truncated (`cut`), the last sample is discarded if some of its
+    /// messages are missing.
     pub(super) fn finish(mut self, cut: bool, give: &mut dyn FnMut(u64, Sample)) {
         if cut && self.waiting.back().is_some_and(|last| last.came.count_ones() < self.most) {
             self.waiting.pop_back();
@@ -103,7 +103,7 @@ mod tests {
 
     use super::*;
 
-    /// Messages of topics that are up to `room` samples apart are matched. The samples are in order of time, and none is
+    /// The messages of a sample are matched if their distance is at most `room` samples. The samples are in time order, and no sample is
     /// lost.
     fn gathered(messages: &[(u64, u8)], room: usize) -> Result<Vec<u64>, Late> {
         let mut gatherer = Reassembler::new(room);

@@ -1,4 +1,4 @@
-//! Finds the point at which a run was interrupted, from its recording.
+//! Search in a recording for the point at which a run was interrupted.
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use crate::trajectory::Trajectory;
 
 /// Maximum path time that the arm needs to come to rest after a stop, ms.
 const RAMP_MS: u32 = 1000;
-/// Maximum distance of the arm at rest from a position of the path to be considered there, rad.
+/// Maximum distance (rad) at which an arm at rest is considered to be at a position of the path.
 const AT_REST: f64 = 0.01;
-/// Maximum distance between the commanded positions of a recording and its trajectory, rad.
+/// Maximum distance between the commanded positions in a recording and the trajectory of the recording, rad.
 const SAME: f64 = 2e-3;
 
-/// Progress of a run along its path, as far as the recording proves it.
+/// Progress of a run along its path, as far as the recording proves this progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResumePoint {
     /// Path time of the last position that the recording shows, ms; 0 if the motion had not begun.
@@ -29,21 +29,21 @@ pub struct ResumePoint {
 pub struct Resumption {
     /// Path time, ms.
     pub ms: u32,
-    /// `true` if the controller itself reports this point, because the motion continued after the end of the recording.
-    /// `false` if the recording shows the point.
+    /// `true` if the controller reports this point, because the motion continued after the end of the recording. `false` if the point is
+    /// known from the recording.
     pub shown: bool,
     /// `true` if the arm is at this point.
     pub stands: bool,
 }
 
 impl ResumePoint {
-    /// Returns the point at which the run on `trajectory` can be resumed without leaving out a part. The point is the last
-    /// position that the recording shows. A later point is used if the controller's `status` shows that the motion
-    /// continued to that point, and the arm is there. The position of the arm alone proves nothing, because a user may have
-    /// moved the arm along the path. A controller that was restarted or that received another motion reports no point of
-    /// this motion. A stopped controller reports its points from the start again.
+    /// Returns the point at which the run on `trajectory` can be resumed without skipping a part of the path. The point is the last
+    /// position that the recording shows. A later point is used if `status` shows that the motion continued to that point and that the arm
+    /// is there. The position of the arm alone is not a proof, because a user may have moved the arm along the path. A controller that was
+    /// restarted or that received another motion does not report a point of this motion. After a Stop, a controller reports the point index
+    /// from the start again.
     ///
-    /// `tolerance` is the maximum distance from a point at which the arm is considered to be there, rad.
+    /// `tolerance` is the maximum distance (rad) at which the arm is considered to be at a point.
     ///
     /// # Errors
     ///
@@ -73,9 +73,9 @@ fn end_ms(trajectory: &Trajectory) -> u32 {
     (trajectory.duration_s() * 1e3).round() as u32
 }
 
-/// Returns the distance of the joint with the largest distance, rad.
+/// Returns the largest difference between the two positions over all joints, rad.
 fn away(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
-    // An unknown position is infinitely far away.
+    // If a position is unknown, the distance is infinite.
     let far = |(a, b): (&f64, &f64)| if (a - b).is_nan() { f64::INFINITY } else { (a - b).abs() };
     a.iter().zip(b).map(far).fold(0.0, f64::max)
 }
@@ -84,7 +84,7 @@ fn away(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NothingLeft {
-    /// The run reached its end.
+    /// The run reached the end of the path.
     #[error("the run reached its end, so no part of it remains")]
     Finished,
     /// The recording contains no motion.
@@ -111,12 +111,12 @@ impl Diagnose for NothingLeft {
 }
 
 impl Recording {
-    /// Returns the progress of the last run in this recording along `trajectory`. The progress ends at the last sample in
-    /// motion, or, after a stop, at the later position at which the recording shows the arm at rest.
+    /// Returns the progress of the last run in this recording along `trajectory`. The progress ends at the last sample in motion, or, after
+    /// a Stop, at the later position at which the recording shows the arm at rest.
     ///
     /// # Errors
     ///
-    /// Returns [`NothingLeft`] if the run reached its end, if the recording contains no run, or if the run is on another
+    /// Returns [`NothingLeft`] if the run reached the end of the path, if the recording contains no run, or if the run is on another
     /// trajectory.
     pub fn broken_off(&self, trajectory: &Trajectory) -> Result<ResumePoint, NothingLeft> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
@@ -143,8 +143,8 @@ impl Recording {
 }
 
 impl Recording {
-    /// Returns the number of completed runs of a repeated motion. The first run is on `first`, the others are on `then`.
-    /// Approaches between them are not counted.
+    /// Returns the number of completed runs of a repeated motion. The first run is on the trajectory `first`, and all other runs are on
+    /// `then`. Approaches between the runs are not counted.
     pub fn runs_finished(&self, first: &Trajectory, then: &Trajectory) -> u32 {
         let mut finished = 0;
         for (leg, ended) in self.executions() {
@@ -154,15 +154,15 @@ impl Recording {
         finished
     }
 
-    /// Returns the samples of each execution, and `true` if the execution reached its end. That is the case if another
-    /// execution follows or the controller reports the end.
+    /// Returns the samples of each execution, and `true` if the execution reached its end. An execution reached its end if another
+    /// execution follows or if the controller reports the end.
     fn executions(&self) -> Vec<(Vec<&Sample>, bool)> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
         let mut all: Vec<(Vec<&Sample>, bool)> = Vec::new();
         for sample in &self.samples {
             match all.last_mut() {
                 Some((leg, ended)) if moving(sample) && !*ended => match leg.last() {
-                    // The point index begins again, so this is another execution.
+                    // The point index starts from the beginning again, so another execution begins here.
                     Some(before) if sample.point < before.point => {
                         *ended = true;
                         all.push((vec![sample], false));
@@ -181,9 +181,9 @@ impl Recording {
     }
 }
 
-/// Returns the path time at which a stop brought the arm to rest, ms. The result is the first position after `last_ms`,
-/// the last one in motion, that matches the arm at rest. If the arm had no torque, it may have left its path, and its
-/// position proves nothing.
+/// Returns the path time at which the arm came to rest after a Stop, ms. The result is the first path position after `last_ms` that matches
+/// the arm at rest; `last_ms` is the last position in motion. If the arm had no torque, it may have left the path, so its position is not a
+/// proof.
 fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u32> {
     let held = |s: &Sample| s.errors == 0 && s.state.known().is_none_or(ControllerState::has_torque);
     let rest = behind.last().filter(|_| behind.iter().all(held))?;
@@ -196,7 +196,8 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
         let far = away(&trajectory.at_ms(ms)?.position, &stood);
         match nearest {
             Some((_, least)) if far < least => nearest = Some((ms, far)),
-            // The path moves away from this position. Later passes are ignored.
+            // From here on, the path leads away from the position of the arm. If the path reaches this position again later, that is
+            // ignored.
             Some(_) if far > AT_REST => break,
             None if far <= AT_REST => nearest = Some((ms, far)),
             _ => {}
@@ -205,13 +206,13 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
     nearest.map(|(ms, _)| ms)
 }
 
-/// Returns `true` if the commanded position of the sample is on the trajectory. If commanded positions are unknown,
-/// compares the measured ones.
+/// Returns `true` if the commanded position of the sample is on the trajectory. If the commanded positions are unknown, the function
+/// compares the measured positions.
 fn is_on(sample: &Sample, trajectory: &Trajectory) -> bool {
     let Some(at) = trajectory.at_ms(sample.point) else { return false };
     (0..JOINTS).all(|j| {
         let joint = &sample.joints[j];
-        // Measured positions are late and contain the tracking error.
+        // The measured positions are delayed and contain the tracking error.
         let (value, same) =
             if joint.set_position.is_finite() { (joint.set_position, SAME) } else { (joint.position, 0.1) };
         (value - at.position[j]).abs() <= same
@@ -225,7 +226,7 @@ mod tests {
     use crate::example::demo_motion;
     use crate::trajectory::Point;
 
-    /// Returns samples of the demo's motion at these points, with their states.
+    /// Returns a recording with samples of the demo motion at `points`, each with a trajectory state.
     fn recording(points: &[(u32, TrajectoryState)], outcome: &str) -> Recording {
         recording_of(&demo_motion(), points, outcome)
     }
@@ -251,7 +252,7 @@ mod tests {
         };
         let way = [(0, Execute), (40, Execute), (4_000, Execute)];
         let at = |last_ms| Ok(ResumePoint { last_ms });
-        // Possible reasons: the link was lost, the program was killed, or the controller ended the run.
+        // The link may have been lost, the program may have been killed, or the controller may have ended the run.
         for outcome in ["", "fault"] {
             assert_eq!(of(&way, outcome), at(4_000));
         }
@@ -260,17 +261,18 @@ mod tests {
         assert_eq!(of(&paused, "stopped"), at(4_300));
         assert_eq!(of(&[&way[..], &[(10_000, Finish)]].concat(), "finished"), Err(NothingLeft::Finished));
         assert_eq!(of(&[(0, Stop)], "stopped"), Err(NothingLeft::NoExecution));
-        // The points belong to another path.
+        // The recorded points belong to another path.
         let mut approach = recording(&way, "fault");
         approach.samples[2].joints[1].set_position += 0.1;
         assert_eq!(approach.broken_off(&demo_motion()), Err(NothingLeft::Other));
-        // If the recording contains this trajectory, the arm was approaching its first point.
+        // If the recording contains this trajectory, the arm was moving to its first point.
         approach.info =
             Some(RecordingInfo { commanded: Some(Arc::new(demo_motion())), ..RecordingInfo::default() });
         assert_eq!(approach.broken_off(&demo_motion()), at(0));
     }
 
-    /// Completed runs are counted, but not the approaches between them. The first run may be the remainder of a run.
+    /// The function counts completed runs, but not the approaches between the runs. The first run may be the remainder of an interrupted
+    /// run.
     #[test]
     fn runs_of_a_repeated_motion_are_counted() {
         use TrajectoryState::{Execute, Finish, Stop};
@@ -286,7 +288,7 @@ mod tests {
             }
         };
         let run = || recording(&whole, "");
-        // Statuses arrive every 40 ms, so it is possible that none of them shows the end of a run.
+        // Status frames arrive every 40 ms, so the end of a run may not appear in any of them.
         let unseen = || recording(&whole[..3], "");
         let part = || recording(&whole[..2], "");
         let approach = || recording_of(&other, &[(0, Execute), (9_960, Execute), (10_000, Finish)], "");
@@ -316,7 +318,7 @@ mod tests {
         assert_eq!(rest.broken_off(&demo), Ok(ResumePoint { last_ms: 5_000 }));
     }
 
-    /// A stopped controller is at its first point again (point 0). The position at rest shows the progress.
+    /// After a Stop, the point index of the controller is 0 again. The position of the arm at rest shows the progress.
     #[test]
     fn a_stop_proves_the_place_at_which_the_arm_came_to_rest() {
         use TrajectoryState::{Execute, Stop};
@@ -334,10 +336,10 @@ mod tests {
             let found = stood(3_400, ms).broken_off(&path).unwrap().last_ms;
             assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
         }
-        // The path has turned back meanwhile, so the arm is at an earlier position. The turn is then run again instead of
-        // being left out.
+        // The path has reversed its direction before the Stop, so the arm is at an earlier position. In this case the reversal is executed
+        // again instead of being skipped.
         assert!(stood(4_900, 5_100).broken_off(&path).unwrap().last_ms < 4_920);
-        // If the arm is elsewhere on the path, away from the path, or without torque, its position proves nothing.
+        // If the arm is elsewhere on the path, away from the path, or without torque, its position does not prove the progress.
         let elsewhere = stood(3_400, 12_000);
         let (mut beside, mut error) = (stood(3_400, 3_700), stood(3_400, 3_700));
         beside.samples[2].joints[3].position += 0.05;
@@ -347,7 +349,7 @@ mod tests {
         }
     }
 
-    /// Joint 1 moves 0.5 → 1.0 → 0.5 → −0.5 rad, at 0.1 rad/s.
+    /// Returns a motion of joint 1 from 0.5 to 1.0, back to 0.5 and to −0.5 rad, at 0.1 rad/s.
     fn back_and_forth() -> Trajectory {
         let q = |k: i32| 0.01 * f64::from(if k <= 50 { 50 + k } else { 150 - k });
         let point = |k: i32| Point { position: [q(k), 0.0, 0.0, 0.0, 0.0, 0.0], ..Point::default() };
@@ -360,15 +362,15 @@ mod tests {
         status
     }
 
-    /// An arm on the remaining path is considered to have moved there in this run only if the controller reports it.
+    /// If the arm is on the remaining path, the function assumes that this run moved it there only if the controller reports this.
     #[test]
     fn only_what_is_proved_counts_as_done() {
         use TrajectoryState::{Execute, Finish, Null, Pause, Stop};
         let (path, broken) = (back_and_forth(), ResumePoint { last_ms: 3_400 });
         let at = |status: &Status| broken.resumption(&path, status, 0.02);
         let recorded = |stands| Ok(Resumption { ms: 3_400, shown: false, stands });
-        // The controller was restarted or stopped, or a user moved the arm. At 0 rad the arm is at the position of the path
-        // at 15 s, and at −0.5 rad at its end.
+        // In these cases the controller was restarted or stopped, or a user moved the arm. At 0 rad the arm is at the position of the path
+        // at 15 s, and at −0.5 rad the arm is at the end of the path.
         for (joint_1, stands) in [(0.0, false), (-0.5, false), (0.84, true), (0.5, false)] {
             for (trajectory, point) in
                 [(Null, 0), (Stop, 0), (Finish, 15_000), (Finish, 4_000), (Finish, 3_000), (Execute, 9_000)]
@@ -386,7 +388,7 @@ mod tests {
             assert_eq!(on, Ok(Resumption { ms: 8_000, shown: true, stands: true }));
         }
         assert_eq!(at(&status(Finish, 20_000, -0.5)), Err(NothingLeft::Finished));
-        // On a closed path, an arm at the end is also at the start.
+        // On a closed path, an arm at the end of the path is also at the start.
         assert_eq!(at(&status(Null, 0, -0.5)), recorded(false));
     }
 

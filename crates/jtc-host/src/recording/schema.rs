@@ -21,7 +21,7 @@ uint32 nanosec
 
 /// Name of the standard joint message.
 pub(super) const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
-/// Definition of the joint message, with the definitions that it needs.
+/// Definition of the joint message, with all definitions that this message needs.
 pub(super) const JOINT_STATE_TEXT: &str = with_header!(
     "\
 std_msgs/Header header
@@ -32,14 +32,14 @@ float64[] effort
 "
 );
 
-/// Name of the message with a robot's description.
+/// Name of the message that contains a robot description.
 pub(super) const STRING: &str = "std_msgs/msg/String";
 /// Definition of the description message.
 pub(super) const STRING_TEXT: &str = "string data\n";
 
 /// Name of the message with transforms between frames.
 pub(super) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
-/// Definition of the transform message, with the definitions that it needs.
+/// Definition of the transform message, with all definitions that this message needs.
 pub(super) const TRANSFORMS_TEXT: &str = with_header!(
     "\
 geometry_msgs/TransformStamped[] transforms
@@ -68,7 +68,8 @@ float64 w 1
 
 /// Name of the message with the parts of the control law.
 pub(super) const CONTROL: &str = "openjtc_msgs/msg/JointControl";
-/// Definition with values per joint, base to wrist. A value that the source does not know is NaN.
+/// Definition of the control message, with values for each joint, base to wrist. A value is NaN if the source of the samples does not know
+/// it.
 pub(super) const CONTROL_TEXT: &str = with_header!(
     "\
 std_msgs/Header header
@@ -90,7 +91,7 @@ float64[6] temperature
 
 /// Name of the state message.
 pub(super) const STATE: &str = "openjtc_msgs/msg/ControllerState";
-/// Definition with states, error words and the point index.
+/// Definition of the state message, with states, error words and the point index.
 pub(super) const STATE_TEXT: &str = with_header!(
     "\
 uint8 STATE_START=0

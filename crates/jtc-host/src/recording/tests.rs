@@ -1,4 +1,4 @@
-//! Both formats are written and read again, and files that are not recordings are rejected.
+//! Tests that recordings in both formats are written and read again, and that other files are rejected.
 
 use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 
@@ -109,8 +109,7 @@ fn what_is_no_recording_is_refused_by_name() {
     assert!(read_mcap(b"not an mcap file").is_err());
 }
 
-/// From a file that is truncated at any byte, all samples of complete blocks are read in the order in which they were
-/// written, and the truncation is reported.
+/// The test truncates a file at any byte. All samples of complete blocks are read in the order of writing, and the truncation is reported.
 #[test]
 fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     let dir = tempfile::tempdir().unwrap();
@@ -162,11 +161,11 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     }
 }
 
-/// The length of a record inside a compressed chunk claims to be a terabyte.
+/// The length field of a record inside a compressed chunk contains one terabyte.
 #[test]
 fn a_damaged_length_takes_no_memory() {
     let mut file = b"\x89MCAP0\r\n".to_vec();
-    // An LZ4 frame with one uncompressed block: opcode and length of a message.
+    // This is an LZ4 frame with one uncompressed block, which contains the opcode and the length of a message.
     let mut data = b"\x04\x22\x4D\x18\x60\x40\x82\x09\0\0\x80\x05".to_vec();
     data.extend((1_u64 << 40).to_le_bytes());
     data.extend([0; 4]);
@@ -183,7 +182,7 @@ fn a_damaged_length_takes_no_memory() {
     assert!(error.contains("length"), "{error}");
 }
 
-/// The index of the limits points beyond the end of any file. The reader ignores it.
+/// The index entry of the record with the limits points beyond the end of the file. The reader ignores this index entry.
 #[test]
 fn a_damaged_index_takes_nothing_away() {
     let dir = tempfile::tempdir().unwrap();
@@ -193,7 +192,7 @@ fn a_damaged_index_takes_nothing_away() {
     let mut file = std::fs::read(&path).unwrap();
     let name = b"\x07\0\0\0openjtc";
     let at = file.windows(name.len()).rposition(|bytes| bytes == name).unwrap();
-    // Offset and length are written before the name.
+    // In the index entry, the offset and length come before the name.
     file[at - 16..at - 8].copy_from_slice(&(u64::MAX - 8).to_le_bytes());
     file[at - 8..at].copy_from_slice(&u64::from(16_u8).to_le_bytes());
     let (found, samples) = read_mcap(&file).unwrap();
@@ -234,9 +233,8 @@ fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
     counts
 }
 
-/// The file contains everything that is needed to understand its values: the arm, its gains and limits, and the identity of
-/// the controller. Poses of the links are written at most 50 times a second, at any sample rate, and only if a
-/// position is known.
+/// The file contains everything that is needed to understand its values. This includes the arm, its gains and limits, and the identity of
+/// the controller. Poses of the links are written at most 50 times a second, at any sample rate, and only if a position is known.
 #[test]
 fn a_recording_of_an_arm_stands_alone() {
     let dir = tempfile::tempdir().unwrap();
@@ -261,7 +259,7 @@ fn a_recording_of_an_arm_stands_alone() {
     written.iter_mut().flat_map(|s| &mut s.joints).for_each(|joint| joint.position = f64::NAN);
     write_all(&path, &info, &written).unwrap();
     assert!(!counted(&path).contains_key("/tf"));
-    // Without an arm the file contains no description.
+    // If the arm is unknown, the file does not contain a robot description.
     write_all(&path, &RecordingInfo::default(), &samples(100)).unwrap();
     assert_eq!(counted(&path).len(), 4);
 }

@@ -1,5 +1,5 @@
-//! Curves of a report. A short recording keeps every sample. A longer one is divided into pieces of equal length, and the
-//! extremes of each piece are kept.
+//! Curves of a report. For a short recording, the curves contain every sample. A longer recording is divided into pieces of equal length,
+//! and the curves contain the minimum and maximum of each piece.
 
 use crate::sample::{JointSample, Sample};
 
@@ -7,7 +7,7 @@ use crate::sample::{JointSample, Sample};
 /// resolution of a screen.
 pub(super) const POINTS_MAX: usize = 16_000;
 
-/// Plotted values of a joint.
+/// Kinds of values of a joint that are plotted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Curve {
     SetPosition,
@@ -45,15 +45,15 @@ fn values(joint: &JointSample) -> [f64; KINDS] {
     ]
 }
 
-/// Piece of the recording: its start, its middle, and the extremes of each curve.
+/// Piece of the recording with its start, its middle, and the minimum and maximum of each curve.
 #[derive(Clone, Debug)]
 struct Bucket {
     begin_s: f64,
     middle_s: f64,
-    /// Lowest values. If no value is known, they are above `high`.
+    /// Lowest values. Minimum of each curve. If no value is known, the minimum is above `high`.
     low: [f64; ALL],
     high: [f64; ALL],
-    /// `true` if the lowest value occurred before the highest.
+    /// `true` if the lowest value occurred before the highest value.
     low_first: [bool; ALL],
 }
 
@@ -86,7 +86,7 @@ impl Bucket {
         }
     }
 
-    /// Joins this bucket with the next one, which has the same length.
+    /// Joins this bucket with the next bucket, which has the same length.
     fn join(&mut self, next: &Self) {
         self.middle_s = next.begin_s;
         for i in 0..ALL {
@@ -111,13 +111,13 @@ impl Bucket {
     }
 }
 
-/// Curves of streamed samples in bounded memory. If there are too many buckets, neighbours are joined in pairs.
+/// Curves of streamed samples, with bounded memory use. If there are too many buckets, each pair of neighbours is joined.
 #[derive(Clone, Debug)]
 pub(super) struct Curves {
     buckets: Vec<Bucket>,
-    /// Number of samples in a bucket. If it is 1, each sample is a point.
+    /// Number of samples in a bucket. If the number is 1, each sample is a point of the curve.
     width: usize,
-    /// Number of samples in the last bucket.
+    /// Number of samples that the last bucket already contains.
     filled: usize,
     last_s: f64,
 }
@@ -146,7 +146,7 @@ impl Curves {
         self.last_s = sample.time_s;
     }
 
-    /// Joins the buckets in pairs. All buckets must be full.
+    /// Joins the buckets in pairs. Before the call, all buckets must be full.
     fn double(&mut self) {
         for i in 0..self.buckets.len() / 2 {
             let (first, next) = self.buckets.split_at_mut(2 * i + 1);
@@ -165,7 +165,7 @@ impl Curves {
         self.buckets.capacity() * size_of::<Bucket>()
     }
 
-    /// Returns the number of samples per bucket. If it is 1, every sample is a point.
+    /// Returns the number of samples per bucket. If the number is 1, every sample is a point of the curve.
     pub(super) fn bucket(&self) -> usize {
         self.width
     }
@@ -182,15 +182,15 @@ impl Curves {
         }
         let mut times: Vec<f64> =
             self.buckets.iter().flat_map(|bucket| [bucket.begin_s, bucket.middle_s]).collect();
-        // The curve reaches to the last sample, even if its last piece is incomplete.
+        // The curve ends at the last sample, even if the last piece is incomplete.
         if let Some(last) = times.last_mut().filter(|_| self.filled < self.width) {
             *last = self.last_s;
         }
         times
     }
 
-    /// Returns the values at those times: the extremes of each bucket, in the order in which they occurred. NaN if no value
-    /// is known.
+    /// Returns the values at the times of [`Self::times`]. These are the minimum and maximum of each bucket, in the order in which they
+    /// occurred. A value is NaN if it is unknown.
     pub(super) fn values(&self, curve: Curve, joint: usize) -> Vec<f64> {
         let i = joint * KINDS + curve as usize;
         let mut values = Vec::with_capacity(self.len());
@@ -208,19 +208,19 @@ impl Curves {
     }
 }
 
-/// Number of pieces to which a row of states is reduced when it has twice as many.
+/// Number of pieces to which a sequence of states is reduced when it has twice as many pieces.
 const RUNS_MAX: usize = 8_192;
 
-/// Rule for the value of two pieces that are joined.
+/// Rule for the common value when two pieces are joined.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joined {
-    /// Keep the value of the longer piece: for states.
+    /// Keep the value of the longer piece; used for states.
     Longer,
-    /// Combine the bits of both: for errors, so that no error is lost.
+    /// Combine the bits of both pieces; used for errors, so that no error is lost.
     Both,
 }
 
-/// Runs of equal values as `(from_s, to_s, value)`.
+/// Sequence of pieces with a constant value, each as `(from_s, to_s, value)`.
 #[derive(Clone, Debug)]
 pub(super) struct Runs {
     runs: Vec<(f64, f64, u64)>,
@@ -246,9 +246,9 @@ impl Runs {
         }
     }
 
-    /// Joins the pieces in pairs. Neighbours that then have equal values are joined too.
+    /// Joins the pieces in pairs. Neighbouring pieces that have equal values after this are also joined.
     fn halve(&mut self) {
-        // The last piece is not joined, because it may still grow.
+        // The last piece is not joined, because it may still become longer.
         let last = self.runs.pop();
         let mut fewer: Vec<(f64, f64, u64)> = Vec::with_capacity(RUNS_MAX);
         for two in self.runs.chunks(2) {
@@ -269,7 +269,7 @@ impl Runs {
         self.runs = fewer;
     }
 
-    /// Returns the size of the runs in memory.
+    /// Returns the memory size of the pieces.
     pub(super) fn bytes(&self) -> usize {
         self.runs.capacity() * size_of::<(f64, f64, u64)>()
     }

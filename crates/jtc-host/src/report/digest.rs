@@ -1,4 +1,4 @@
-//! Data that a report needs from its samples. The samples are streamed, so the memory does not grow with their number.
+//! Data from the samples that a report needs. The samples are streamed, so the memory use does not increase with their number.
 
 use super::curves::{Curves, Joined, Runs};
 use super::summary::Figures;
@@ -7,10 +7,10 @@ use super::{RunFailure, Summary};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Samples reduced to the content of a report: figures, curves with their extremes, and the first error.
+/// Samples reduced to the content of a report: values for each joint, curves with their minimum and maximum, and the first error.
 ///
-/// A digest takes about 20 MB, whether the recording lasts a minute or a day. For up to 16,000 samples the plots show
-/// each sample.
+/// A digest needs about 20 MB of memory, independent of the length of the recording. The plots show each sample if there are at most 16,000
+/// samples.
 #[derive(Clone, Debug)]
 pub struct Digest {
     samples: u64,
@@ -46,7 +46,7 @@ impl Digest {
         }
     }
 
-    /// Creates a digest of these samples, oldest first.
+    /// Creates a digest of `samples`, which are sorted oldest first.
     pub fn of(samples: &[Sample]) -> Self {
         let mut digest = Self::new();
         samples.iter().for_each(|sample| digest.push(sample));
@@ -82,12 +82,12 @@ impl Digest {
         self.first_s.map(|first| (first, self.last_s))
     }
 
-    /// Returns the figures, with the names and limits of `info`.
+    /// Returns the summary, with the names and limits of `info`.
     pub fn summary(&self, info: &RecordingInfo) -> Summary {
         self.figures.summary(info)
     }
 
-    /// Returns the failure of the recorded run: see [`RunFailure::of_recording`].
+    /// Returns the failure of the recorded run, like [`RunFailure::of_recording`].
     pub fn failure(&self, info: &RecordingInfo, ending: &Ending) -> Option<RunFailure> {
         self.watch.failure(info, ending)
     }

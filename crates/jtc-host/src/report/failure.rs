@@ -1,4 +1,4 @@
-//! First error of a failed run: its time, its joint, and the values around it.
+//! First error of a failed run, with its time, its joint, and the values before and after it.
 
 use std::fmt::Write;
 
@@ -11,14 +11,14 @@ use crate::labels;
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Number of samples shown before and after the first bad sample.
+/// Number of samples that are shown before and after the first sample with an error.
 pub(super) const BEFORE: usize = 3;
 const AFTER: usize = 2;
-/// A step of the measured position is a jump if it is more than this multiple of the step that the velocity limit permits.
-/// Noise and time jitter cause smaller steps.
+/// Factor for detecting a jump: a position step is a jump if it exceeds this factor times the step that the velocity limit permits. Noise
+/// and time jitter cause smaller steps.
 const STEP_SHARE: f64 = 1.2;
 
-/// Values of a joint at one moment near the failure. Unknown values are NaN.
+/// Values of a joint at one time near the failure. Unknown values are NaN.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Moment {
     /// Time since the start of the run, ms.
@@ -35,7 +35,7 @@ pub struct Moment {
     pub velocity_rad_s: f64,
     /// Torque, N·m.
     pub torque_nm: f64,
-    /// Limit of the torque, N·m.
+    /// Torque limit, N·m.
     pub torque_limit_nm: f64,
     /// Error bits of this joint as text.
     pub errors: Vec<String>,
@@ -46,34 +46,35 @@ pub struct Moment {
 /// Failure of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunFailure {
-    /// Problems found, the first error before its consequences.
+    /// Problems that were found; the first error comes before its consequences.
     pub causes: Vec<String>,
-    /// First failed joint; `None` if no joint failed.
+    /// First joint that failed; `None` if no joint failed.
     pub joint: Option<Joint>,
-    /// Time since the start of the run, ms. In motion it comes from the point index of the controller.
+    /// Time since the start of the run, ms. During a motion, this time is computed from the point index of the controller.
     pub at_ms: f64,
     /// Time of the first sample that shows the failure (s), on the clock of the samples.
     pub time_s: f64,
-    /// Time since the last sample without an error, ms. The failure occurred within this time.
+    /// Time since the last sample without an error, ms. The failure occurred during this time.
     pub within_ms: f64,
-    /// Values around the failure.
+    /// Values before and after the failure.
     pub moments: Vec<Moment>,
-    /// `true` for a log. Its times are those of the device, in seconds since its start.
+    /// `true` if the failure comes from a flight recorder log. The times of a log are device times, in seconds since the start of the
+    /// device.
     #[serde(skip)]
     pub in_log: bool,
 }
 
 impl RunFailure {
-    /// Returns the first error since the start of the execution. Without an execution, searches all samples. `None` if the
-    /// samples show no error.
+    /// Returns the first error since the start of the execution. If the samples contain no execution, searches all samples. Returns `None`
+    /// if the samples do not show an error.
     pub fn find(info: &RecordingInfo, samples: &[Sample]) -> Option<Self> {
         let begin = begin(samples);
         let at = begin + samples.get(begin..)?.iter().position(is_bad)?;
         Some(Self::found(info, &Around::of(samples, at)))
     }
 
-    /// Returns the failure of a recorded run. The failure is an error in the samples, or else the recorded reason for
-    /// the end, or else the fact that the recording does not show the end.
+    /// Returns the failure of a recorded run. The failure is an error in the samples, otherwise the recorded reason for the end. If both
+    /// are missing, the failure is that the recording does not show the end.
     pub fn of_recording(info: &RecordingInfo, samples: &[Sample], ending: &Ending) -> Option<Self> {
         if let Some(found) = Self::find(info, samples) {
             return Some(found);
@@ -82,7 +83,7 @@ impl RunFailure {
         Some(Self::ended_by(info, samples, why_it_ended(ending, unseen)?))
     }
 
-    /// Returns the failure of a log, at the sample of `time_s`, with these causes and this joint.
+    /// Returns the failure of a log at the sample of the time `time_s`, with the given causes and joint.
     pub fn in_log(
         info: &RecordingInfo,
         samples: &[Sample],
@@ -95,8 +96,8 @@ impl RunFailure {
         Self { in_log: true, ..Self::at(info, &around, causes, joint) }
     }
 
-    /// Returns the failure of a run whose samples contain no error. The moment is the last sample, and the cause is the
-    /// given reason.
+    /// Returns the failure of a run whose samples do not contain an error. The time of the failure is the last sample, and the cause is
+    /// `reason`.
     pub fn ended_by(info: &RecordingInfo, samples: &[Sample], reason: String) -> Self {
         Self::at(info, &Around::of(samples, samples.len().saturating_sub(1)), vec![reason], None)
     }
@@ -107,7 +108,7 @@ impl RunFailure {
         found.unwrap_or_else(|| Self::ended_by(info, samples, error.to_string())).with_error(error)
     }
 
-    /// Adds details that only the error of the run contains: the errors that the drives report.
+    /// Adds the errors that the drives report, which only `error` contains.
     pub fn with_error(self, error: &Error) -> Self {
         match error {
             Error::Motion(MotionError::RunFault { status, .. }) => self.with_status(status),
@@ -115,7 +116,7 @@ impl RunFailure {
         }
     }
 
-    /// Adds the errors that the drives report.
+    /// Adds the errors that the drives report in `status`.
     pub(super) fn with_status(self, status: &Status) -> Self {
         let (causes, joint) = causes(&Words::of_status(status));
         if causes.is_empty() { self } else { Self { causes, joint: joint.or(self.joint), ..self } }
@@ -168,7 +169,8 @@ impl RunFailure {
                 first: i == at,
             }
         };
-        // If a joint failed, shows this joint before and after the failure. If not, shows all joints up to the failure.
+        // If a joint failed, the table shows this joint before and after the failure. Otherwise the table shows all joints up to the
+        // failure.
         let moments = match joint {
             Some(joint) => (at.saturating_sub(BEFORE)..samples.len().min(at + AFTER + 1))
                 .map(|i| moment(i, joint))
@@ -183,7 +185,7 @@ impl RunFailure {
         Self { causes, joint, at_ms: into_ms(at), time_s: time(at), within_ms, moments, in_log: false }
     }
 
-    /// Header of the table: texts, then figures with their units.
+    /// Header of the table: columns with texts, followed by columns with numbers and their units.
     pub const HEAD: [&'static str; 9] = [
         "ms",
         "joint",
@@ -196,7 +198,7 @@ impl RunFailure {
         "errors",
     ];
 
-    /// Returns the rows of the table. An unknown value is a dash.
+    /// Returns the rows of the table. For an unknown value, the cell contains a dash.
     pub fn rows(&self) -> Vec<[String; 9]> {
         let figure = |v: f64, digits: usize| {
             if v.is_finite() { format!("{v:.digits$}").replace('-', "−") } else { "–".to_owned() }
@@ -217,7 +219,7 @@ impl RunFailure {
         self.moments.iter().map(row).collect()
     }
 
-    /// Returns the HTML for the top of the page.
+    /// Returns the HTML of the failure for the top of the page.
     pub(super) fn html(&self) -> String {
         let mut out = format!(
             "<section class=\"failure\" role=\"alert\">\n<h1>{}</h1>\n",
@@ -253,13 +255,13 @@ impl RunFailure {
     }
 }
 
-/// Returns `true` if this sample shows an error.
+/// Returns `true` if the sample shows an error.
 pub(super) fn is_bad(sample: &Sample) -> bool {
     sample.errors != 0 || sample.state == ControllerState::Error
 }
 
-/// Returns the reason why a run failed although its samples show no error. `unseen` is `true` if the last sample is in
-/// motion. Returns `None` if the run did not fail.
+/// Returns the reason why a run failed although its samples do not show an error. `unseen` is `true` if the arm is in motion at the last
+/// sample. Returns `None` if the run did not fail.
 pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     match (ending.is_fault(), ending.reason.as_str()) {
         (true, "") => Some("the run ended in a fault, but the recording does not name the fault".to_owned()),
@@ -272,13 +274,13 @@ pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     }
 }
 
-/// A moment with the samples before and after it that are shown.
+/// Sample at the time of a failure, with the samples before and after it that are shown.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Around {
     pub(super) samples: Vec<Sample>,
-    /// Index of the moment in the samples.
+    /// Index of this sample in all samples.
     pub(super) at: usize,
-    /// Start of the run, s.
+    /// Start time of the run, s.
     pub(super) start_s: f64,
 }
 
@@ -289,7 +291,7 @@ impl Around {
         Self { samples: piece.to_vec(), at: at - from, start_s: start_s(samples, at) }
     }
 
-    /// Adds a later sample if it is near enough to the moment.
+    /// Adds a later sample if it is close enough to the time of the failure.
     pub(super) fn follow(&mut self, sample: &Sample) {
         if self.samples.len() <= self.at + AFTER {
             self.samples.push(*sample);
@@ -297,14 +299,14 @@ impl Around {
     }
 }
 
-/// Finds a joint whose measured position, around the sample `at`, changed between two samples by more than its velocity
-/// limit permits. Returns the joint and a description. Used if the status does not show which joint failed.
+/// Finds a joint whose measured position changed by more than its velocity limit permits, between two samples near the sample `at`. Returns
+/// the joint and a description of the change. The function is used if the status does not show which joint failed.
 fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint, String)> {
     let mut worst: Option<(f64, Joint, String)> = None;
     for i in at.max(1)..samples.len().min(at + 2) {
         let since = |i: usize| samples[i].time_s - samples[i.saturating_sub(1)].time_s;
-        // After a failure the times are arrival times. Samples that arrive together were not measured together, so the
-        // longest of the last intervals is used.
+        // After a failure, the times of the samples are arrival times. Samples that arrive together were not measured together, so the
+        // function uses the longest of the last intervals.
         let span_s = (1..=i).rev().take(3).map(since).fold(0.0, f64::max);
         for (joint, limits) in Joint::ALL.into_iter().zip(&info.joints) {
             let position = |i: usize| samples[i].joints[joint.index()].position;
@@ -328,7 +330,7 @@ fn begin(samples: &[Sample]) -> usize {
     samples.iter().position(Sample::is_operating).unwrap_or(0)
 }
 
-/// Returns the start of the run, s. The point index of the last sample in motion gives it most precisely.
+/// Returns the start time of the run, s. The point index of the last sample in motion gives the most precise start time.
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];
     match known.iter().rfind(|s| s.state == ControllerState::Operate) {
@@ -337,12 +339,12 @@ fn start_s(samples: &[Sample], at: usize) -> f64 {
     }
 }
 
-/// Returns the start of the run, computed from this sample, s.
+/// Returns the start time of the run that follows from the sample, s.
 pub(super) fn began_s(sample: &Sample) -> f64 {
     sample.time_s - f64::from(sample.point) * 1e-3
 }
 
-/// Error words at one moment, from a sample or a status.
+/// Error words at one time, from a sample or a status.
 struct Words {
     errors: u16,
     can: u32,
@@ -389,8 +391,8 @@ impl Words {
     }
 }
 
-/// Returns the problems and the first failed joint. The joints come first, because the controller's own errors follow from
-/// them.
+/// Returns the problems and the first failed joint. The joints come first, because the errors of the controller are consequences of joint
+/// errors.
 fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
     let mut all = Vec::new();
     let mut first = None;

@@ -1,9 +1,9 @@
-//! Facts about upload and link in a report.
+//! Facts about the upload and the link in a report.
 use super::Facts;
 use crate::session::{LinkStatistics, UploadReport};
 
 impl Facts {
-    /// Returns the facts about upload and link of a run, on a line with this rate (Bd).
+    /// Returns the facts about the upload and the link of a run on a line with the bit rate `baud` (Bd).
     pub fn of_link(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32>) -> Self {
         let share = upload.line_share_percent();
         let share = share.map_or(String::new(), |s| format!(", {s:.1} % of the capacity of the line"));

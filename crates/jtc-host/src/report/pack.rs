@@ -1,10 +1,10 @@
-//! Compact form of curves for a page: numbers that are packed in base64.
+//! Compact format of curves for a page, with numbers in base64.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-/// Returns the values as `{"k":"f32","d":base64}`. Returns `null` if no value is known.
+/// Returns the values as `{"k":"f32","d":base64}`. Returns `null` if all values are unknown.
 pub(super) fn fine(values: &[f64]) -> Value {
     if !values.iter().any(|v| v.is_finite()) {
         return Value::Null;
@@ -13,8 +13,8 @@ pub(super) fn fine(values: &[f64]) -> Value {
     json!({ "k": "f32", "d": STANDARD.encode(bytes) })
 }
 
-/// Returns the values as `{"k":"i16","o":offset,"s":scale,"d":base64}` over their range. An unknown value is -32768. If all
-/// values are equal, returns `{"k":"c","v":value}`; if none is known, returns `null`.
+/// Returns the values as `{"k":"i16","o":offset,"s":scale,"d":base64}` scaled to the range of the values. The number -32768 marks an
+/// unknown value. If all values are equal, returns `{"k":"c","v":value}`; if all values are unknown, returns `null`.
 pub(super) fn coarse(values: &[f64]) -> Value {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let (Some(low), Some(high)) = (finite().reduce(f64::min), finite().reduce(f64::max)) else {

@@ -1,4 +1,4 @@
-//! The HTML page: a template, the vendored plot library, the project's style and script, and the data as JSON.
+//! HTML page that consists of a template, the vendored plot library, the style and script of this project, and the data as JSON.
 
 use serde_json::{Value, json};
 
@@ -13,7 +13,7 @@ const SCRIPT: &str = include_str!("assets/report.js");
 const PLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const PLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 
-/// Returns the complete page. The page can be written to a file and opened without a network.
+/// Returns the complete HTML page. The page can be written to a file and opened without a network.
 pub fn html(input: &ReportInput<'_>) -> String {
     // `<` is escaped so that no text can end the script element.
     let data = data(input).to_string().replace('<', "\\u003c");
@@ -24,7 +24,7 @@ pub fn html(input: &ReportInput<'_>) -> String {
     });
     let mut page = String::with_capacity(data.len() + 200_000);
     let mut rest = PAGE;
-    // Each mark is searched only after the previous one, so that inserted text is never searched.
+    // The search for a mark starts after the previous mark, so that inserted text is never searched.
     for (mark, text) in [
         ("{{title}}", title.as_str()),
         ("{{plot_style}}", PLOT_STYLE),
@@ -110,7 +110,7 @@ fn data(input: &ReportInput<'_>) -> Value {
     })
 }
 
-/// Returns times relative to the first sample, because f32 resolves microseconds only in a run of a few minutes.
+/// Returns times relative to the first sample, because an f32 has a resolution of microseconds only for times of up to a few minutes.
 fn relative(times: &[f64]) -> Vec<f64> {
     let start = times.first().copied().unwrap_or(0.0);
     times.iter().map(|t| t - start).collect()

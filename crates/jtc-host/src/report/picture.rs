@@ -1,4 +1,4 @@
-//! A small picture of a run: commanded and measured positions of the six joints, and the tracking error below them.
+//! Small picture of a run, with the commanded and measured positions of the six joints and, below, the tracking errors.
 
 use std::fmt::Write;
 
@@ -7,14 +7,14 @@ use super::{ReportInput, escape};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
-/// Points per line. This number is enough for the width in pixels.
+/// Points per line. Maximum number of points per curve, which is sufficient for the width in pixels.
 const POINTS: usize = 260;
 /// Minimum and maximum number of grid lines of an axis.
 const TICKS: (usize, usize) = (3, 12);
-/// Largest magnitude that is drawn. Larger values are invalid.
+/// Largest magnitude that is drawn. Larger values are considered invalid.
 const DRAWN_MAX: f64 = 1e30;
 
-/// Colours of the page: light by default, dark if the reader prefers dark pages.
+/// Style with light colours by default, and with dark colours if the reader has selected a dark theme.
 const STYLE: &str = "\
 svg{--paper:#fffefb;--ink:#1b1f24;--soft:#5f666f;--grid:#eceae2;--j0:#2559d6;--j1:#dd6412;--j2:#0c8a5b;--j3:#c02c7c;--j4:#7547cf;--j5:#94780a}\
 @media (prefers-color-scheme:dark){svg{--paper:#161a20;--ink:#e9ebee;--soft:#9aa3af;--grid:#262c35;--j0:#7aa5ff;--j1:#ff9d57;--j2:#43d39e;--j3:#ff77b6;--j4:#b79bff;--j5:#e3c84c}}\
@@ -29,9 +29,9 @@ struct Panel {
     top: f64,
     width: f64,
     height: f64,
-    /// First and last time, s. The second must be greater.
+    /// First and last time, s. The last time must be greater than the first time.
     time: (f64, f64),
-    /// Lowest and highest value. The second must be greater.
+    /// Lowest and highest value. The highest value must be greater than the lowest value.
     value: (f64, f64),
 }
 
@@ -72,7 +72,7 @@ impl Panel {
     }
 }
 
-/// Returns the picture as SVG. The picture adapts to the reader's light or dark setting.
+/// Returns the picture as SVG. The picture adapts to the light or dark theme of the reader.
 pub fn picture_svg(input: &ReportInput<'_>) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">\n<style>{STYLE}</style>\n\
@@ -155,7 +155,7 @@ fn errors(svg: &mut String, input: &ReportInput<'_>, time: (f64, f64)) {
     }
 }
 
-/// Returns times and values of a curve.
+/// Returns the times and values of a curve.
 fn points(input: &ReportInput<'_>, curve: Curve, j: usize) -> Vec<(f64, f64)> {
     let curves = &input.digest.curves;
     curves.times().into_iter().zip(curves.values(curve, j)).collect()
@@ -187,7 +187,7 @@ fn bounds<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<(f64, f64)
     })
 }
 
-/// Returns `true` if the number can be drawn.
+/// Returns `true` if the number is in the range that can be drawn.
 fn is_drawn(v: f64) -> bool {
     v.abs() < DRAWN_MAX
 }
@@ -197,21 +197,21 @@ fn margin(v: f64) -> f64 {
     1e-9 * v.abs()
 }
 
-/// Returns the axis for positions from `low` to `high`. The axis has a margin even if the joint does not move.
+/// Returns the axis for positions from `low` to `high`. The axis range includes a margin, even if the joint does not move.
 fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
     let margin = ((high - low) * 0.08).max(0.02).max(margin(low)).max(margin(high));
     (low - margin, high + margin)
 }
 
-/// Returns values and labels of the grid lines between `low` and `high`, as many as [`TICKS`] permits. About four steps
-/// fill `share` of the span. An axis with space for more labels uses a smaller share.
+/// Returns the values and labels of the grid lines between `low` and `high`; [`TICKS`] limits their number. About four steps fit into
+/// `share` of the span. For an axis with space for more labels, the caller passes a smaller share.
 fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
     let rough = share * (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
-    // Steps are 1, 2 or 5 times a power of ten. The first step that is large enough is used, or a finer one if there would
-    // be too few lines.
+    // A step is 1, 2 or 5 times a power of ten. The function uses the first step that is large enough, or a finer step if there would be
+    // too few lines.
     let power = 10f64.powf(rough.log10().floor());
     let steps = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2].map(|m| m * power);
     let enough = steps.iter().rposition(|step| *step >= rough).unwrap_or(0);
@@ -227,9 +227,9 @@ fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
 /// Number format.
 #[derive(Clone, Copy)]
 enum Digits {
-    /// Digits after the decimal point.
+    /// Format with this number of digits after the decimal point.
     Plain(usize),
-    /// Digits after the decimal point, with a power of ten.
+    /// Format with this number of digits after the decimal point, followed by a power of ten.
     Power(usize),
 }
 
@@ -259,7 +259,7 @@ mod tests {
 
     use super::*;
 
-    /// Checks that the labels differ, are in rising order, and have a readable number.
+    /// Checks that the labels are different and in ascending order, and that their number is within the limits.
     fn readable(low: f64, high: f64, share: f64) -> Result<(), TestCaseError> {
         let ticks = ticks(low, high, share);
         prop_assert!((TICKS.0..=TICKS.1).contains(&ticks.len()), "{low}..{high}: {ticks:?}");
@@ -312,7 +312,7 @@ mod tests {
             let (low, high) = position_axis((low, high));
             readable(low, high, 1.0).unwrap();
         }
-        // A usual range has simple grid lines.
+        // For a usual range, the grid lines are at simple numbers.
         let words: Vec<String> = ticks(-1.08, 1.08, 1.0).into_iter().map(|tick| tick.1).collect();
         assert_eq!(words, ["−1", "0", "1"]);
         for none in [(f64::NAN, 1.0), (0.0, f64::INFINITY), (1.0, 1.0), (1.0, 0.0), (f64::NAN, f64::NAN)] {

@@ -1,4 +1,4 @@
-//! Streamed samples give the same result as all samples at once, in bounded memory.
+//! Tests that streamed samples give the same result as all samples together, with bounded memory.
 
 use super::curves::{Curve, Joined, POINTS_MAX, Runs};
 use super::*;
@@ -7,7 +7,7 @@ use crate::sample::JointSample;
 use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use proptest::prelude::*;
 
-/// Returns a sample of any kind: with unknown values, with errors, in an execution or not.
+/// Returns a random sample, which may have unknown values and errors, and may be inside or outside an execution.
 fn any_sample() -> impl Strategy<Value = Sample> {
     let value = || prop_oneof![4 => -10.0..10.0, 1 => Just(f64::NAN), 1 => Just(0.0)];
     let joint = (prop::array::uniform12(value()), any::<bool>()).prop_map(|(v, fault)| JointSample {
@@ -57,7 +57,7 @@ fn any_samples(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Sample>> 
     })
 }
 
-/// Computes the figures from their definition, over all samples at once.
+/// Computes the values of the summary from their definition, with all samples in memory.
 fn by_definition(info: &RecordingInfo, samples: &[Sample]) -> Summary {
     let any = samples.iter().any(Sample::is_operating);
     let counted: Vec<&Sample> = samples.iter().filter(|s| !any || s.is_operating()).collect();
@@ -115,7 +115,7 @@ proptest! {
         let ending = crate::recording::Ending { outcome: outcome.into(), ..Default::default() };
         let (stream, all) =
             (Digest::of(&samples).failure(&info, &ending), RunFailure::of_recording(&info, &samples, &ending));
-        // Compares text, because unknown values are NaN, and NaN is not equal to itself.
+        // The test compares text, because unknown values are NaN, and NaN is not equal to itself.
         prop_assert_eq!(format!("{stream:?}"), format!("{all:?}"));
     }
 
@@ -134,7 +134,7 @@ proptest! {
     }
 }
 
-/// Returns the value of sample `i`, which is noise with single peaks.
+/// Returns the value of sample `i`, which is noise with isolated peaks.
 fn noise(i: usize) -> f64 {
     let mixed = (i as u64 + 1)
         .wrapping_mul(0x9E37_79B9_7F4A_7C15)
@@ -143,8 +143,9 @@ fn noise(i: usize) -> f64 {
     (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// The number of points of a curve is bounded, however long the recording is. Each point represents a piece of equal
-/// length, and the lowest and highest values of the piece are kept in order. A shorter recording keeps every sample.
+/// The number of points of a curve is bounded, independent of the length of the recording. Each point represents a piece of equal length,
+/// and the lowest and highest values of the piece are stored in the order of their times. For a short recording, the curve contains every
+/// sample.
 #[test]
 fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     for n in [1, 2, 15_999, POINTS_MAX, POINTS_MAX + 1, 31_999, 32_000, 32_001, 100_003] {
@@ -184,7 +185,7 @@ fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     }
 }
 
-/// States that change with every sample need only bounded memory, and no error is lost.
+/// Even if the state changes with every sample, the memory use is bounded and no error is lost.
 #[test]
 fn rows_of_states_are_bounded_and_lose_no_error() {
     let (mut states, mut errors) = (Runs::new(Joined::Longer), Runs::new(Joined::Both));

@@ -1,17 +1,17 @@
-//! Figures of a run: tracking error and torque per joint.
+//! Summary of a run, with tracking error and torque for each joint.
 
 use serde::Serialize;
 
 use crate::recording::RecordingInfo;
 use crate::sample::{JointSample, Sample};
 
-/// Figures of a joint. `None` for a value that the source does not know.
+/// Values of one joint in the summary. A value is `None` if the source of the samples does not know it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointSummary {
-    /// Name as in the arm file.
+    /// Name of the joint as in the arm file.
     pub name: String,
-    /// Root mean square of the position error, mrad. The error is the position that was commanded for the time of a
-    /// measurement, minus the measured one (J-62).
+    /// Root mean square of the position error, mrad. The error is the position that was commanded for the time of a measurement, minus the
+    /// measured position (J-62).
     pub rms_error_mrad: Option<f64>,
     /// Largest magnitude of the position error, mrad.
     pub max_error_mrad: Option<f64>,
@@ -21,47 +21,46 @@ pub struct JointSummary {
     pub torque_limit_nm: Option<f64>,
     /// Peak torque as a share of the limit, from 0 to 1.
     pub torque_share: Option<f64>,
-    /// Largest magnitude of the speed, rad/s. The measured speed is used, or the commanded one if no speed was
-    /// measured.
+    /// Largest magnitude of the speed, rad/s. The measured speed is used, or the commanded speed if no speed was measured.
     pub peak_velocity_rad_s: Option<f64>,
     /// Highest bearing temperature, °C.
     pub peak_temperature_c: Option<f64>,
 }
 
-/// Figures of a run.
+/// Summary of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Time from the first to the last sample, s.
     pub recorded_s: f64,
     /// Duration of the execution, s.
     pub executed_s: f64,
-    /// Number of samples used for the figures.
+    /// Number of samples that were used for the summary.
     pub samples: usize,
-    /// Figures of the joints, base to wrist.
+    /// Values of the joints, base to wrist.
     pub joints: Vec<JointSummary>,
 }
 
 impl Summary {
-    /// Computes the figures over the samples of an execution. If the recording has no execution, uses all samples.
+    /// Computes the summary from the samples of an execution. If the recording does not contain an execution, the function uses all
+    /// samples.
     pub fn of(info: &RecordingInfo, samples: &[Sample]) -> Self {
         let mut figures = Figures::default();
         samples.iter().for_each(|sample| figures.push(sample));
         figures.summary(info)
     }
 
-    /// Returns the joint with the largest value of `figure`, and the value.
+    /// Returns the joint with the largest value of `figure`, together with this value.
     pub fn worst(&self, figure: impl Fn(&JointSummary) -> Option<f64>) -> Option<(&JointSummary, f64)> {
         self.joints.iter().filter_map(|j| figure(j).map(|v| (j, v))).max_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
-/// Figures of streamed samples. The figures are collected over all samples, and over an execution, which may begin
-/// later.
+/// Summary data of streamed samples. The data are collected both for all samples and for an execution, which may begin later.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figures {
-    /// Times of the first and the last sample.
+    /// Times of the first and the last recorded sample.
     recorded: Option<(f64, f64)>,
-    /// Sums over the samples before an execution. Without an execution, these are all samples.
+    /// Sums over the samples before an execution. If there is no execution, this includes all samples.
     before: Sums,
     executed: Sums,
 }

@@ -1,4 +1,4 @@
-//! The page is complete, offline and of bounded size; the figures are correct.
+//! Tests that the page is complete, works offline and has a bounded size, and that the values are correct.
 
 use super::curves::Curve;
 use super::*;
@@ -177,8 +177,7 @@ fn drives_name_their_own_faults() {
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
 }
 
-/// The status does not show which joint failed. The report finds the joint with an impossible step, and shows the rows
-/// before it.
+/// The status does not show which joint failed. The report finds the joint with an impossible step, and shows the samples before this step.
 #[test]
 fn an_encoder_that_jumps_is_named_by_its_step() {
     let (mut info, mut samples) = run(1000);
@@ -229,7 +228,7 @@ fn a_recording_without_its_end_is_no_success() {
     assert_eq!(of(&samples, "stopped", ""), None);
 }
 
-/// The page of a plan shows the binding limits and the commanded figures. Measured values are unknown.
+/// The page of a plan shows the limits that determine the speed and the commanded values. The measured values are unknown.
 #[test]
 fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let arm = Arm::avena();
@@ -240,7 +239,8 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let summary = Summary::of(&info, &samples);
     for (of_page, of_check) in summary.joints.iter().zip(&planned.verdict.joints) {
         let (speed, torque) = (of_page.peak_velocity_rad_s.unwrap(), of_page.peak_torque_nm.unwrap());
-        // The page uses only the points, and colder bearings than the check before a run. So its figures differ.
+        // The page uses only the values at the points, and colder bearings than the check before a run. Therefore the values on the page
+        // differ from the values of the check.
         assert!((speed / of_check.velocity_peak_rad_s - 1.0).abs() < 0.05, "{of_page:?} {of_check:?}");
         let peak = of_check.torque_peak_nm.unwrap();
         assert!((0.95..1.5).contains(&(torque / peak)), "{of_page:?} {of_check:?}");
@@ -255,8 +255,7 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     assert!(of_run.contains("\"plan\":null") && of_run.contains("\"set_acceleration_rad_s2\":null"));
 }
 
-/// The picture stays small and each axis is readable, even if a joint stands still, moves very little, is far away or has
-/// no values.
+/// The picture stays small and each axis is readable, even if a joint does not move, moves very little, is far from zero or has no values.
 #[test]
 fn a_picture_is_small_whatever_the_joints_do() {
     type Lead = fn(f64) -> f64;

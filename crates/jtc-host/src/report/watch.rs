@@ -9,17 +9,18 @@ use super::failure::{Around, BEFORE, began_s, is_bad, why_it_ended};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Searches for the first error in streamed samples. The result is equal to the result of [`RunFailure::of_recording`].
+/// Search for the first error in streamed samples. The result is equal to the result of [`RunFailure::of_recording`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
     /// Most recent samples.
     recent: VecDeque<Sample>,
     /// `true` if a trajectory was executed.
     begun: bool,
-    /// Start of the run, computed from the last sample in motion. Before a motion it is the time of the first sample.
+    /// Start time of the run, computed from the last sample in motion. Before a motion, this is the time of the first sample.
     start_s: Option<f64>,
     in_motion: bool,
-    /// First error before an execution, and first error since its start. The former is used only without an execution.
+    /// First error before an execution, followed by the first error since the start of the execution. The error before an execution is used
+    /// only if there is no execution.
     before: Option<Around>,
     since: Option<Around>,
 }
@@ -54,7 +55,7 @@ impl Watch {
     }
 }
 
-/// Returns the moment of the last of these samples, with the samples before it.
+/// Returns the last sample of `recent`, with the samples before it.
 fn now(recent: &VecDeque<Sample>, start_s: Option<f64>) -> Around {
     Around {
         samples: recent.iter().copied().collect(),

@@ -1,4 +1,4 @@
-//! Course of a run: a trajectory, or a pose to reach.
+//! Goal of a run, which is a trajectory or a pose.
 use std::sync::Arc;
 
 use jtc_core::{Config, JOINTS};
@@ -8,17 +8,17 @@ use crate::plan::kinematics::Target;
 use crate::plan::{MoveSpeed, PlanError, Planner, at_speed};
 use crate::trajectory::Trajectory;
 
-/// Course of a run.
+/// Goal of a run.
 #[derive(Clone, Debug)]
 pub enum Course {
     /// Along a trajectory.
     Along(Arc<Trajectory>),
-    /// From the current position of the arm to a pose.
+    /// Move from the current position of the arm to a pose.
     To {
         /// Target pose.
         target: Target,
-        /// `true` if the flange moves on a straight line. If not, the joints move in proportion to each other, unless that
-        /// is slower.
+        /// `true` if the flange moves along a straight line. Otherwise the joints move in proportion to each other, unless another motion
+        /// is faster.
         line: bool,
         /// Torque margin of the move, % of each limit.
         margin_pct: f64,
@@ -28,14 +28,14 @@ pub enum Course {
 /// Trajectory of a run.
 #[derive(Clone, Debug)]
 pub struct Planned {
-    /// Trajectory at its speed.
+    /// Trajectory at the requested speed.
     pub trajectory: Arc<Trajectory>,
-    /// Notes of the planner for the user.
+    /// Messages of the planner for the user.
     pub notes: Vec<String>,
 }
 
 impl Course {
-    /// Returns the message of an error of [`Course::planned`].
+    /// Returns the text for an error that [`Course::planned`] returned.
     pub fn message(&self, error: &PlanError) -> String {
         match self {
             Self::Along(_) => error.to_string(),
@@ -43,8 +43,8 @@ impl Course {
         }
     }
 
-    /// Returns the trajectory for an arm at `here` (rad) on a controller with the settings `device`. `speed_pct` is the
-    /// speed of an existing trajectory in %. `move_speed` is the speed of a move, and `option` is the option that sets it.
+    /// Returns the trajectory for an arm at `here` (rad) on a controller with the settings `device`. `speed_pct` is the speed of an
+    /// existing trajectory, % of its own speed. `move_speed` is the speed of a move, and `option` is the option that sets this speed.
     ///
     /// # Errors
     ///

@@ -12,7 +12,7 @@ use crate::trajectory::Trajectory;
 /// First motion of a run.
 #[derive(Clone, Debug)]
 pub struct Start {
-    /// Motion that was checked from the position of the arm.
+    /// Motion that passed the check from the current position of the arm.
     pub checked: CheckedTrajectory,
     /// `true` if the motion is the approach to the first point.
     pub is_approach: bool,
@@ -24,13 +24,13 @@ pub enum StartError {
     /// A trajectory of the run did not pass the check.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// The only problem is that the arm is not at the first point, and the order does not allow an approach.
+    /// The arm is not at the first point, which is the only problem, and the order does not allow an approach.
     #[error(transparent)]
     Elsewhere(CheckError),
-    /// An approach of the run is not possible.
+    /// The run needs an approach that is not possible.
     #[error("the straight path from the present position to the first point is refused: {0}")]
     Approach(#[from] ApproachError),
-    /// The next run cannot begin at the end of the run before it.
+    /// The next run cannot begin at the end of the previous run.
     #[error(transparent)]
     Open(#[from] OpenPath),
 }
@@ -45,7 +45,7 @@ pub struct OpenPath {
     pub joint: Joint,
     /// Distance of this joint, rad.
     pub distance: f64,
-    /// Largest distance at which the controller starts a run, rad.
+    /// Largest distance from the first point at which the controller starts a run, rad.
     pub tolerance: f64,
 }
 
@@ -95,8 +95,8 @@ impl Diagnose for OpenPath {
 }
 
 impl Order<'_> {
-    /// Returns the first motion of run `n` (from 1) for an arm at `here` (rad). Before the first run, it checks the
-    /// trajectories and the approaches of all runs, with the limits, the payload and the settings of the controller.
+    /// Returns the first motion of run `n` (from 1) for an arm at `here` (rad). Before the first run, the function checks the trajectories
+    /// and the approaches of all runs, with the limits, the payload and the settings of the controller.
     ///
     /// # Errors
     ///
@@ -121,7 +121,7 @@ impl Order<'_> {
         }
     }
 
-    /// Checks the runs after the first one, and checks that each run ends at the start of the next one.
+    /// Checks all runs after the first run, and checks that each run ends at the start of the next run.
     fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
         let next = self.later;
         if next != self.trajectory {
@@ -129,7 +129,7 @@ impl Order<'_> {
             CheckedTrajectory::check(next, self.arm, &begin, self.options)?;
         }
         let tolerance = self.arm.config_on_device(&self.options.device).start_tolerance_rad;
-        // The end of a later run is compared only if there are at least two later runs.
+        // The end of a later run matters only if there are at least two later runs.
         let before = [self.trajectory, next];
         for before in before.into_iter().take(if self.runs > 2 { 2 } else { 1 }) {
             let Some(open) = OpenPath::between(before, next, tolerance) else { continue };
@@ -157,7 +157,7 @@ mod tests {
         joint_move(&[0.0; JOINTS], &[0.0, 1.2, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
     }
 
-    /// Order with `runs` runs: the first on `trajectory`, all others on `later`.
+    /// Order with `runs` runs: the first run is on `trajectory`, and all other runs are on `later`.
     struct Course<'a> {
         trajectory: &'a Trajectory,
         later: &'a Trajectory,
@@ -188,7 +188,7 @@ mod tests {
         assert!(!start(&course, [0.0; JOINTS], |_| ()).unwrap().is_approach);
         let without = Course { approach_pct: None, ..course };
         assert!(matches!(start(&without, THERE, |_| ()), Err(StartError::Elsewhere(_))));
-        // The limits, the payload and the settings of the controller are used, and each kind of problem is found.
+        // The check uses the limits, the payload and the settings of the controller, and finds each kind of problem.
         let slow = |config: &mut Config| config.joints[1].velocity_max = 0.3;
         let weak = |config: &mut Config| config.joints[1].torque_max = 90.0;
         let loaded = |config: &mut Config| config.payload.mass = 6.0;
@@ -218,7 +218,7 @@ mod tests {
         }
         let then = Course { later: &outside, ..course };
         assert!(matches!(start(&then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
-        // An approach would begin at the end of the path. Its speed is too high for the controller's limit there.
+        // An approach would begin at the end of the path. The speed at that point is above the limit of the controller.
         let none = Course { approach_pct: Some(0.0), ..course };
         assert!(matches!(start(&none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
     }
@@ -232,14 +232,14 @@ mod tests {
         let StartError::Open(open) = &error else { panic!("{error}") };
         assert!(open.joint.number() == 2 && (open.distance - 1.2).abs() < 1e-3, "{error}");
         assert_eq!(error.diagnosis().code, "open-path");
-        // Only a third run would begin at the end of the second run.
+        // The end of the second run matters only if there is a third run.
         let there = motion.points.last().unwrap().position;
         let back = joint_move(&there, &[0.0; JOINTS], &Config::avena(), 30.0).unwrap();
         let and_back = |runs| Course { trajectory: &motion, later: &back, runs, approach_pct: None };
         let twice = start(&and_back(2), [0.0; JOINTS], |_| ());
         assert!(twice.is_ok(), "{twice:?}");
         assert!(matches!(start(&and_back(3), [0.0; JOINTS], |_| ()), Err(StartError::Open(_))));
-        // A problem that an approach cannot solve is reported first.
+        // The function first reports a problem that an approach cannot solve.
         assert!(matches!(start(&course(2), THERE, |_| ()), Err(StartError::Open(_))));
         assert!(matches!(start(&course(1), THERE, |_| ()), Err(StartError::Elsewhere(_))));
     }

@@ -60,8 +60,8 @@ pub const AVENA_TOML: &str = include_str!("../../../arms/avena.toml");
 pub struct ArmChoice {
     /// Names of the six moving joints, base to wrist. `None` if the description has exactly six moving joints.
     pub joints: Option<Vec<String>>,
-    /// Flange link. Name of the last link of the arm: only joints on the path to this link are considered. `None` selects the flange, which
-    /// is fixed to the last joint.
+    /// Name of the last link of the arm: only joints on the path to this link are considered. `None` selects the flange, which is fixed to
+    /// the last joint.
     pub tip: Option<String>,
 }
 

@@ -43,7 +43,7 @@ pub struct Example {
     pub file: &'static str,
     /// Description of the example.
     pub what: &'static str,
-    /// Command that uses the example; `{}` stands for the file name.
+    /// Command that uses the example; `{}` is replaced by the file name.
     pub next: &'static str,
     text: fn() -> String,
 }

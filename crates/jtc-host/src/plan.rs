@@ -361,7 +361,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Returns `place`. Moves a joint to its limit if it is outside by at most the rounding of a CAN frame (J-36).
+/// Returns `place`, in which each joint is moved to its limit if it is outside by at most the rounding of a CAN frame (J-36).
 fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     std::array::from_fn(|j| {
         let range = PathRange::of(config, j, 0);

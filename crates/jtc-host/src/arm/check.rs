@@ -100,7 +100,7 @@ impl Checked {
 }
 
 impl Arm {
-    /// Checks the arm. Checks the arm and returns all findings that an operator must know before the parameters are sent to a controller.
+    /// Checks the arm and returns all findings that an operator must know before the parameters are sent to a controller.
     pub fn check(&self) -> Checked {
         let mut findings = Vec::new();
         self.find_limits(&mut findings);

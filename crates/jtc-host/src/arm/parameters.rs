@@ -5,7 +5,7 @@ use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 use jtc_wire::Joint;
 
-/// Parameters to send. Set of parameters for a controller. A parameter that is `None` is not sent.
+/// Set of parameters for a controller. A parameter that is `None` is not sent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
     /// Friction compensation.

@@ -101,7 +101,7 @@ impl CheckedTrajectory {
         start: &[f64; JOINTS],
         options: &CheckOptions,
     ) -> Result<Self, CheckError> {
-        // The fields of [`Arm`] are public, so the check cannot rely on valid numbers. With physically impossible numbers, any torque could
+        // The fields of `Arm` are public, so the check cannot rely on valid numbers. With physically impossible numbers, any torque could
         // pass the check.
         arm.is_physical()?;
         let differences = arm.device_differences(&options.device);

@@ -45,8 +45,8 @@ impl Verdict {
         self.hint_with(file, speed_pct, self.slower(speed_pct))
     }
 
-    /// Like [`Verdict::hint_for`]. Like `hint_for`; `passes` is a speed (% of the file's own speed) that is known to pass the check, if
-    /// such a speed is known.
+    /// Like [`Verdict::hint_for`]; `passes` is a speed (% of the file's own speed) that is known to pass the check, if such a speed is
+    /// known.
     pub fn hint_with(&self, file: &str, speed_pct: f64, passes: Option<f64>) -> Next {
         let has = |kind| self.problems.iter().any(|p| p.kind == kind);
         let only = |kind| self.refusals().all(|p| p.kind == kind);

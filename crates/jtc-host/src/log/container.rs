@@ -81,8 +81,7 @@ impl FlightLog {
         log.ok_or_else(|| LogFileError::NoLog { path: path.to_owned() })
     }
 
-    /// Decodes a log. Decodes a log, and skips parts that a later version of the format has added. Returns `None` if the bytes are not a
-    /// valid log.
+    /// Decodes a log and skips parts that a later version of the format has added. Returns `None` if the bytes are not a valid log.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut rest = bytes.strip_prefix(MAGIC)?;
         let mut log = Self::default();

@@ -5,7 +5,7 @@ use jtc_plan::furthest_joint;
 
 use super::{PlanError, Planned};
 
-/// Largest blend, rad. Largest blend, rad. A larger value is probably an angle in degrees.
+/// Largest blend, rad. A larger value is probably an angle in degrees.
 pub const BLEND_MAX: f64 = 0.5;
 /// Largest blend of corners between lines and arcs, m. A larger value is probably a length in mm.
 pub const BLEND_M_MAX: f64 = 0.5;

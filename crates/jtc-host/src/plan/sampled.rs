@@ -8,7 +8,7 @@ use crate::trajectory::{Point, Trajectory};
 
 /// Minimum number of steps of a motion, unless the steps would be too short.
 const STEPS_MIN: f64 = 20.0;
-/// Shortest step, ms. Shortest step, ms. In a shorter step, a position would change by less than its rounding.
+/// Shortest step, ms. In a shorter step, a position would change by less than its rounding.
 const STEP_MIN_MS: f64 = 2.0;
 /// Longest step that a trajectory frame can contain, ms.
 const STEP_MAX_MS: f64 = 1000.0;

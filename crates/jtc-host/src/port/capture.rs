@@ -27,7 +27,7 @@ pub struct Capture<P, W: Write> {
 }
 
 impl<P: Port, W: Write> Capture<P, W> {
-    /// Wraps `port`. Creates a capture of `port` that is written to `out`.
+    /// Creates a capture of `port` that is written to `out`.
     pub fn new(port: P, out: W) -> Self {
         Self { port, out, failed: None }
     }
@@ -102,7 +102,7 @@ pub struct Captured {
     pub bytes: Vec<u8>,
 }
 
-/// Reads a capture. Reads a capture. The error for an invalid line contains the line number.
+/// Reads a capture. The error for an invalid line contains the line number.
 ///
 /// # Errors
 ///

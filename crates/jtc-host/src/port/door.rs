@@ -25,8 +25,8 @@ const RETRY: Duration = Duration::from_millis(20);
 /// Timeout for receiving a request and for writing an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// An open door. Door of an open port. The door must be closed before the port, because the next program that opens the port creates a door
-/// at the same path.
+/// Door of an open port. The door must be closed before the port, because the next program that opens the port creates a door at the same
+/// path.
 pub(super) struct Door {
     path: PathBuf,
     /// Device and inode of the socket. These numbers show if another program has created a new socket at the same path.
@@ -77,8 +77,8 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// Creates the socket. Opens a socket at `path`. If no program serves an existing socket, a killed program left it, and it is replaced. If
-/// a program still serves the socket, it is not replaced. This program belongs to the superuser, who can open any port.
+/// Creates the socket at `path`. If no program serves an existing socket, a killed program left it, and it is replaced. If a program still
+/// serves the socket, it is not replaced. This program belongs to the superuser, who can open any port.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {
         return Err(io::ErrorKind::AddrInUse.into());

@@ -22,8 +22,7 @@ use super::{Halts, PortError, line_time};
 
 /// Timeout for a write during which no byte is accepted.
 const STALL: Duration = Duration::from_secs(5);
-/// Bytes per write. Maximum number of bytes per write. This number limits the delay until a stalled line is detected, and the delay of a
-/// Stop.
+/// Maximum number of bytes per write. This number limits the delay until a stalled line is detected, and the delay of a Stop.
 const CHUNK: usize = 256;
 /// Gap on the line after an abandoned frame. The gap is the 5 ms of J-03 plus a reserve for adapters that shorten it.
 const GAP: Duration = Duration::from_millis(8);

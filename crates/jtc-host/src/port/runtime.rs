@@ -73,7 +73,7 @@ pub fn is_own(folder: &Path) -> bool {
     folder.is_dir()
 }
 
-/// Creates the folder. Creates the folder of this program. Returns `None` if no location exists to which only this user can write.
+/// Creates the folder of this program. Returns `None` if no location exists to which only this user can write.
 ///
 /// # Errors
 ///

@@ -83,7 +83,7 @@ pub(super) struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// Creates a decoder. Creates a decoder. Returns `None` if the message is not little-endian CDR.
+    /// Creates a decoder. Returns `None` if the message is not little-endian CDR.
     pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
         let body = bytes.strip_prefix(&HEADER[..2])?.get(2..)?;
         Some(Self { body, at: 0 })

@@ -43,7 +43,7 @@ const DESCRIPTION_TOPIC: &str = "/robot_description";
 /// Topic of the poses of the links.
 const TRANSFORMS_TOPIC: &str = "/tf";
 
-/// Writer of samples. Writer of MCAP files, which writes each sample as four messages.
+/// Writer of MCAP files, which writes each sample as four messages.
 pub(super) struct McapWriter<W: Write + Seek> {
     out: mcap::Writer<W>,
     states: u16,
@@ -202,7 +202,7 @@ const SAMPLE_TOPICS: [&str; 4] = [STATES_TOPIC, COMMANDS_TOPIC, CONTROL_TOPIC, S
 /// Content of one channel of an MCAP file.
 #[derive(Clone, Copy)]
 enum Carries {
-    /// Messages of samples. Part of a sample; the number is the index into [`SAMPLE_TOPICS`].
+    /// Messages with a part of each sample; the number is the index into [`SAMPLE_TOPICS`].
     Sample(u8),
     Trajectory,
     Then,

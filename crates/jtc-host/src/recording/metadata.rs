@@ -80,7 +80,7 @@ impl RecordingInfo {
         map
     }
 
-    /// Reverses `to_map`. Reads the header from key-value pairs. Missing or unreadable values keep their defaults.
+    /// Reads the header from key-value pairs. Missing or unreadable values keep their defaults.
     pub(super) fn from_map(map: &BTreeMap<String, String>) -> Self {
         let text = |key: &str| map.get(key).cloned().unwrap_or_default();
         let number = |key: String| map.get(&key).and_then(|v| v.parse().ok()).unwrap_or(f64::NAN);

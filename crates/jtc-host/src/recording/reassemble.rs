@@ -12,8 +12,8 @@ struct Reassembled {
     came: u8,
 }
 
-/// Reassembles samples. Buffer of at most `room` incomplete samples. If the buffer is full, the oldest sample is released, because no
-/// further message of this sample is expected.
+/// Reassembler of samples with a buffer of at most `room` incomplete samples. If the buffer is full, the oldest sample is released, because
+/// no further message of this sample is expected.
 ///
 /// In a recording of this project, the messages of a sample follow each other. A program that rewrites a file may group messages by topic.
 /// Messages of one sample are still matched if their distance in the file is at most one chunk.

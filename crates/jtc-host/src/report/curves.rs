@@ -50,7 +50,7 @@ fn values(joint: &JointSample) -> [f64; KINDS] {
 struct Bucket {
     begin_s: f64,
     middle_s: f64,
-    /// Lowest values. Minimum of each curve. If no value is known, the minimum is above `high`.
+    /// Minimum of each curve. If no value is known, the minimum is above `high`.
     low: [f64; ALL],
     high: [f64; ALL],
     /// `true` if the lowest value occurred before the highest value.

@@ -7,7 +7,7 @@ use super::{ReportInput, escape};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
-/// Points per line. Maximum number of points per curve, which is sufficient for the width in pixels.
+/// Maximum number of points per curve, which is sufficient for the width in pixels.
 const POINTS: usize = 260;
 /// Minimum and maximum number of grid lines of an axis.
 const TICKS: (usize, usize) = (3, 12);

@@ -43,7 +43,7 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
             continue;
         }
         assert_eq!(rig.status().joints[1].internal, joint_error::TORQUE);
-        // The torque is off now. The model is required again, and stays required while the error is latched.
+        // The torque is off now. The controller requires the arm model again, and still requires it while the error is latched.
         assert_eq!(rig.status().jtc_init, 0b100);
         rig.clear(true, 0x7F);
         rig.run(50);

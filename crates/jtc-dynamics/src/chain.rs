@@ -21,8 +21,8 @@ use crate::trig::{angle, sin_cos};
 /// Largest difference (rad) between an angle of a joint origin and a multiple of π/2 at which the multiple replaces the angle. Many arm
 /// models write π/2 with six digits, and the wire format uses f32.
 const RIGHT_ANGLE_TOLERANCE: f64 = 2e-6;
-/// Sine or cosine of the angle between two axes that is treated as 0. Products of rotations by right angles contain such values because of
-/// rounding.
+/// Sine or cosine of the angle between two axes that is treated as 0. In products of rotations by right angles, rounding causes small
+/// values instead of 0.
 const ALIGNED: f64 = 1e-12;
 
 /// Direction of a joint's axis relative to the axis of the previous joint.

@@ -106,8 +106,8 @@ impl Dynamics {
         kinematics::flange_speed(&self.chain, q, qd)
     }
 
-    /// Returns the poses, in the base frame (m), of the joint frames from base to wrist and of the flange, at the positions `q` (rad). The
-    /// joint frames are those of the model after the rotation of the joint.
+    /// Returns the poses, in the base frame (m), of the joint frames from base to wrist and of the flange, at the positions `q` (rad). Each
+    /// joint frame is the joint frame of the model after the rotation of the joint.
     pub fn forward_kinematics(&self, q: &JointVec) -> [Pose; 7] {
         kinematics::forward_kinematics(&self.chain, q)
     }

@@ -81,8 +81,8 @@ pub const SIN_COS_MAX: f64 = 1.0e9;
 /// Returns sine and cosine of `x` (rad).
 ///
 /// The absolute error of sine and cosine is at most 2^-52 (2.3e-16) for |x| ≤ 1e6. For larger |x| the error grows to half the spacing of
-/// f64 numbers around `x`. Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions, whatever
-/// `x` is.
+/// f64 numbers around `x`. Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions, for every
+/// value of `x`.
 #[inline(always)]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * PER_RAD + ROUND;

@@ -1,4 +1,4 @@
-//! Compares the crate's sine and cosine with those of the standard library.
+//! Compares the crate's sine and cosine with the functions of the standard library.
 use jtc_dynamics::{SIN_COS_MAX, sin_cos};
 use proptest::prelude::*;
 

@@ -212,7 +212,7 @@ impl Arm {
         })
     }
 
-    /// Returns the name that the file gives to the joint or link with the model error.
+    /// Returns the name, as in the file, of the joint or link with the model error.
     fn name_of_part(&self, error: &ModelError) -> String {
         let part = if error.is_of_joint() { &self.joint_names[..] } else { &self.link_names[..] };
         let kind = if error.is_of_joint() { "joint" } else { "link" };
@@ -227,7 +227,7 @@ impl Arm {
         let mut config =
             Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default };
         for value in &self.others {
-            // The code skips an out-of-range value. The file readers reject such values.
+            // The code skips an out-of-range value. The file readers reject out-of-range values.
             let _ = settings::apply(&mut config, *value);
         }
         config

@@ -53,7 +53,7 @@ pub trait Port {
         "port".to_owned()
     }
     /// Returns the reason why the last rejected frame did not reach the device. Returns `None` if the device itself rejected the frame.
-    /// Only a shared line returns such reasons.
+    /// Only a shared line returns a reason.
     fn take_denial(&mut self) -> Option<String> {
         None
     }

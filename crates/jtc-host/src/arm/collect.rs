@@ -262,8 +262,8 @@ impl<T> PerJoint<T> {
         Ok(())
     }
 
-    /// Returns the tables of all six joints, or `None` if no file has such a table. If some joints have no table, returns
-    /// an error that lists their files.
+    /// Returns the tables of all six joints, or `None` if no file contains a table of this kind. If some joints have no table, returns an
+    /// error that lists their files.
     fn complete(self) -> Result<Option<Complete<T>>, FileError> {
         let Some((first, _)) = self.found.iter().flatten().next() else { return Ok(None) };
         let first = first.clone();

@@ -16,7 +16,7 @@ use super::statics::{POSES, Ranges, pose};
 
 /// Tick of the controller, s.
 const DT: f64 = 1e-3;
-/// Ticks over which the controller takes the derivative (J-41).
+/// Number of ticks over which the controller computes the derivative (J-41).
 const WINDOW: f64 = 5.0;
 /// Steps of the frequency search, from [`SLOWEST`] to half of the tick rate.
 const STEPS: i32 = 400;
@@ -52,8 +52,8 @@ impl StableInertia {
     /// Returns the stable range. Returns `None` if the gains are not stable with any inertia, or are not finite.
     ///
     /// In the formulas, θ is the frequency in rad per tick. The loop transfer function is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), and H is the
-    /// control law with its delay and the half tick during which a torque stays constant. At a limit of stability H is real and the loop is
-    /// −1, which gives the inertia J.
+    /// control law with its delay and the half tick during which a torque stays constant. At a stability limit, H is real and the loop
+    /// transfer function is −1. This equation determines the inertia J.
     pub(super) fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
         let turned = |theta: f64| {
             let half = 0.5 * gains.ki * DT;

@@ -80,7 +80,7 @@ impl Sources {
         self.proposed.insert(key);
     }
 
-    /// Marks the value of `key` as a default, because the file has no such key.
+    /// Marks the value of `key` as a default, because this key is missing in the file.
     pub(super) fn fill_in(&mut self, key: Key) {
         self.defaults.insert(key);
     }

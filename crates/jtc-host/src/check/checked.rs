@@ -23,7 +23,7 @@ pub struct CheckOptions {
     pub upload: UploadOptions,
     /// `true` if the settings that are not sent with friction, gains and arm model (limits, gravity, rotor inertia) may differ between the
     /// arm file and the controller. With this option the caller confirms that the controller's values are safe for this arm. If `false`,
-    /// the check refuses such an arm (J-55).
+    /// the check refuses an arm with different values (J-55).
     pub accept_device_limits: bool,
     /// Settings of the controller. By default, these are the built-in settings of the controller. For a controller with extensions , use
     /// the result of [`Session::device_config`](crate::Session::device_config).

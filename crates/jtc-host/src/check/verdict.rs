@@ -12,7 +12,8 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Number of places with contradictory channels that the check tolerates. Existing files contain such places between joined pieces.
+/// Number of places with contradictory channels that the check tolerates. Existing files have contradictory channels where pieces are
+/// joined.
 const SEAMS: usize = 20;
 
 /// Values of a joint along the path.

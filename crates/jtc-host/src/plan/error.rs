@@ -40,7 +40,7 @@ pub enum PlanError {
         /// Requested value, %.
         percent: f64,
     },
-    /// The blend is too large. The value was probably given in another unit.
+    /// The blend is too large. The value is probably in another unit.
     #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
     Blend {
         /// Requested value.

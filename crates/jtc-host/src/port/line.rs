@@ -34,7 +34,7 @@ const AWAITED: Duration = Duration::from_millis(150);
 const TRIES: u32 = 8;
 /// Timeout for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(1);
-/// Time after another program's Stop in which motion requests are rejected. An agent rejects requests for the same time.
+/// Time after another program's Stop in which motion requests are rejected. An agent rejects motion requests for the same duration.
 const CALM: Duration = Duration::from_secs(3);
 /// Maximum age of a status or a jog for which it still describes the current state of the arm.
 const RECENT: Duration = Duration::from_millis(300);

@@ -10,7 +10,7 @@ use super::Recording;
 use crate::sample::Sample;
 use crate::trajectory::Trajectory;
 
-/// Maximum path time that the arm needs to come to rest after a stop, ms.
+/// Maximum path time that the arm needs to come to rest after a Stop, ms.
 const RAMP_MS: u32 = 1000;
 /// Maximum distance (rad) at which an arm at rest is considered to be at a position of the path.
 const AT_REST: f64 = 0.01;

@@ -391,8 +391,8 @@ impl Words {
     }
 }
 
-/// Returns the problems and the first failed joint. The joints come first, because the errors of the controller are consequences of joint
-/// errors.
+/// Returns the problems and the first failed joint. The list begins with the joints, because the errors of the controller are consequences
+/// of joint errors.
 fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
     let mut all = Vec::new();
     let mut first = None;

@@ -43,7 +43,7 @@ impl Arm {
     }
 
     /// Finds unstable gains, of each joint and of all joints together. If the gains are stable, returns the tolerated factors of the rotor
-    /// inertias. Returns `None` if gains are unstable, or if the file does not give gains or all rotor inertias.
+    /// inertias. Returns `None` if gains are unstable, or if the file does not contain the gains and all rotor inertias.
     pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) -> Option<RotorMargins> {
         let pid = self.pid.as_ref().filter(|_| self.rotors_given == [true; JOINTS])?;
         let delay = self.config().delay_ticks;

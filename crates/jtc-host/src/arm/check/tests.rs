@@ -160,7 +160,7 @@ fn j71_the_rotor_margin_is_where_the_check_changes() {
     assert!(words(&arm).contains(" times the rotor inertias; each joint alone "), "{}", words(&arm));
 }
 
-/// For proposed rotor inertias the check requires a wider stable range than for measured ones.
+/// For proposed rotor inertias the check requires a wider stable range than for measured rotor inertias.
 #[test]
 fn gains_that_do_not_tolerate_a_proposed_rotor_are_refused() {
     let with = |proposed: bool, factor: f64| {

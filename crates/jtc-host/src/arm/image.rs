@@ -89,7 +89,7 @@ impl Arm {
         })
     }
 
-    /// Returns the differences between this arm and the arm of a controllerfor each value. Values that are missing in the arm file are
+    /// Returns the differences between this arm and the arm of a controller for each value. Values that are missing in the arm file are
     /// skipped.
     pub fn differences(&self, device: &Self) -> Vec<Difference> {
         let mut all = Vec::new();

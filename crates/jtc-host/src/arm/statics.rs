@@ -127,7 +127,7 @@ fn with(q: &JointVec, joint: usize, position: f64) -> JointVec {
     q
 }
 
-/// Returns the least and greatest inertia of each joint with its rotorfor poses distributed over the position ranges.
+/// Returns the least and greatest inertia of each joint with its rotor for poses distributed over the position ranges.
 pub(super) fn inertia(model: &ArmModel, rotor: &JointVec, ranges: &Ranges) -> [Inertia; JOINTS] {
     let dynamics = Dynamics::new(model, [0.0; 3]);
     let mut all = [Inertia { least: f64::INFINITY, most: 0.0 }; JOINTS];

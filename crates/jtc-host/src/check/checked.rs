@@ -25,8 +25,8 @@ pub struct CheckOptions {
     /// arm file and the controller. With this option the caller confirms that the controller's values are safe for this arm. If `false`,
     /// the check refuses an arm with different values (J-55).
     pub accept_device_limits: bool,
-    /// Settings of the controller. By default, these are the built-in settings of the controller. For a controller with extensions , use
-    /// the result of [`Session::device_config`](crate::Session::device_config).
+    /// Settings of the controller. By default, these are the built-in settings of the controller. For a controller with extensions, use the
+    /// result the result of [`Session::device_config`](crate::Session::device_config).
     pub device: Config,
 }
 

@@ -1,4 +1,4 @@
-//! Problem of a trajectorywith kind, joint, first occurrence and worst occurrence.
+//! Problem of a trajectory with kind, joint, first occurrence and worst occurrence.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Result of a checkwith all problems in groups, worst first.
+//! Result of a check with all problems in groups, worst first.
 
 use std::fmt;
 

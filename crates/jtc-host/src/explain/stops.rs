@@ -4,7 +4,7 @@ use jtc_wire::StopKind;
 
 use super::{Family, Page, page};
 
-/// Declares the pages of the causesof a held stop, each with kind, name, meaning, usual cause, remedy and next command. By default, the
+/// Declares the pages of the causes of a held stop, each with kind, name, meaning, usual cause, remedy and next command. By default, the
 /// next command is `jtc clear`.
 macro_rules! stops {
     (@next) => { "jtc clear" };

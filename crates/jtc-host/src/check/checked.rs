@@ -26,7 +26,7 @@ pub struct CheckOptions {
     /// the check refuses an arm with different values (J-55).
     pub accept_device_limits: bool,
     /// Settings of the controller. By default, these are the built-in settings of the controller. For a controller with extensions, use the
-    /// result the result of [`Session::device_config`](crate::Session::device_config).
+    /// result of [`Session::device_config`](crate::Session::device_config).
     pub device: Config,
 }
 

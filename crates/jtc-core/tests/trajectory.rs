@@ -246,8 +246,8 @@ fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
 
 #[test]
 fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
-    // Every joint moves at 1 rad/s; it starts and ends at rest. A ramp of 200 ms would need 7.5 rad/s², which this configuration does not
-    // allow.
+    // Every joint starts at rest, moves at 1 rad/s, and ends at rest. A ramp of 200 ms would need 7.5 rad/s², which this configuration does
+    // not allow.
     let n = 151;
     let speed = |i: i32| (0.04 * f64::from(i.min(n - 1 - i))).min(1.0);
     let mut way = 0.0;

@@ -7,7 +7,7 @@
 //! unexpected order, parts of the flash stay empty, and the ST-LINK does not report this. Therefore the controller itself must report the
 //! content of its flash over its serial line.
 //!
-//! Flashing a board uses these functions and types in this order: [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?),
+//! Flashing a board uses these functions and types in this order: [`Image`], [`Drive`], [`Lines::look`] (checks if the board holds an arm),
 //! [`may_flash`], [`write_image`], [`verify_program`]. If the program waits for an answer of the operator between these steps, it repeats
 //! [`Places::still_there`], [`Lines::look`] and [`may_flash`] directly before [`write_image`].
 

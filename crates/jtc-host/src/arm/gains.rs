@@ -2,7 +2,7 @@
 //!
 //! In the loop of one joint, the controller reads a position. The resulting torque takes effect `delay_ticks` later and lasts for one tick.
 //! The controller computes the derivative over five ticks. This control loop is stable between a lower and an upper inertia. Below the
-//! lower inertia the derivative is too slow; above the upper inertia the integral gain is too high.
+//! lower inertia the delay of the derivative is too long; above the upper inertia the integral gain is too high.
 //!
 //! For coupled joints, D and U are the lower and upper inertias of the joints, and M is the mass matrix with rotors. The arm is stable if M
 //! − D and U − M are positive definite. This condition is exact if the gains of all joints have the same ratios.
@@ -33,7 +33,7 @@ type Matrix = [[f64; JOINTS]; JOINTS];
 /// Range of inertias (kg·m²) in which a joint is stable with its gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StableInertia {
-    /// Lower limit; below this inertia the derivative is too slow.
+    /// Lower limit; below this inertia the delay of the derivative is too long.
     pub least: f64,
     /// Upper limit; above this inertia the integral gain is too high. The limit is infinite if the integral gain is 0.
     pub most: f64,

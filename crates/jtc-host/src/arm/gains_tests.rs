@@ -3,7 +3,7 @@
 use super::*;
 use crate::arm::Arm;
 
-/// Returns the magnitude of a joint's position error (rad) in the last third of `ticks`, divided by its size in the second third.
+/// Returns the magnitude of a joint's position error (rad) in the last third of `ticks`, divided by the magnitude in the second third.
 fn growth(gains: &PidGains, delay: u8, inertia: f64, ticks: usize) -> f64 {
     let mut torques = vec![0.0; usize::from(delay) + 1];
     let mut errors = [0.0; 6];

@@ -34,7 +34,7 @@ pub struct Written {
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`] if no byte was written. [`FirmwareError::DriveFull`] and
+/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`] mean that no byte was written. [`FirmwareError::DriveFull`] and
 /// [`FirmwareError::NotWritten`] if the copying failed; the board has the previous program or only a part of a program.
 pub fn write_image(
     drive: &Drive,

@@ -1,4 +1,4 @@
-//! The trajectory: segments, execution, pause and stop (section 5).
+//! Tests of the trajectory: segments, execution, Pause and Stop (section 5).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, POINTS_MAX, TrajectoryState};

@@ -13,7 +13,7 @@ use crate::error::CheckError;
 use crate::plan::{PlanError, Planner};
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Number for the next check that passes. The number distinguishes trajectories that are otherwise equal.
+/// Number that the next passed check receives. The number distinguishes trajectories that are otherwise equal.
 static PASSED: AtomicU64 = AtomicU64::new(1);
 
 /// Options for the check of a trajectory before its execution.

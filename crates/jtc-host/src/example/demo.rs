@@ -1,4 +1,4 @@
-//! The motion of `jtc demo`.
+//! Motion of the command `jtc demo`.
 use crate::trajectory::{Point, Trajectory};
 
 /// Duration of the demo motion, s.

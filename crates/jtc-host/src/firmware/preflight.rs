@@ -46,7 +46,7 @@ pub struct Asked {
     /// Name of the port.
     pub port: String,
     /// `true` if the line and the drive belong to the same USB device, which means to the same board. `None` if the operating system does
-    /// not report it.
+    /// not report the USB devices.
     pub same_device: Option<bool>,
     /// Report of the controller on the line.
     pub answers: Answers,

@@ -248,8 +248,8 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
-/// A motion that is too long even at the highest speed is rejected before planning. So the planner does not reach the check that the last
-/// pose can be held. Waypoints that are probably in degrees are reported as waypoints in degrees.
+/// A motion that is too long even at the highest speed is rejected before planning. So the planner rejects the motion before it checks that
+/// the arm can be held in the last pose. Waypoints that are probably in degrees are reported as waypoints in degrees.
 #[test]
 fn too_long_a_way_is_refused_at_once() {
     let arm = Arm::avena();

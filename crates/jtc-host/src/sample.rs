@@ -32,7 +32,7 @@ pub struct JointSample {
     pub torque_d: f64,
     /// Friction compensation, N·m.
     pub torque_friction: f64,
-    /// Torque commanded on the bus, N·m. Over a real link it is the torque that the drive reports.
+    /// Torque commanded on the bus, N·m. Over a real link, this value is the torque that the drive reports.
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: f64,
@@ -43,7 +43,7 @@ pub struct JointSample {
 }
 
 impl JointSample {
-    /// A joint without any known value.
+    /// Values of a joint of which no value is known.
     pub const UNKNOWN: Self = Self {
         set_position: f64::NAN,
         set_velocity: f64::NAN,
@@ -62,15 +62,15 @@ impl JointSample {
         internal: 0,
     };
 
-    /// Returns the sample without the values that a silent joint cannot have sent. A plot then shows a gap instead of a
-    /// joint at 0 rad.
+    /// Returns the sample without the values that a silent joint cannot have sent. As a result, a plot shows a gap
+    /// instead of a joint at 0 rad.
     fn not_measured(self) -> Self {
         let nan = f64::NAN;
         Self { position: nan, error: nan, velocity: nan, torque: nan, temperature: nan, ..self }
     }
 
-    /// Returns the position error, rad: the recorded error, or, if it is unknown, the commanded minus the measured position
-    /// of this sample. NaN if a value is unknown.
+    /// Returns the position error, rad. If no error was recorded, this is the commanded minus the measured position of this
+    /// sample. NaN if a value is unknown.
     pub fn position_error(&self) -> f64 {
         if self.error.is_finite() { self.error } else { self.set_position - self.position }
     }
@@ -113,7 +113,7 @@ pub struct Sample {
     pub state: Code<ControllerState>,
     /// Trajectory execution state.
     pub trajectory: Code<TrajectoryState>,
-    /// Index of the current 1 ms point.
+    /// Index of the current 1 ms point of the trajectory.
     pub point: u32,
     /// Current error word of the controller.
     pub errors: u16,
@@ -124,7 +124,7 @@ pub struct Sample {
 }
 
 impl From<&Telemetry> for Sample {
-    /// Converts telemetry; the time is the controller's tick count.
+    /// Converts telemetry. The time of the sample is the tick count of the controller.
     fn from(t: &Telemetry) -> Self {
         Self {
             time_s: t.tick as f64 * 1e-3,
@@ -187,7 +187,8 @@ impl Sample {
     }
 
     /// Returns the values of a status while `trajectory` is executed. The commanded values are computed for the reported
-    /// point, as the controller does. For the error the measurements are taken to be `delay_ticks` old (J-62).
+    /// point, as the controller does. For the position error, the measurements are assumed to be `delay_ticks` old
+    /// (J-62).
     pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory, delay_ticks: u8) -> Self {
         let mut sample = Self::from_status(time_s, status);
         if status.state == ControllerState::Operate
@@ -226,8 +227,8 @@ mod tests {
         assert!(Sample::from_status(0.0, &status).joints[2].position > 0.29);
     }
 
-    /// A measurement is compared with the position that was commanded for its time. If that position is unknown, the
-    /// current one is used.
+    /// A measurement is compared with the position that was commanded for its time. If that commanded position is
+    /// unknown, the current commanded position is used.
     #[test]
     fn j62_the_error_of_a_sample_is_that_of_the_time_of_the_measurement() {
         let now = JointTelemetry {

@@ -92,14 +92,14 @@ pub struct Session<P> {
     start: Duration,
     last_received: Duration,
     observer: Option<Observer>,
-    /// Trajectory that this session uploaded and that the controller still has.
+    /// Trajectory that this session uploaded and that is still in the memory of the controller.
     uploaded: Option<CheckedTrajectory>,
     /// Time limits.
     pub timeouts: Timeouts,
 }
 
 impl<P: Port> Session<P> {
-    /// Creates a session on an open port. Neither sends nor waits.
+    /// Creates a session on an open port. This function sends nothing and does not wait.
     pub fn new(port: P) -> Self {
         let start = port.now();
         Self {
@@ -135,8 +135,8 @@ impl<P: Port> Session<P> {
         &self.port
     }
 
-    /// Returns the port, for functions that only the port has. Bytes that are written directly to the port disturb the
-    /// session.
+    /// Returns the port, for calls that the session does not offer. If bytes are written directly to the port, the
+    /// session no longer works correctly.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
@@ -160,7 +160,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the last status, however old it is.
+    /// Returns the last received status, even if it is old.
     pub fn last(&self) -> Option<&Status> {
         self.last.as_ref()
     }
@@ -206,7 +206,7 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// Returns a status that arrives after this call. Discards those that arrived before.
+    /// Returns a status that arrives after this call. Discards the statuses that arrived before the call.
     ///
     /// # Errors
     ///
@@ -228,8 +228,8 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Reads all received bytes, and discards records and denials of earlier frames. Some of them may have arrived just
-    /// now.
+    /// Reads all received bytes, and discards records and denials of earlier frames. Some of these records may have
+    /// arrived only a moment ago.
     fn forget_the_past(&mut self) -> Result<(), LinkError> {
         self.catch_up()?;
         self.records.clear();
@@ -295,14 +295,14 @@ impl<P: Port> Session<P> {
 
     /// Returns the maximum time until the confirmation of a frame of `len` bytes must arrive.
     fn confirmation_time(&self, len: usize) -> Duration {
-        // This covers the frame, a status that is already being sent, and the status with the record.
+        // The time covers the frame, a status that is already being sent, and the status with the record.
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
     /// Sends a frame and waits for its record. If the frame arrived damaged, or its record does not arrive, the frame is
-    /// sent again. Execute and TeachingModeEnable are sent again only if they arrived damaged. Without a record they may
-    /// have been executed, and the arm may have been stopped over another line since. This function is not public, because
-    /// a frame can start a motion.
+    /// sent again. Execute and TeachingModeEnable are sent again only if the controller received them damaged. Without a
+    /// record, the controller may have executed the frame, and a Stop from another line may have stopped the arm after
+    /// that. This function is not public, because a frame can start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;
@@ -317,14 +317,14 @@ impl<P: Port> Session<P> {
             let begun = self.port.now();
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
-                // After the first such record, the frame may have been damaged. After the second one, the device does not
-                // know the type.
+                // The first record of an unknown type may mean that the frame was damaged. The second such record means
+                // that the device does not know the frame type.
                 Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
-                // No status has arrived either, so the device is late and has not lost the frame. A Stop or a Pause is sent
-                // again anyway.
+                // No status has arrived either, so the device is only late and has not lost the frame. The session sends a
+                // Stop or a Pause again in this case too.
                 None if !halts && self.last_received < begun => {
                     due = false;
                     self.next_status()?;
@@ -338,7 +338,7 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.timeouts.tries, last: bad })
     }
 
-    /// Returns the record of the frame that was just sent. `None` if none arrived in time.
+    /// Returns the record of the frame that was just sent. `None` if no record arrived in time.
     fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, LinkError> {
         let mut limit = Limit::new(self.confirmation_time(len));
         loop {
@@ -354,7 +354,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Reads bytes during the next wait of a limit. Returns `false` if no time is left.
+    /// Reads bytes for the duration of the next wait of `limit`. Returns `false` if no time is left.
     fn wait_within(&mut self, limit: &mut Limit) -> Result<bool, LinkError> {
         let Some(wait) = limit.next_wait() else { return Ok(false) };
         let begun = self.port.now();
@@ -363,15 +363,15 @@ impl<P: Port> Session<P> {
         Ok(true)
     }
 
-    /// Sends a command. Returns an error if it is rejected.
+    /// Sends a command. Returns an error if the request is rejected.
     fn command(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         self.introduce()?;
         let record = self.request(frame)?;
         if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
     }
 
-    /// Returns the error for the request that this record rejects. The device has rejected it, or an agent that shares the
-    /// line.
+    /// Returns the error for the request that this record rejects. Either the device or an agent that shares the line has
+    /// rejected the request.
     fn refused(&mut self, record: Response) -> LinkError {
         if let Some(reason) = self.port.take_denial() {
             return LinkError::Denied { request: frame_type(record.frame_type), reason };

@@ -1,4 +1,4 @@
-//! Trajectories: points at a fixed step. Trajectories can be read from common file formats.
+//! Trajectories, which consist of points at a fixed time step. This module reads trajectories from common file formats.
 
 mod csv;
 pub mod fit;
@@ -33,13 +33,13 @@ pub struct Point {
 }
 
 impl From<&Point> for SetPoint {
-    /// Converts the point without the rounding of a frame.
+    /// Converts the point without rounding the values as in a frame.
     fn from(p: &Point) -> Self {
         Self { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
     }
 }
 
-/// A trajectory: points at a fixed step.
+/// A trajectory, which consists of points at a fixed time step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
     /// Time between points, ms.
@@ -48,34 +48,34 @@ pub struct Trajectory {
     pub points: Vec<Point>,
 }
 
-/// Form of a trajectory file.
+/// Format of a trajectory file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
     /// CSV with a header.
     Csv,
-    /// 19 columns of integers, with the scale of the frames.
+    /// 19 columns of integers, in the units of the trajectory frames.
     Int16,
     /// 19 columns of floats.
     Float,
-    /// JSON in the project's own form.
+    /// JSON in the format of this project.
     Json,
     /// `trajectory_msgs/JointTrajectory`, as YAML or JSON.
     JointTrajectory,
-    /// A recording of a run, as MCAP or CSV.
+    /// A recording of an execution, as MCAP or CSV.
     Recording,
 }
 
-/// Trajectory from a file.
+/// Trajectory that was read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// Trajectory.
     pub trajectory: Trajectory,
-    /// Form of the file.
+    /// Format of the file.
     pub form: Form,
     /// Descriptions of derived, resampled and ignored data.
     pub notes: Vec<String>,
-    /// Overshoot of the curve beyond the waypoints, if the file has only positions.
+    /// Overshoot of the curve beyond the waypoints, if the file contains only positions.
     pub overshoot: Vec<Overshoot>,
     /// `true` if the file states the units of its numbers.
     pub units_named: bool,
@@ -87,8 +87,7 @@ impl Loaded {
         Self { trajectory, form, notes, overshoot, units_named: matches!(form, Form::Json | Form::Recording) }
     }
 
-    /// Reads a file of any form. `joint_names` are the names of the arm's joints, if they are known.
-    ///
+    /// Reads a file of any of these formats. `joint_names` are the names of the arm's joints, if the caller knows them.
     /// # Errors
     ///
     /// Returns an error with line and column if the file cannot be read or is not a trajectory of a known form.
@@ -106,8 +105,8 @@ impl Loaded {
         read.map_err(|e| e.in_file(path))
     }
 
-    /// Reads the measured motion of a recording instead of the commanded one. The result is the last motion by hand, or
-    /// else the last execution.
+    /// Reads the measured motion of a recording instead of the commanded one. The result is the last motion by hand,
+    /// or, without such a motion, the last execution.
     ///
     /// # Errors
     ///
@@ -116,7 +115,8 @@ impl Loaded {
         replay::load_measured(path)
     }
 
-    /// Converts the values from degrees, degrees/s and degrees/s². Returns an error if the file states its units itself.
+    /// Converts the values from degrees, degrees/s and degrees/s² to radians. Returns an error if the file already
+    /// states its units.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
             return Err(FileError::form(UNITS_KNOWN));
@@ -133,7 +133,7 @@ impl Loaded {
         Ok(self)
     }
 
-    /// Parses a text whose form is recognised by its content.
+    /// Parses a text, and recognises the format by the content.
     ///
     /// # Errors
     ///
@@ -181,7 +181,7 @@ impl From<&RawPoint> for Point {
 }
 
 impl Point {
-    /// Returns the point in the form in which it is sent. `index` is used in the error.
+    /// Returns the point in the integer form of a frame. `index` is the index of the point for the error.
     ///
     /// # Errors
     ///
@@ -209,7 +209,7 @@ impl Point {
 }
 
 impl Trajectory {
-    /// Returns all points in the form in which they are sent.
+    /// Returns all points in the integer form of a frame.
     ///
     /// # Errors
     ///

@@ -4,7 +4,7 @@
 //! of the flange in the base frame (m, with a quaternion or roll, pitch and yaw). If a flange pose has several solutions,
 //! the joint positions nearest to the previous waypoint are used. `leg` selects the motion to the waypoint: straight in
 //! joint space, or with the flange on a [line or an arc](LegKind). Times are in s from the first waypoint. A file is CSV
-//! with a header, or JSON with the same keys:
+//! with a header, or JSON whose keys have the names of the CSV columns:
 //!
 //! ```
 //! use jtc_host::waypoints::WaypointFile;
@@ -39,7 +39,7 @@ use crate::plan::PlanError;
 /// Maximum number of waypoints in a file.
 pub const WAYPOINTS_MAX: usize = 10_000;
 
-/// Position of a waypoint.
+/// Position of a waypoint, in one of the three forms of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// Joint positions, rad, base to wrist.
@@ -55,7 +55,7 @@ pub enum Target {
 pub struct FileWaypoint {
     /// Position.
     pub target: Target,
-    /// Time of the waypoint from the first one, s. `None`: as soon as the limits permit.
+    /// Time of the waypoint from the first one, s. If `None`, the arm arrives as soon as the limits permit.
     pub time: Option<f64>,
     /// Motion from the previous waypoint, if the file specifies it.
     pub leg: Option<LegKind>,
@@ -77,7 +77,7 @@ pub struct WaypointFile {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WaypointError {
-    /// The file cannot be read, or its form is unknown.
+    /// The file cannot be read, or its format is unknown.
     #[error(transparent)]
     File(#[from] FileError),
     /// A name in the file is not a pose of the arm, or the arm cannot reach the pose.
@@ -100,7 +100,7 @@ pub enum WaypointError {
         /// Reason.
         source: Box<kinematics::PoseError>,
     },
-    /// The path through the waypoints is not possible. The error contains the number of the waypoint.
+    /// The path through the waypoints is not possible. The planning error contains the number of the waypoint.
     #[error(transparent)]
     Route(#[from] PlanError),
 }
@@ -135,18 +135,18 @@ impl Diagnose for WaypointError {
 }
 
 impl WaypointFile {
-    /// Reads a CSV or JSON file. The form is recognised by its content.
+    /// Reads a CSV or JSON file. The format is recognised by the content.
     ///
     /// # Errors
     ///
-    /// Returns an error with line, column and value if the file cannot be read or has none of these forms.
+    /// Returns an error with line, column and value if the file cannot be read or has none of these formats.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let file = Self::parse(&text).map_err(|e| e.in_file(path))?;
         Ok(Self { path: path.to_owned(), ..file })
     }
 
-    /// Sets the path of the file, for error messages.
+    /// Sets the path of the file for error messages.
     pub fn in_file(self, path: &Path) -> Self {
         Self { path: path.to_owned(), ..self }
     }
@@ -193,25 +193,25 @@ impl WaypointFile {
         Ok(())
     }
 
-    /// Returns `true` if the flange moves on a line or an arc on any leg. If `line` is set, legs without a specified motion
-    /// are lines.
+    /// Returns `true` if the flange moves on a line or an arc on at least one leg. If `line` is set, legs without a
+    /// specified motion are lines.
     pub fn has_lines(&self, line: bool) -> bool {
         let is_line = |w: &FileWaypoint| w.leg.map_or(line, |leg| leg != LegKind::Joint);
         self.waypoints.iter().skip(1).any(is_line)
     }
 
-    /// Returns the indices of the waypoints to which a leg in joint space leads, from one flange pose to another.
+    /// Returns the indices of the flange poses that the arm reaches by a leg in joint space from another flange pose.
     pub fn legs_between_flange_poses(&self) -> Vec<usize> {
         let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
         let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;
         (1..self.waypoints.len()).filter(|&i| is_joint(i) && by_flange(i - 1) && by_flange(i)).collect()
     }
 
-    /// Converts the values from degrees.
+    /// Converts the values from degrees to radians.
     ///
     /// # Errors
     ///
-    /// Returns an error if the file states its units itself.
+    /// Returns an error if the file already states its units.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
             return Err(FileError::form(UNITS_KNOWN).in_file(&self.path));
@@ -227,8 +227,8 @@ impl WaypointFile {
     }
 
     /// Returns the waypoints as positions of an arm, for [`Planner::through`](crate::plan::Planner::through). For a flange
-    /// pose the joint positions nearest to the previous waypoint are used. For the first waypoint they are those nearest to
-    /// the zero pose.
+    /// pose, the solution nearest to the previous waypoint is used. For the first waypoint, the solution nearest to the
+    /// zero pose is used.
     ///
     /// # Errors
     ///
@@ -316,7 +316,7 @@ impl WaypointFile {
                 .at(*position)
                 .and_then(|pose| kinematics.solve(&pose, before))
                 .map_err(|source| WaypointError::Flange { path, place, source: Box::new(source) }),
-            // This case does not occur, because `kinematics` is present if a waypoint needs it.
+            // This case does not occur, because `kinematics` is `Some` if a waypoint needs it.
             (Target::Flange(..), None) => Ok(*before),
         }
     }
@@ -336,7 +336,7 @@ impl WaypointFile {
     }
 }
 
-/// Returns the motion to a waypoint for a word in a file. Returns `None` if the word is empty.
+/// Returns the kind of motion that a word in a file names. Returns `None` if the word is empty.
 ///
 /// # Errors
 ///

@@ -49,7 +49,7 @@ fn line_of(number: &Number) -> Range<usize> {
     start..end
 }
 
-/// Returns the file without the number and without its separators.
+/// Returns the file without the number and without the separators next to it.
 fn without(number: &Number) -> String {
     let line = line_of(number);
     let (before, after) = (&AVENA[line.start..number.at.start], &AVENA[number.at.end..line.end]);
@@ -75,8 +75,8 @@ fn a_number_that_is_left_out_is_missed() {
                 let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, expected ");
                 assert!(named, "{} {text}: {e}", number.key);
             }
-            // If the missing value has a default, it must be listed as a default or have a warning. A missing rotor inertia
-            // is recorded in the arm.
+            // If the missing value has a default, it must be listed as a default or have a warning. If the rotor inertia is
+            // missing, the arm records this.
             Ok(arm) => {
                 let default = arm.values().iter().any(|v| v.name == number.key && v.from == Source::Default);
                 let listed = default || arm.warnings.iter().any(|w| w.problem.contains(number.key));
@@ -101,15 +101,15 @@ fn a_number_that_is_given_twice_is_refused() {
     }
 }
 
-/// A number with the opposite sign is rejected, or it is accepted as a valid value and is the only value that differs.
+/// A number with the opposite sign is rejected, or it is valid. If it is valid, no other value of the arm changes.
 #[test]
 fn a_number_of_the_other_sign_is_refused_or_is_what_differs() {
     let avena = Arm::parse(AVENA).unwrap();
     for number in numbers() {
         let text = &AVENA[number.at.clone()];
         let value: f64 = text.parse().unwrap();
-        // The arm uses polynomials instead of the friction tables. So for the axes of the tables the reader only checks
-        // that they increase.
+        // The arm uses polynomials instead of the friction tables. So the reader only checks that the values of both
+        // table axes increase.
         let unused = ["temperature_c", "velocity_rad_s"].contains(&number.key);
         match Arm::parse(&with(number.at.clone(), &(-value).to_string())) {
             Ok(arm) if value != 0.0 && !unused => {

@@ -1,8 +1,8 @@
-//! Torque margin of plans. The tests compute it independently, from the inverse dynamics and the friction law, at each
-//! millisecond that the controller computes.
+//! Torque margin of plans. The tests compute the margin independently, from the inverse dynamics and the friction law,
+//! at each millisecond that the controller computes.
 //!
-//! The tests use the shipped arm, and imported arms with the proportions of a UR5 and a Z1. The variable `JTC_TEST_ARMS`
-//! can list further arm files or robot descriptions, separated by `:`.
+//! The tests use the shipped arm, and imported arms with the proportions of a UR5 and a Z1. The environment variable
+//! `JTC_TEST_ARMS` can list further arm files or robot descriptions, separated by `:`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,7 +16,8 @@ use jtc_host::plan::{self, MARGIN_PCT, PlanError, Planned, Planner, Waypoint};
 use jtc_host::{Arm, Diagnose as _, ErrorKind};
 use proptest::prelude::*;
 
-/// Axis, offset from the previous joint (m), mass (kg), position of its centre (m), torque limit (N·m), friction (N·m).
+/// Axis, offset from the previous joint (m), mass (kg), centre of mass (m), torque limit (N·m) and friction (N·m) of a
+/// joint.
 type Part = (&'static str, [f64; 3], f64, [f64; 3], f64, f64);
 
 const UR5: [Part; JOINTS] = [
@@ -80,8 +81,8 @@ fn friction_at(friction: Option<&Friction>, config: &Config, j: usize, v: f64, c
 /// Bearing temperatures of a plan and of a run, °C.
 const TEMPERATURES: [f64; 2] = [20.0, 30.0];
 
-/// Checks a plan that must leave the share `margin` of each limit free. Returns all torque problems as text, and the
-/// smallest share that the plan leaves free.
+/// Checks a plan that must leave the share `margin` of each limit unused. Returns all torque problems as text, and the
+/// smallest unused share of a limit.
 fn judge(arm: &Arm, config: &Config, planned: &Planned, margin: f64) -> (String, f64) {
     let (friction, mut wrong, mut left) = (arm.friction(), String::new(), f64::INFINITY);
     let of = |j: usize, v: f64, celsius: f64| friction_at(friction.as_ref(), config, j, v, celsius);
@@ -130,7 +131,7 @@ fn share() -> impl Strategy<Value = [f64; JOINTS]> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Random waypoints: the margin is kept at each millisecond, and the plan reports its margin.
+    /// For random waypoints, the plan keeps the margin at each millisecond and reports its own margin.
     #[test]
     fn plans_keep_the_margin_at_each_millisecond(
         which in 0..64usize,
@@ -188,8 +189,8 @@ fn stretched(share: f64) -> (Arm, Config) {
 
 const OUT: [f64; JOINTS] = [0.0, 1.5, 0.0, 0.0, 0.0, 0.0];
 
-/// A pose that needs more torque than the margin permits can be reached and left. The margin is kept if that is
-/// possible. If it falls below 10 %, there is a warning.
+/// A pose that needs more torque than the margin permits can be the end or the start of a motion. The plan keeps the
+/// margin if possible. If the margin is below 10 %, the plan contains a warning.
 #[test]
 fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     for share in [0.6, 0.7, 0.8, 0.86, 0.9, 0.94] {
@@ -211,8 +212,8 @@ fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     }
 }
 
-/// Purpose of the margin: an arm with 10 % more mass and 20 % more friction than its model stays within each limit, if the
-/// plan has the default margin.
+/// With the default margin of a plan, an arm with 10 % more mass and 20 % more friction than its model stays within each
+/// limit.
 #[test]
 fn the_default_margin_suffices_for_ten_percent_of_mass_and_twenty_of_friction() {
     let places =

@@ -1,4 +1,5 @@
-//! Serial ports on a pseudo-terminal: both directions, timeouts, rates, and the errors of a port that cannot be used.
+//! Tests of serial ports on a pseudo-terminal: both directions, timeouts, rates, and errors of a port that cannot be
+//! used.
 #![cfg(unix)]
 
 use std::io::{Read, Write};
@@ -10,7 +11,7 @@ use jtc_host::{Diagnose, Port, frame};
 use jtc_wire::{ControllerState, DataStatus, FrameType, RawPoint, Response, Status, TrajectoryState, fixed};
 use serialport::{SerialPort as _, TTYPort};
 
-/// Returns the far end of a pseudo-terminal, and the path of its near end.
+/// Returns the controller side of a pseudo-terminal, and the path that the host opens.
 fn pair() -> (TTYPort, String) {
     let (mut far, near) = TTYPort::pair().expect("a pseudo-terminal");
     far.set_timeout(Duration::from_secs(5)).unwrap();
@@ -57,7 +58,7 @@ fn what_is_wrong_is_said_with_the_next_command() {
     assert!(matches!(error, PortError::Gone { .. }), "{error}");
 }
 
-/// Returns the door of this port.
+/// Returns the path of the door (control socket) of this port.
 fn door(path: &str) -> std::path::PathBuf {
     let mut sockets = halt::sockets_of(path).into_iter().filter(|socket| halt::is_alive(socket));
     sockets.next().expect("the program listens")
@@ -67,7 +68,8 @@ fn status(response: Response) -> [u8; jtc_wire::STATUS_LEN] {
     Status { response, ..Status::default() }.emit()
 }
 
-/// J-03: a Stop is sent between two frames. A half-written long frame is abandoned, and no piece of it follows.
+/// J-03: a Stop is sent between two frames. If a long frame is only partly written, the port drops the remaining part
+/// of the frame.
 #[test]
 fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     let (mut far, path) = pair();
@@ -84,14 +86,15 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     // Frames that move the arm are blocked. Other frames are still sent.
     assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
     assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
-    // A Pause would change the stop into a pause.
+    // A Pause after the Stop would only pause the motion instead of stopping it.
     assert!(port.write_all(&fixed::PAUSE).is_err());
     port.write_all(&fixed::STOP).unwrap();
     port.write_all(&fixed::GET_INFO).unwrap();
     let mut got = vec![0; fixed::STOP.len() + fixed::GET_INFO.len()];
     far.read_exact(&mut got).unwrap();
     assert_eq!(got, [&fixed::STOP[..], &fixed::GET_INFO].concat());
-    // The owner does not read. The record is found anyway, and the owner gets its bytes later.
+    // The owner of the port does not read. The port finds the record in spite of this, and the owner receives the bytes
+    // of the record later.
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
     let (answer, _) = loop {
@@ -108,7 +111,8 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!(first, status(record));
 }
 
-/// A Stop that arrives damaged or is not answered is sent again. If it is never confirmed, the client gets an error.
+/// A Stop that arrives damaged or is not answered is sent again. If the Stop is never confirmed, the client gets an
+/// error.
 #[test]
 fn a_stop_is_written_until_the_controller_confirms_it() {
     let (mut far, path) = pair();
@@ -135,33 +139,33 @@ fn halt_unconfirmed(path: &str, halt: Halt) {
     std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");
 }
 
-/// A motion was requested before the Stop and then waits, for example in a queue. The waiting does not make it a new
-/// request.
+/// The client requested a motion before the Stop. The request then waits, for example in a queue. The request remains
+/// an old request, although it waits.
 #[test]
 fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() {
     let (_far, path) = pair();
     let mut port = SerialPort::open(&path, 115_200).unwrap();
     let none = Halts::default();
     assert_eq!(port.halts(), none);
-    // Before the Stop a motion is sent.
+    // Before the Stop, the port sends a motion.
     port.ask_to_move_after(none.all).unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     assert_eq!(port.halts(), Halts { all: 1, stops: 1 });
-    // This is longer than the 3 s for which new requests are rejected.
+    // This time is longer than the 3 s for which new requests are rejected.
     std::thread::sleep(Duration::from_millis(3100));
     for _ in 0..10 {
         port.ask_to_move_after(none.all).unwrap();
         let error = port.write_all(&fixed::EXECUTE).expect_err("requested before the Stop");
         assert!(matches!(error, PortError::Halted { by: Some(_) }), "{error}");
     }
-    // A motion requested after the Stop is sent.
+    // The port sends a motion that was requested after the Stop.
     port.ask_to_move_after(1).unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
 }
 
-/// J-33: a controller refuses a Pause while it decelerates after a Stop, but an older one pauses. So a Pause of any client is
-/// not written after a Stop.
+/// J-33: a controller rejects a Pause while it decelerates after a Stop. An older controller accepts it and pauses. So
+/// the port does not write a Pause of any client after a Stop.
 #[test]
 fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     let (mut far, path) = pair();
@@ -190,7 +194,7 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     port.ask_to_move().unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
     read(&mut far, &[fixed::EXECUTE; 1]);
-    // After a Pause without a Stop the motion can be resumed.
+    // After a Pause without a Stop, a client can resume the motion.
     halt_unconfirmed(&path, Halt::Pause);
     std::thread::sleep(Duration::from_millis(3100));
     port.ask_to_resume().unwrap();
@@ -199,8 +203,8 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     read(&mut far, &[fixed::EXECUTE; 1]);
 }
 
-/// Simulates a controller. The controller calls `next` with the received bytes, and sends the status that `next`
-/// returns. Returns a flag that ends the controller, and its thread.
+/// Simulates a controller. Starts a controller that calls `next` with the received bytes, and sends the status that
+/// `next` returns. Returns the thread of the controller, and a flag that ends it.
 fn controller(
     mut far: TTYPort,
     mut next: impl FnMut(&[u8]) -> Status + Send + 'static,
@@ -213,7 +217,7 @@ fn controller(
         let mut buffer = [0; 256];
         while !end.load(Ordering::SeqCst) {
             let n = far.read(&mut buffer).unwrap_or(0);
-            // Statuses are lost if the other end of the line does not read for a while.
+            // Statuses are lost if the host does not read from the line for some time.
             let _ = far.write_all(&next(&buffer[..n]).emit());
         }
     });
@@ -224,7 +228,8 @@ fn is_in(bytes: &[u8], frame: &[u8]) -> bool {
     bytes.windows(frame.len()).any(|window| window == frame)
 }
 
-/// The end of teaching is written again until the statuses show it. Until then the arm is not considered at rest.
+/// The port repeats the command that ends teaching until the statuses show the end. Until the statuses show this, the
+/// arm is not considered at rest.
 #[test]
 fn the_end_of_teaching_is_written_until_statuses_show_it() {
     for heard in [1, 2, 5, u32::MAX] {
@@ -255,7 +260,7 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
 }
 
 /// Teaching that was requested but has not begun would begin as soon as the arm is at rest. Such teaching is considered
-/// ended when the record of its end has arrived.
+/// ended when the record of the command that ends it has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {
     for heard in [1, 3, u32::MAX] {
@@ -281,7 +286,7 @@ fn teaching_that_did_not_begin_is_ended_with_a_record() {
     }
 }
 
-/// A trajectory that is paused after a Stop is stopped again.
+/// If a trajectory is paused after a Stop, the port sends the Stop again.
 #[test]
 fn a_pause_that_came_after_the_stop_is_stopped() {
     for heard in [2, 3, u32::MAX] {
@@ -309,8 +314,8 @@ fn a_pause_that_came_after_the_stop_is_stopped() {
     }
 }
 
-/// Two programs of the superuser may hold one port. The later program does not replace the socket of the earlier one, and
-/// removes only its own socket.
+/// Two programs of the superuser may have one port open at the same time. The later program does not replace the socket
+/// of the earlier one, and removes only its own socket.
 #[test]
 fn a_socket_of_a_living_program_is_left_alone() {
     let (_far, path) = pair();
@@ -318,7 +323,7 @@ fn a_socket_of_a_living_program_is_left_alone() {
     let socket = door(&path);
     let kept = socket.with_extension("kept");
     std::fs::rename(&socket, &kept).unwrap();
-    // In the meantime another program listens at the same path.
+    // After that, another program listens at the path of this socket.
     let other = std::os::unix::net::UnixListener::bind(&socket).unwrap();
     drop(port);
     assert!(socket.exists(), "it is not the port's own");
@@ -330,14 +335,15 @@ fn a_socket_of_a_living_program_is_left_alone() {
     std::fs::remove_file(&socket).unwrap();
 }
 
-/// A request whose bytes arrive slowly has one deadline for the whole request. So it does not prevent the port from
-/// closing.
+/// A request whose bytes arrive slowly has one deadline for the whole request. So the request cannot prevent the port
+/// from closing.
 #[test]
 fn a_request_that_comes_byte_by_byte_is_given_up() {
     let (_far, path) = pair();
     let _port = SerialPort::open(&path, 115_200).unwrap();
     let mut stream = std::os::unix::net::UnixStream::connect(door(&path)).unwrap();
-    // The door disconnects before the line is complete. All bytes together would take far more than a second.
+    // The door closes the connection before the request line is complete. The complete request would take much more
+    // than one second.
     let closed = (0..100).any(|_| {
         std::thread::sleep(Duration::from_millis(100));
         stream.write_all(b" ").is_err()

@@ -9,7 +9,8 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{labels, sample};
 
-/// Movement within [`WATCHED`] below which the arm is at rest, rad. The slowest jog moves twice as far.
+/// Movement within [`WATCHED`] below which the arm is at rest, rad. At the slowest jog, the arm moves twice this
+/// distance.
 const STILL: f64 = 1.2e-3;
 /// Time for which the arm is observed. A slow jog does not appear in any field of the status.
 const WATCHED: Duration = Duration::from_millis(250);
@@ -36,7 +37,8 @@ impl<P: Port> Session<P> {
 
 fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
     let moving = |what: String| Err(StateError::Moving { what });
-    // This also detects the beginning, a reversal and the end of a motion, at which the speed is zero for a moment.
+    // This comparison also detects the beginning, a reversal and the end of a motion, at which the speed is zero for a
+    // moment.
     if now.is_executing() {
         return moving("the arm is on the path of a trajectory".into());
     }

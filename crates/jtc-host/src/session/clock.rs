@@ -6,12 +6,13 @@ use jtc_wire::Status;
 
 /// Maximum transmission delay of a status that the clock assumes, s.
 const DELAY_S: f64 = 0.1;
-/// Minimum time between two statuses, s. This time keeps statuses apart that a slow computer reads at once.
+/// Minimum difference between the times of two statuses, s. Statuses that a slow computer reads together therefore get
+/// different times.
 const APART_S: f64 = 1e-6;
 
-/// Clock for statuses. While the controller moves along the path, the clock uses the milliseconds of the controller, which
-/// have no transmission jitter. Otherwise it uses the time of arrival. At a reduced speed the path time runs slower (J-57),
-/// so the clock is limited to 0.1 s around the time of arrival.
+/// Clock for statuses. While the controller moves along the path, the clock uses the millisecond count of the controller,
+/// which have no transmission jitter. Otherwise the clock uses the time of arrival of the status. At a reduced speed the
+/// path time runs slower (J-57), so the clock is limited to 0.1 s around the time of arrival.
 pub struct StatusClock {
     start: Duration,
     arrived: Duration,
@@ -21,7 +22,7 @@ pub struct StatusClock {
 }
 
 impl StatusClock {
-    /// Starts a clock at `now` of the port, with the controller at `point`.
+    /// Starts a clock at the port's time `now`, with the controller at the path point `point`.
     pub fn begin(now: Duration, point: u32) -> Self {
         Self { start: now, arrived: now, point, time_s: None }
     }
@@ -59,19 +60,19 @@ mod tests {
     fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
         // Different transmission delays have no effect.
         assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
-        // Half of the full speed, then a standstill.
+        // The arm moves at half of the full speed, and then it stands still.
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
         assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
         assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);
-        // Several statuses are read at once, at a standstill or ahead of the host's time. All times must differ, because a
-        // recording merges samples with equal times.
+        // Several statuses are read at once. The arm is at a standstill, or the controller is ahead of the host's time.
+        // All times must differ, because a recording merges samples with equal times.
         let at_once = times(&[(40, 40), (200, 40), (200, 40), (200, 400), (200, 440), (200, 440)]);
         assert!(at_once.is_sorted_by(|a, b| a < b), "{at_once:?}");
     }
 
     proptest! {
-        /// The input is arbitrary: statuses may be missing, the point index may begin again, or another trajectory may be
-        /// at another point.
+        /// The input is random: statuses may be missing, and the point index may jump, for example because another
+        /// trajectory begins.
         #[test]
         fn time_goes_on_and_is_that_of_arrival_to_a_tenth_of_a_second(
             begins_at in any::<u32>(),

@@ -12,7 +12,7 @@ use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::labels;
 use crate::port::Port;
 
-/// Maximum time for which a controller delays teaching until the arm is held at rest, plus a reserve.
+/// Maximum time for which a controller delays teaching until the arm is at rest with position hold, plus a reserve.
 const TEACHING: Duration = Duration::from_secs(11);
 
 /// Parameter that a controller needs.
@@ -30,7 +30,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// Returns the name for messages.
+    /// Returns the name of the parameter for messages.
     pub fn name(self) -> &'static str {
         match self {
             Parameter::FrictionTable => "friction table",
@@ -52,8 +52,8 @@ impl Parameter {
 
 impl<P: Port> Session<P> {
     /// Marks the start of a motion request. Call this before each motion if the session is used for several motions. On a
-    /// shared line, a request is rejected if it was made before another client's Stop. The time of a request is the last
-    /// call of this function, or else the beginning of the session.
+    /// shared line, a request is rejected if it was made before another client's Stop. The time of a request is the time
+    /// of the last call of this function, or, without a call, the start of the session.
     ///
     /// # Errors
     ///
@@ -115,7 +115,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Switches teaching on (only in HoldPos) or off. Teaching begins when the arm is held at rest. This function waits
-    /// until then.
+    /// until teaching begins.
     ///
     /// # Errors
     ///
@@ -132,8 +132,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::teach`], except a denial. An agent that denies this request has itself ended the
-    /// teaching of the other client.
+    /// Returns the errors of [`Session::teach`], except a denial. If an agent denies this request, the agent itself has
+    /// already ended the teaching of the other client.
     pub fn end_teaching(&mut self) -> Result<(), Error> {
         match self.teach(false) {
             Err(Error::Link(LinkError::Denied { .. })) => Ok(()),
@@ -141,9 +141,9 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Switches teaching on and waits until it begins. If it does not begin in time, or `ended` returns `true`, teaching is
-    /// switched off again. Otherwise the arm would become compliant as soon as it is at rest, when the operator no longer
-    /// expects that.
+    /// Switches teaching on and waits until it begins. If teaching does not begin in time, or `ended` returns `true`,
+    /// switches teaching off again. Otherwise the arm would become compliant as soon as it is at rest, at a time when
+    /// the operator no longer expects this.
     ///
     /// # Errors
     ///
@@ -153,8 +153,8 @@ impl<P: Port> Session<P> {
         self.read_host_timeout()?;
         self.presence.command(self.port.now());
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
-            // The controller has rejected the request, or another client has switched teaching on. So it is not switched
-            // off here.
+            // The controller has rejected the request, or another client has switched teaching on. So this function does
+            // not switch teaching off.
             Err(error) if !error.is_loss() => return Err(error.into()),
             Err(error) => Err(error.into()),
             Ok(()) => {
@@ -165,7 +165,8 @@ impl<P: Port> Session<P> {
             }
         };
         if begun.is_err() {
-            // The first error is reported. The result of this command is ignored, because it is accepted in every state.
+            // The caller gets the first error. The result of this command is ignored, because the controller accepts
+            // the command in every state.
             let _ = self.teach(false);
         }
         begun
@@ -188,8 +189,8 @@ impl<P: Port> Session<P> {
         self.command(&fixed::gripper_control(pump))
     }
 
-    /// Commands the controller to use its default for one parameter: that of the stored arm, or, without one, the built-in
-    /// default (J-54).
+    /// Commands the controller to use its default for one parameter (J-54). The default is the value of the stored arm,
+    /// or, without a stored arm, the built-in value.
     ///
     /// # Errors
     ///
@@ -198,8 +199,8 @@ impl<P: Port> Session<P> {
         self.command(&fixed::empty(parameter.use_default()))
     }
 
-    /// Commands the controller to use its defaults, as [`use_default`](Self::use_default): friction polynomial, gains and arm
-    /// model.
+    /// Commands the controller to use its defaults for the friction polynomial, the gains and the arm model, as
+    /// [`use_default`](Self::use_default) does for one parameter.
     ///
     /// # Errors
     ///
@@ -210,14 +211,15 @@ impl<P: Port> Session<P> {
             .try_for_each(|p| self.use_default(p))
     }
 
-    /// Starts the trajectory that was just uploaded, from its first point. After a pause it continues at the paused point.
-    /// **The arm moves.**
+    /// Starts the trajectory that was just uploaded, from its first point. After a pause, the trajectory continues at the
+    /// paused point. **The arm moves.**
     ///
     /// # Errors
     ///
-    /// [`MotionError::NotUploaded`], before anything is sent, unless this session uploaded exactly this trajectory and the
-    /// controller still has it. [`LinkError::Refused`] if the controller does not start it, because the arm is not at the
-    /// first point (J-34) or is not held. [`MotionError::LinkLost`] if no confirmation arrived. The arm may then be moving.
+    /// [`MotionError::NotUploaded`], before anything is sent, if this session did not upload exactly this trajectory, or if
+    /// the controller no longer has it. [`LinkError::Refused`] if the controller does not start the trajectory because the
+    /// arm is not at the first point (J-34) or not in position hold. [`MotionError::LinkLost`] if no confirmation arrived.
+    /// The arm may then be moving.
     pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
         self.catch_up()?;
         if self.uploaded.as_ref().map(CheckedTrajectory::number) != Some(checked.number()) {
@@ -231,15 +233,15 @@ impl<P: Port> Session<P> {
         self.exec(ExecCommand::Execute, Status::is_executing)
     }
 
-    /// Resumes after a pause. If this session uploaded the trajectory, and settings or payload have changed since its
-    /// check, the remainder is checked again. The trajectory of another client cannot be checked by this session.
+    /// Resumes after a pause. If settings or payload have changed since the check of a trajectory that this session
+    /// uploaded, checks the remainder again. This session cannot check the trajectory of another client.
     ///
     /// # Errors
     ///
     /// [`MotionError::RestRefused`], before anything is sent, if the remainder no longer passes the check.
     /// [`StateError::HeldStop`], before anything is sent, while the cause of a held stop is not cleared.
-    /// [`MotionError::NotPaused`], before anything is sent, if no motion is paused. [`LinkError::Refused`] if the arm has
-    /// been moved since. [`MotionError::LinkLost`] if no confirmation arrived.
+    /// [`MotionError::NotPaused`], before anything is sent, if no motion is paused. [`LinkError::Refused`] if the arm was
+    /// moved after the pause. [`MotionError::LinkLost`] if no confirmation arrived.
     pub fn resume(&mut self) -> Result<(), Error> {
         self.port.ask_to_resume().map_err(LinkError::Port)?;
         let status = self.fresh_status()?;
@@ -258,7 +260,7 @@ impl<P: Port> Session<P> {
         self.go()
     }
 
-    /// Pauses on the path.
+    /// Pauses the motion on the path.
     ///
     /// # Errors
     ///
@@ -268,7 +270,7 @@ impl<P: Port> Session<P> {
         self.exec(ExecCommand::Pause, |s| s.trajectory == TrajectoryState::Pause)
     }
 
-    /// Ends the trajectory. The next execution begins at its first point.
+    /// Ends the trajectory. The next execution begins at the first point of the trajectory.
     ///
     /// # Errors
     ///
@@ -278,8 +280,8 @@ impl<P: Port> Session<P> {
         self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
 
-    /// Sends an execution command. If it is not confirmed, it is unknown whether the arm moves, and
-    /// [`MotionError::LinkLost`] reports this.
+    /// Sends an execution command. Returns [`MotionError::LinkLost`] if the command is not confirmed, because the arm
+    /// may then be moving.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
         // No other frame is sent before a Stop or a Pause.
@@ -291,15 +293,15 @@ impl<P: Port> Session<P> {
         let retries = self.statistics.retries;
         let mut record = match self.request(&fixed::exec(command)) {
             Ok(record) => record,
-            // The command took effect, and only its record was lost.
+            // The command took effect, and only the record of the command was lost.
             Err(LinkError::NotConfirmed { .. }) if !stopping && self.last.is_some_and(|s| reached(&s)) => {
                 return Ok(());
             }
             Err(error) => return Err(self.link_lost(error, command == ExecCommand::Stop)),
         };
         if stopping && record.data == DataStatus::IncorrectValue {
-            // Without a preceding extension request, the controller reports a general code (J-51). A Stop or a Pause can be
-            // rejected only because of the state.
+            // Without a preceding extension request, the controller reports a general code (J-51). The controller rejects a
+            // Stop or a Pause only because of its state.
             record.data = DataStatus::NotAllowed;
         }
         if accepted(&record) {
@@ -314,8 +316,8 @@ impl<P: Port> Session<P> {
         Err(self.refused(record).into())
     }
 
-    /// Returns an error of the link while the arm moves or may move, with what is known about the motion. Returns a
-    /// rejection unchanged.
+    /// Converts a link error that occurs while the arm moves or may move: adds the known facts about the motion.
+    /// Returns a rejection unchanged.
     pub(super) fn link_lost(&self, error: LinkError, stop_sent: bool) -> Error {
         if !error.is_loss() {
             return error.into();
@@ -337,9 +339,9 @@ impl<P: Port> Session<P> {
         self.without_error(status)
     }
 
-    /// Waits until the controller holds the arm in HoldPos, and all drives are enabled, except those of joints that are
-    /// marked as absent. Returns an error at once if the controller reports errors. The positions in the returned status
-    /// are measured. A run starts from these positions.
+    /// Waits until the controller holds the arm in HoldPos with all drives enabled. Drives of joints that are marked as
+    /// absent do not count. Returns an error at once if the controller reports errors. The positions in the returned
+    /// status are measured. A trajectory starts at these positions.
     ///
     /// # Errors
     ///

@@ -1,4 +1,5 @@
-//! Protocol extensions: identity, settings, the arm as a whole, jogging (J-50 to J-58). Existing devices do not have them.
+//! Protocol extensions for identity, settings, complete arms and jogging (J-50 to J-58). Existing devices do not
+//! support these extensions.
 
 use std::time::Duration;
 
@@ -23,12 +24,13 @@ const STORING: Duration = Duration::from_secs(30);
 /// Knowledge of the session about the extensions of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Extensions {
-    /// The session has not asked yet.
+    /// The session has not sent an extension request yet.
     #[default]
     Unknown,
-    /// The device has no extensions.
+    /// The device does not support the extensions.
     None,
-    /// The device has extensions. The value is the port's time of the last request.
+    /// The device supports the extensions. The value is the time of the last extension request, on the clock of the
+    /// port.
     Asked(Duration),
 }
 
@@ -50,14 +52,14 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the reactions of the device to detected problems (J-69). `None` if the device does not report them, or if
-    /// the line does not answer.
+    /// Returns the report of the device about its reactions to detected problems (J-69). `None` if the device has no
+    /// such report or does not answer.
     pub fn reactions(&mut self) -> Option<Reactions> {
         self.info().ok().flatten()?.reactions
     }
 
-    /// Returns the cause of the last held stop of the device (J-69). `None` if the device does not report it, or if the
-    /// line does not answer.
+    /// Returns the cause of the last held stop of the device (J-69). `None` if the device has no such report or does
+    /// not answer.
     pub fn stop_cause(&mut self) -> Option<StopCause> {
         self.reactions()?.stop.map(|(cause, _)| cause)
     }
@@ -82,7 +84,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.info() {
-            // Statuses still arrive, so the command itself may succeed.
+            // Statuses still arrive, so the command that follows may succeed.
             Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::Denied { .. }) => {
                 self.extensions = Extensions::Asked(self.port.now());
                 Ok(())
@@ -91,14 +93,15 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sends an extension request. Returns an error if the device rejects the request or does not know it.
+    /// Sends an extension request. Returns an error if the device rejects the request or does not know this type of
+    /// request.
     pub(super) fn extension(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         let request = frame_type(type_byte(frame));
         if self.extensions == Extensions::None {
             return Err(LinkError::NoExtension { request });
         }
         let record = match self.request(frame) {
-            // An existing device reports an unknown frame type (J-50).
+            // A device without extensions reports an unknown frame type (J-50).
             Err(LinkError::NotConfirmed { last: Some(last), .. })
                 if last.status == FrameStatus::IncorrectFrameType =>
             {
@@ -162,7 +165,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the identity of the device, which is needed for `request`.
+    /// Returns the identity of the device. The caller needs it for `request`.
     fn info_for(&mut self, request: FrameType) -> Result<Info, LinkError> {
         self.info()?.ok_or(LinkError::NoExtension { request })
     }
@@ -334,7 +337,7 @@ impl<P: Port> Session<P> {
         let halts = self.port.halts();
         match self.extension(&frame) {
             // Another program's Stop has overtaken the frame (J-04). If the frame is sent again, the port blocks it, and
-            // its error contains the program that stopped the arm.
+            // the error of the port names the program that stopped the arm.
             Err(LinkError::Refused { .. }) if self.port.halts() != halts => Ok(self.extension(&frame)?),
             done => Ok(done?),
         }

@@ -1,4 +1,4 @@
-//! Following an execution to its end.
+//! Functions that follow an execution to its end.
 
 use std::time::Duration;
 
@@ -8,7 +8,8 @@ use super::Session;
 use crate::error::{Error, LinkError, MotionError};
 use crate::port::{Port, PortError};
 
-/// Action that a callback requests. All except Continue and Cancel are possible only while a motion is followed.
+/// Action that a callback requests. All actions except Continue and Cancel are possible only while a motion is
+/// followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flow {
     /// Continue unchanged.
@@ -22,16 +23,16 @@ pub enum Flow {
     Speed(u8),
     /// Stop the motion and follow it until the arm is at rest.
     Stop,
-    /// Return at once. The motion continues without being followed.
+    /// Return at once. Stop following; the motion continues.
     Cancel,
 }
 
-/// How an execution ended.
+/// Result of an execution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
     /// The motion reached its last point.
     Finished(Status),
-    /// This client or another one stopped the motion before its end.
+    /// This client or another client stopped the motion before its end.
     Stopped(Status),
 }
 
@@ -39,10 +40,10 @@ pub enum Outcome {
 const SETTLE: Duration = Duration::from_millis(300);
 
 impl<P: Port> Session<P> {
-    /// Follows the execution that was just started. `each` receives every status.
+    /// Follows the execution that was just started. The callback `each` receives every status.
     ///
-    /// If the link is lost during the motion, a Stop is sent, because frames may still arrive. The error states that the
-    /// arm may be moving.
+    /// If the link is lost during the motion, sends a Stop, because the controller may still receive frames. The error
+    /// states that the arm may be moving.
     ///
     /// # Errors
     ///
@@ -116,7 +117,8 @@ impl<P: Port> Session<P> {
                 Flow::Pause if status.is_executing() => unless_ended(self.pause()),
                 Flow::Resume => self.resume(),
                 Flow::Speed(percent) => self.set_speed(f64::from(percent) / 100.0),
-                // An accepted Stop is not repeated. The controller decelerates to standstill without further commands.
+                // The session does not repeat an accepted Stop. The controller decelerates to standstill without
+                // further commands.
                 Flow::Stop if !stopping || again => {
                     stopping = true;
                     unless_ended(self.stop())
@@ -126,7 +128,7 @@ impl<P: Port> Session<P> {
             done(flow, &did);
             match (flow, did) {
                 (_, Ok(())) => {}
-                // The motion continues unchanged or stays paused, so it is followed further.
+                // The motion continues unchanged or stays paused, so the session continues to follow it.
                 (
                     Flow::Resume,
                     Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }))),
@@ -144,7 +146,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sends a Stop after the link is lost. Frames may still arrive, and an arm that is not observed should not move.
+    /// Sends a Stop after the link is lost. The controller may still receive frames, and an arm that the host cannot
+    /// observe should not move.
     fn lost_in_motion(&mut self, error: LinkError) -> Error {
         let sent =
             self.last.is_none_or(|s| s.is_executing()) && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();

@@ -1,4 +1,4 @@
-//! Jogging from its start to standstill.
+//! Jogging, from the start of the motion to standstill.
 
 use std::time::Duration;
 
@@ -9,14 +9,14 @@ use crate::error::{Error, LinkError, StateError};
 use crate::port::halt::Halt;
 use crate::port::{Port, Standstill};
 
-/// Interval at which a velocity is sent again. The controller drops a velocity after 200 ms (J-58).
+/// Interval at which the session repeats a jog velocity. The controller drops a velocity after 200 ms (J-58).
 pub const JOG_AGAIN: Duration = Duration::from_millis(50);
 /// Maximum time that an arm needs to come to rest.
 const REST: Duration = Duration::from_secs(3);
 
 impl<P: Port> Session<P> {
-    /// Waits until joints may be jogged. A controller that has just caught the load of a joint does not jog yet. If there
-    /// is any other reason against jogging, returns an error at once.
+    /// Waits until joints may be jogged. A controller that has just begun to carry the load of a joint rejects jogging
+    /// for a short time. If the controller rejects jogging for another reason, returns an error at once.
     ///
     /// # Errors
     ///
@@ -56,8 +56,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Jogs at this velocity (rad/s) until `over` returns `true`. **The arm moves.** Call [`Session::jog_to_rest`]
-    /// afterwards.
+    /// Jogs at these joint velocities (rad/s) until `over` returns `true`. **The arm moves.** Call
+    /// [`Session::jog_to_rest`] afterwards.
     ///
     /// # Errors
     ///
@@ -95,7 +95,7 @@ impl<P: Port> Session<P> {
             standstill.see(self.now(), &status);
             let late = self.now() > end;
             if late || standstill.is_reached() {
-                // The controller may lower a load for longer than that. The controller is then in a held stop.
+                // The controller may still be lowering a load after this time. The controller is then in a held stop.
                 self.without_held_stop(&status)?;
             }
             if standstill.is_reached() {

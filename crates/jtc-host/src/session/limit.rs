@@ -1,19 +1,19 @@
-//! Timeout for an answer of the controller that tolerates a busy host computer.
+//! Timeout for an answer of the controller; a busy host computer does not end it early.
 
 use std::time::Duration;
 
 /// Maximum duration of a single wait.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Remaining time for an answer. A wait that takes longer than planned is subtracted only with its planned length. A
-/// computer that wakes this program late may also have delayed the answer, or the simulator that sends it.
+/// Remaining time for an answer. If a wait takes longer than planned, only the planned length is subtracted. If the
+/// computer wakes this program late, it may also have delayed the answer or the simulator that sends the answer.
 #[derive(Debug)]
 pub(super) struct Limit {
     left: Duration,
 }
 
 impl Limit {
-    /// Creates a limit of this length.
+    /// Creates a time limit of this length.
     pub(super) fn new(time: Duration) -> Self {
         Self { left: time }
     }

@@ -1,4 +1,4 @@
-//! Fetching the flight recorder log of a device page by page, with the device data that a replay needs (J-56).
+//! Download of a device's flight recorder log, page by page, with the device data that a replay needs (J-56).
 
 use jtc_core::recorder::BLOCK_BYTES;
 use jtc_wire::{Answer, LOG_NO_BLOCK, LogState, RawPoint, fixed};
@@ -13,7 +13,7 @@ use crate::port::Port;
 pub struct LogStatus {
     /// Activity of the recorder, or the reason why it has stopped.
     pub state: LogState,
-    /// Number after the number of the newest block.
+    /// Number of the newest block plus 1.
     pub end: u32,
 }
 
@@ -28,7 +28,7 @@ struct Page {
 }
 
 impl<P: Port> Session<P> {
-    /// Returns the state of the flight recorder. The recorder continues.
+    /// Returns the state of the flight recorder. The recorder continues to record.
     ///
     /// # Errors
     ///
@@ -37,7 +37,7 @@ impl<P: Port> Session<P> {
         self.log_page(LOG_NO_BLOCK, 0).map(|page| page.status)
     }
 
-    /// Deletes the log. The recorder starts a new log.
+    /// Deletes the log. Starts a new log in the recorder.
     ///
     /// # Errors
     ///
@@ -61,8 +61,8 @@ impl<P: Port> Session<P> {
     }
 
     /// Reads the complete log, the active arm, and the points of the trajectory that the log needs. The recorder pauses
-    /// meanwhile. The arm may move. Calls `done` after each part with the number of bytes received and the total number of
-    /// bytes.
+    /// during the transfer. The arm may move during the transfer. Calls `done` after each part with the number of bytes
+    /// received and the total number of bytes.
     ///
     /// # Errors
     ///
@@ -88,13 +88,14 @@ impl<P: Port> Session<P> {
             if ended() {
                 return Err(Error::Cancelled);
             }
-            // The first answer shows the beginning of the log.
+            // The first answer contains the number of the first block of the log.
             let (block, offset) =
                 (first.unwrap_or(0) + (bytes.len() / BLOCK_BYTES) as u32, bytes.len() % BLOCK_BYTES);
             let page = self.log_page(block, offset as u16)?;
             (log.state, log.points_hash) = (page.status.state, page.points_hash);
             if page.block != block || first.is_none() || usize::from(page.offset) != offset {
-                // This is the oldest block, or the first block of a log that was cleared and started again.
+                // The page belongs to the oldest block, or to the first block of a log that was cleared and started
+                // again.
                 bytes.clear();
                 first = Some(page.block);
             }
@@ -118,7 +119,8 @@ impl<P: Port> Session<P> {
         Ok(log)
     }
 
-    /// Returns points of the trajectory in the device's memory. If the memory has fewer than `count`, returns fewer.
+    /// Returns points of the trajectory in the device's memory. If the memory contains fewer than `count` points,
+    /// returns all of them.
     fn log_points(&mut self, first: usize, count: usize) -> Result<Vec<RawPoint>, LinkError> {
         let mut all = Vec::new();
         while all.len() < count {

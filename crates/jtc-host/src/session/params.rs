@@ -20,7 +20,7 @@ const TRIAL: Duration = Duration::from_millis(2_500);
 pub struct PushReport {
     /// Parameter.
     pub parameter: Parameter,
-    /// Size of its frame, bytes.
+    /// Size of the parameter's frame, bytes.
     pub bytes: usize,
     /// Number of times that the frame must be sent: two for the friction table.
     pub times: u32,
@@ -29,11 +29,11 @@ pub struct PushReport {
 }
 
 impl<P: Port> Session<P> {
-    /// Checks `set`, then sends its parameters. Calls `done` after each of them.
+    /// Checks `set`, and then sends the parameters in `set`. Calls `done` after each parameter.
     ///
-    /// If gains are set while the arm is held, they are on trial for two seconds. If the arm is not stable with them, the
-    /// controller restores the old gains and goes into a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71).
-    /// [`Session::await_trial`] waits for the result.
+    /// If gains are set while the arm is held, they are on trial for two seconds. If the arm is not stable with the new
+    /// gains, the controller restores the old gains and goes into a held stop of the kind [`jtc_wire::StopKind::Gains`]
+    /// (J-71). [`Session::await_trial`] waits for the result.
     ///
     /// # Errors
     ///
@@ -62,8 +62,8 @@ impl<P: Port> Session<P> {
         set.check()?;
         let mut frames = Vec::new();
         if let Some(friction) = &set.friction {
-            // The table is too long for CRC-16 to detect every double bit error. So it is sent twice, and both
-            // transmissions must be confirmed.
+            // The table is too long for CRC-16 to detect every double bit error. So the table is sent twice, and the
+            // controller must confirm both transmissions.
             let (parameter, times) = match friction {
                 jtc_core::Friction::Table(_) => (Parameter::FrictionTable, 2),
                 jtc_core::Friction::Polynomial(_) => (Parameter::FrictionPolynomial, 1),
@@ -95,9 +95,9 @@ impl<P: Port> Session<P> {
         Ok(all)
     }
 
-    /// Waits while new gains are on trial (J-71). If they are, calls `begun` first. Call this function right after
-    /// [`Session::push`] or [`Session::push_arm`]. Returns `true` if there was a trial. Returns `false` without torque, and
-    /// for a device without extensions.
+    /// Waits while new gains are on trial (J-71). If new gains are on trial, calls `begun` first. Call this function right
+    /// after [`Session::push`] or [`Session::push_arm`]. Returns `true` if gains were on trial. Returns `false` if the arm
+    /// has no torque or the device has no extensions.
     ///
     /// # Errors
     ///
@@ -130,7 +130,7 @@ fn explained(error: LinkError, set: &ParameterSet) -> Error {
     let LinkError::Refused { request, code: DataStatus::IncorrectValue, .. } = error else {
         return error.into();
     };
-    // Only values that were in this frame can be the reason.
+    // Only a value in this frame can be the reason for the rejection.
     let part = match request {
         FrameType::PidParam => ParameterSet { pid: set.pid, ..ParameterSet::default() },
         FrameType::ArmModel => ParameterSet { model: set.model, ..ParameterSet::default() },

@@ -9,7 +9,8 @@ use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Returns the payload that the controller assumes at the flange. Without extensions it is [`Payload::NONE`].
+    /// Returns the payload that the controller assumes at the flange. If the device has no extensions, the payload is
+    /// [`Payload::NONE`].
     ///
     /// # Errors
     ///
@@ -18,8 +19,8 @@ impl<P: Port> Session<P> {
         Ok(self.device_config()?.payload)
     }
 
-    /// Sets the payload. The controller takes half a second to include it in the torque. Execute, teaching and jogging wait
-    /// for that.
+    /// Sets the payload. The controller takes half a second to include a new payload in the torque. Execute, teaching and
+    /// jogging wait until the payload is included.
     ///
     /// # Errors
     ///
@@ -30,7 +31,7 @@ impl<P: Port> Session<P> {
     pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
         payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
         let values: Vec<_> = settings::payload_values(payload).collect();
-        // This payload is rejected by every controller.
+        // Every controller rejects this payload.
         let alone = settings::with_values(&Config::avena(), values.iter().copied());
         if let Err(settings::SettingError::Value { .. }) = alone.as_ref() {
             return Err(
@@ -48,7 +49,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the reason why the controller rejected a physically valid payload, if it can be determined.
+    /// Returns the reason why the controller rejected a physically valid payload, if the reason can be determined.
     fn why_refused(&mut self, payload: &Payload) -> Result<Option<ExtensionError>, Error> {
         let config = self.device_config()?;
         if let Err(e) = config.parameter_bounds.check_payload(payload) {

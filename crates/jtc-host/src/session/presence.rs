@@ -14,9 +14,9 @@ use super::extension::{ASK_AGAIN, Extensions};
 use crate::error::LinkError;
 use crate::port::Port;
 
-/// Maximum time until a command appears in the statuses.
+/// Maximum time until a command has an effect in the statuses.
 const SHOWS: Duration = Duration::from_secs(1);
-/// Shortest time between two requests. A status is sent every 40 ms, and an answer takes 13 ms at 115,200 Bd.
+/// Minimum time between two GetInfo requests. A status is sent every 40 ms, and an answer takes 13 ms at 115,200 Bd.
 const SHORTEST: Duration = Duration::from_millis(20);
 
 /// State of host supervision in the session.
@@ -24,12 +24,12 @@ const SHORTEST: Duration = Duration::from_millis(20);
 pub(super) struct Presence {
     /// Time at which this session commanded the current motion or teaching.
     commanded: Option<Duration>,
-    /// `true` while the session waits for teaching to begin.
+    /// `true` while the session waits until teaching begins.
     waits: bool,
     /// `true` if the last status shows that the arm moves or can be guided by hand.
     moves: bool,
-    /// Last known `host_timeout_ms` of the controller, ms. 0 means no supervision. A controller without torque may get
-    /// another value, so the value is forgotten then.
+    /// Last known `host_timeout_ms` of the controller, ms. 0 means no supervision. The session discards the value while
+    /// the controller has no torque, because the setting may then be changed.
     host_timeout_ms: Option<f64>,
     /// `true` if the controller has accepted an extension request.
     answered: bool,
@@ -71,7 +71,7 @@ impl Presence {
         self.commanded.is_some() && (self.moves || self.waits)
     }
 
-    /// Returns the time between two requests. This time is short enough for at least three requests within the
+    /// Returns the time between two GetInfo requests. This time is short enough for at least three requests within the
     /// controller's timeout.
     fn period(&self) -> Duration {
         match self.host_timeout_ms {
@@ -80,7 +80,7 @@ impl Presence {
         }
     }
 
-    /// Evaluates an answer. If it answers a GetInfo, returns the time at which that GetInfo was sent.
+    /// Evaluates an answer. If the record answers a GetInfo, returns the time at which that GetInfo was sent.
     pub(super) fn take_answer(&mut self, answer: &Answer<'_>) -> Option<Duration> {
         match answer {
             Answer::Info(_) => {
@@ -93,7 +93,7 @@ impl Presence {
         None
     }
 
-    /// Stores the timeout from settings that were read or set.
+    /// Stores the host timeout from settings that were read or set.
     fn take(&mut self, values: impl Iterator<Item = SettingValue>) {
         if let Some(ms) = host_timeout_ms(values) {
             self.host_timeout_ms = Some(ms);
@@ -108,7 +108,7 @@ pub fn host_timeout_ms(mut values: impl Iterator<Item = SettingValue>) -> Option
 }
 
 impl<P: Port> Session<P> {
-    /// Sends GetInfo if it is due. Returns the time until it is due again.
+    /// Sends a GetInfo if its time has come. Returns the time until the next GetInfo.
     pub(super) fn show_presence(&mut self) -> Result<Duration, LinkError> {
         let Extensions::Asked(at) = self.extensions else { return Ok(Duration::MAX) };
         if !self.presence.is_shown() {
@@ -125,13 +125,13 @@ impl<P: Port> Session<P> {
         Ok(period)
     }
 
-    /// Stores the timeout from settings that the device has accepted.
+    /// Stores the host timeout from settings that the device has accepted.
     pub(super) fn set_presence(&mut self, values: &[SettingValue]) {
         self.presence.take(values.iter().copied());
     }
 
-    /// Waits for the answers to the requests of [`show_presence`](Self::show_presence). Until then the device would reject
-    /// another request (J-50).
+    /// Waits for the answers to the requests of [`show_presence`](Self::show_presence). Before these answers, the device
+    /// would reject another request (J-50).
     pub(super) fn await_presence(&mut self) -> Result<(), LinkError> {
         let end = self.presence.asked_at + self.confirmation_time(jtc_wire::ANSWER_MAX);
         while self.presence.unanswered > 0 && self.port.now() < end {
@@ -141,13 +141,14 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Reads the timeout before a motion begins, unless it is known.
+    /// Reads the host timeout before a motion begins, if the timeout is not yet known.
     pub(super) fn read_host_timeout(&mut self) -> Result<(), LinkError> {
         if self.presence.host_timeout_ms.is_some() || !self.presence.answered {
             return Ok(());
         }
         match self.settings() {
-            // If the timeout cannot be read, the default period is used. If the line is lost, the next command reports it.
+            // If the timeout cannot be read, the default period is used. If the line is lost, the next command returns
+            // that error.
             Err(
                 LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::NoExtension { .. },
             ) => Ok(()),

@@ -6,7 +6,7 @@ use crate::arm::{Arm, ParameterSet};
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
-/// Part of an arm that the device has just received.
+/// Part of an arm that the device has received.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArmPart<'a> {
     /// Number of settings.
@@ -31,8 +31,8 @@ impl<P: Port> Session<P> {
         self.push_arm_until(arm, || false, done)
     }
 
-    /// Like [`Session::push_arm`], but stops once `ended` returns `true` because the user cancels. The device then keeps
-    /// the parts for which `done` was called.
+    /// Like [`Session::push_arm`], but stops once `ended` returns `true` because the user cancels. In this case the
+    /// device keeps the parts for which `done` was called.
     ///
     /// # Errors
     ///
@@ -52,8 +52,9 @@ impl<P: Port> Session<P> {
     }
 
     /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54). Returns the number of the stored arm. The
-    /// arm has no torque meanwhile. With friction, gains and model the controller would leave Init and hold the arm. So the
-    /// parts that it has received are withdrawn before the last of the three is sent.
+    /// arm has no torque during the transfer. If the controller had friction, gains and model at the same time, it would
+    /// leave Init and hold the arm. So this function withdraws the parts already sent before it sends the last of these
+    /// three parameters.
     ///
     /// # Errors
     ///
@@ -67,8 +68,8 @@ impl<P: Port> Session<P> {
         self.push_and_store_arm_until(arm, || false, done)
     }
 
-    /// Like [`Session::push_and_store_arm`], but stops once `ended` returns `true` because the user cancels. The device
-    /// then keeps the parts for which `done` was called.
+    /// Like [`Session::push_and_store_arm`], but stops once `ended` returns `true` because the user cancels. In this
+    /// case the device keeps the parts for which `done` was called.
     ///
     /// # Errors
     ///
@@ -93,20 +94,21 @@ impl<P: Port> Session<P> {
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
-        // This brings the device into the same state as after a start. A later request of the host activates the complete
+        // After this, the device is in the state in which it starts. A later request of the host activates the complete
         // stored arm.
         self.withdraw_arm()?;
         Ok((pushed, number))
     }
 
-    /// If the device has no torque, makes it drop its active arm, so that parts of two arms are not combined (J-71).
+    /// If the arm has no torque, commands the device to drop its active arm, so that parts of two arms are not combined
+    /// (J-71).
     fn withdraw_arm(&mut self) -> Result<(), Error> {
         let state = self.fresh_status()?.state;
         if state == ControllerState::Init {
             self.disable()?;
         } else if state == ControllerState::Error {
             match self.disable() {
-                // Older firmware rejects this in Error, but it accepts each part separately.
+                // In Error, older firmware rejects this command, but it accepts each part separately.
                 Err(LinkError::Refused { .. }) => {}
                 done => done?,
             }
@@ -114,7 +116,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Sends settings and name, each only if it differs.
+    /// Sends the settings and the name, but only those that differ from the device.
     fn push_settings(
         &mut self,
         arm: &Arm,
@@ -139,7 +141,7 @@ impl<P: Port> Session<P> {
         goes_on()
     }
 
-    /// Reads the arm back from the device, and checks that it equals this arm.
+    /// Reads the arm back from the device, and checks that it is equal to `arm`.
     fn has_arm(&mut self, arm: &Arm, hash: u64) -> Result<(), Error> {
         if self.info()?.is_some_and(|info| info.hash == hash) {
             return Ok(());

@@ -9,12 +9,12 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{held_stop, labels};
 
-/// Maximum time until the drives are enabled. Their first enable takes 4 s.
+/// Maximum time until the drives are enabled. The first enable of the drives takes 4 s.
 pub const BRING_UP: Duration = Duration::from_secs(15);
 
 impl<P: Port> Session<P> {
-    /// If the controller is starting up, waits until it holds the arm with all drives enabled. Returns the status for the
-    /// check of a motion. Calls `waits` with a description of the state that is awaited.
+    /// If the controller is starting up, waits until it holds the arm with all drives enabled. Returns the status that the
+    /// check of a motion needs. Calls `waits` with a description of the state for which the function waits.
     ///
     /// # Errors
     ///

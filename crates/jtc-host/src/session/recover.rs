@@ -1,4 +1,4 @@
-//! Recovery from every state to HoldPos. Each step is reported.
+//! Recovery from any state to HoldPos. The recovery reports each step.
 
 mod parameters;
 mod source;
@@ -18,7 +18,7 @@ use crate::error::{Error, LinkError, StateError};
 use crate::labels;
 use crate::port::Port;
 
-/// Maximum time until a node is ready. The first enable of a drive takes 4 s, and longer after a reset.
+/// Maximum time until a node is ready. The first enable of a drive takes 4 s. After a reset it takes longer.
 const NODE_TIME: Duration = Duration::from_secs(15);
 /// Maximum time from reset to Init.
 const START_TIME: Duration = Duration::from_secs(3);
@@ -30,8 +30,8 @@ const BOOT: Duration = Duration::from_secs(1);
 const TAKEN_IN: Duration = Duration::from_millis(60);
 /// Maximum number of steps before the recovery fails.
 const ACTS_MAX: u8 = 24;
-/// Maximum number of times that a held stop is cleared. Meanwhile a compliant joint comes to rest, or an operator frees the
-/// joint.
+/// Maximum number of times that a held stop is cleared. In the time of these attempts, a compliant joint comes to rest, or
+/// an operator frees the joint.
 const HELD_CLEARS: u8 = 6;
 /// Maximum number of times that errors are cleared.
 const CLEARS_MAX: u8 = 6;
@@ -39,13 +39,13 @@ const CLEARS_MAX: u8 = 6;
 const EFFECT: Duration = Duration::from_millis(500);
 /// Interval at which the recovery checks whether the user cancels.
 const LOOK: Duration = Duration::from_millis(100);
-/// Time for the operator to release the emergency stop.
+/// Time that the operator has to release the emergency stop.
 const PERSON_TIME: Duration = Duration::from_secs(60);
 
 impl<P: Port> Session<P> {
-    /// Brings the controller to HoldPos without errors. `parameters` gives friction, gains and arm model if the controller
-    /// lacks some of them. If the source is missing or incomplete, an error is returned before anything is sent. A
-    /// trajectory is never resumed.
+    /// Brings the controller to HoldPos without errors. `parameters` is the source of friction, gains and arm model if the
+    /// controller lacks some of them. If this source is missing or incomplete, returns an error before anything is sent.
+    /// The recovery never resumes a trajectory.
     ///
     /// # Errors
     ///
@@ -60,8 +60,8 @@ impl<P: Port> Session<P> {
         self.recover_until(parameters, || false, report)
     }
 
-    /// Like [`Session::recover`], but ends once `ended` returns `true` because the user cancels. Then nothing more is sent,
-    /// and [`Error::Cancelled`] is returned. A motion is first stopped and followed to standstill.
+    /// Like [`Session::recover`], but ends once `ended` returns `true` because the user cancels. After that, it sends
+    /// nothing more and returns [`Error::Cancelled`]. A running motion is first stopped and followed to standstill.
     ///
     /// # Errors
     ///
@@ -103,7 +103,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Recovery in progress, with what it has done so far.
+/// Recovery in progress, with the steps done so far.
 struct Recovery<'a, P, Ended, Report> {
     session: &'a mut Session<P>,
     parameters: ParameterSource<'a>,
@@ -119,7 +119,7 @@ struct Recovery<'a, P, Ended, Report> {
     held_clears: u8,
     /// `true` if nodes were reset because they did not start up.
     reset_slow: bool,
-    /// Time at which the operator was first asked to release the emergency stop.
+    /// Time of the first message that asks the operator to release the emergency stop.
     asked: Option<Duration>,
     /// Number of steps left before the recovery fails.
     acts_left: u8,
@@ -152,8 +152,8 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         }
     }
 
-    /// Brings the controller from the state in `status` to HoldPos without errors. Takes one step for each state on the
-    /// way.
+    /// Brings the controller from the state in `status` to HoldPos without errors. Executes one step for each state
+    /// that occurs.
     fn from(&mut self, mut status: Status) -> Result<Status, Error> {
         while self.acts_left > 0 {
             self.acts_left -= 1;
@@ -184,7 +184,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                 Some(ControllerState::Operate) => self.end_motion()?,
                 Some(ControllerState::Teaching) => self.end_teaching()?,
                 Some(ControllerState::Error) => self.leave_error(&status)?,
-                // This program does not know the state, so it does nothing.
+                // This program does not know the state, so the recovery does nothing.
                 None => break,
             }
             status = self.session.fresh_status()?;
@@ -240,7 +240,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
 
     fn leave_error(&mut self, status: &Status) -> Result<(), Error> {
         let nodes = faulty(status);
-        // Errors are latched. Only an attempt to clear them shows if the safety input is high again.
+        // Errors are latched. Only an attempt to clear the errors shows whether the safety input is high again.
         let safety_input = status.errors & error::EMERGENCY_INPUT != 0;
         if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
             return self.wait_for_a_person(status);
@@ -260,7 +260,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         Ok(())
     }
 
-    /// Clears errors again and again, for at most 60 s, until the safety input is high again.
+    /// Repeats the clearing of errors until the safety input is high again, for at most 60 s.
     fn wait_for_a_person(&mut self, status: &Status) -> Result<(), Error> {
         let since = *self.asked.get_or_insert_with(|| {
             (self.report)(&RecoverStep::SafetyInput);
@@ -274,7 +274,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn clear(&mut self, nodes: u8) -> Result<(), Error> {
-        // If the fault persists, the caller finds it in the next status.
+        // If the fault persists, the next status shows it to the caller.
         self.session.clear_if_possible(true, nodes)?;
         self.session.pause_for(EFFECT, &self.ended)
     }

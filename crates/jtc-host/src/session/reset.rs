@@ -22,7 +22,7 @@ pub fn reset_takes_torque(nodes: u8, state: Code<ControllerState>) -> Result<boo
 }
 
 impl<P: Port> Session<P> {
-    /// Resets nodes (bits 0..6). If the arm has torque, `may_fall` must be set.
+    /// Resets nodes (bits 0..6). If the arm has torque, the caller must set `may_fall`.
     ///
     /// # Errors
     ///

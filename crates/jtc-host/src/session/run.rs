@@ -1,4 +1,4 @@
-//! Execution of a trajectory from its start to its end, with the samples.
+//! Execution of a trajectory from its start to its end, with a sample for each status.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,19 +13,20 @@ use crate::report::Summary;
 use crate::sample::Sample;
 use crate::{Arm, Error};
 
-/// Result of a run: how it ended, and a sample for each status.
+/// Result of the execution of a trajectory, with a sample for each status.
 #[derive(Debug)]
 #[must_use = "a run may have failed: check its outcome"]
 pub struct Run {
-    /// How the run ended. If it failed, it is an error of [`Session::execute`] or of [`Session::follow`]. A failed run also
-    /// has samples, for an analysis of the failure.
+    /// Result of the execution. If the run failed, the error is one of [`Session::execute`] or [`Session::follow`]. A
+    /// failed run also has samples, for an analysis of the failure.
     pub outcome: Result<Outcome, Error>,
-    /// Samples, oldest first. The commanded values are those of the trajectory at the point that the controller reports.
+    /// Samples, oldest first. The commanded values in a sample are the values of the trajectory at the point that the
+    /// controller reports.
     pub samples: Vec<Sample>,
 }
 
 impl Run {
-    /// Returns the figures of the run: tracking error, speed and torque of each joint. `arm` supplies names and limits.
+    /// Returns the tracking error, speed and torque of each joint during the run. `arm` supplies names and limits.
     pub fn summary(&self, arm: &Arm) -> Summary {
         Summary::of(&RecordingInfo::of(arm), &self.samples)
     }
@@ -34,8 +35,8 @@ impl Run {
 impl<P: Port> Session<P> {
     /// Executes the trajectory that was just uploaded and follows it to its end. **The arm moves.**
     ///
-    /// `each` receives each status and returns the next action: continue, pause, resume, stop. An observer that was set
-    /// earlier is removed.
+    /// `each` receives each status and returns the next action, for example to pause or to stop. This function removes
+    /// an observer that was set earlier.
     pub fn run(&mut self, checked: &CheckedTrajectory, each: impl FnMut(&Status) -> Flow) -> Run {
         let samples = Rc::<RefCell<Vec<Sample>>>::default();
         let taken = Rc::clone(&samples);

@@ -1,4 +1,4 @@
-//! Changes of settings by a user. All values are checked before any of them is sent (J-53).
+//! Changes of settings by a user. All values are checked before the first value is sent (J-53).
 
 use jtc_core::settings;
 use jtc_wire::SettingValue;

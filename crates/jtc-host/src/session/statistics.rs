@@ -22,7 +22,7 @@ pub struct LinkStatistics {
 }
 
 impl LinkStatistics {
-    /// Returns the statistics since `before`, which is an earlier snapshot of the same session.
+    /// Returns the statistics since `before`, an earlier snapshot of this session.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             bytes_sent: self.bytes_sent.saturating_sub(before.bytes_sent),

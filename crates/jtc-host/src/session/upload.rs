@@ -1,4 +1,5 @@
-//! Upload of a trajectory. Several frames are in flight, each segment is confirmed, and lost segments are sent again.
+//! Upload of a trajectory to the controller. Several frames are in flight, each segment is confirmed, and lost segments
+//! are sent again.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -33,15 +34,15 @@ pub struct Progress {
     pub bytes_done: usize,
     /// Bytes of all segments.
     pub bytes: usize,
-    /// Bytes per second so far.
+    /// Average rate since the start of the upload, bytes/s.
     pub bytes_per_s: f64,
-    /// Time left at this rate, s.
+    /// Remaining time at the average rate, s.
     pub left_s: f64,
     /// Number of repeated segments.
     pub retries: u32,
 }
 
-/// Figures of a completed upload.
+/// Statistics of a completed upload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct UploadReport {
     /// Number of points.
@@ -54,7 +55,7 @@ pub struct UploadReport {
     pub time_s: f64,
     /// Bytes per second.
     pub bytes_per_s: f64,
-    /// Used share of the capacity of the line. `None` if the line has no rate.
+    /// Share of the line capacity that the upload used. `None` if the line has no bit rate.
     pub line_share: Option<f64>,
     /// Number of repeated segments.
     pub retries: u32,
@@ -63,7 +64,8 @@ pub struct UploadReport {
 }
 
 impl UploadReport {
-    /// Returns the used share of the capacity of the line, %. `None` for a pseudo-terminal that is faster than its rate.
+    /// Returns the share of the line capacity that the upload used, %. `None` for a pseudo-terminal that is faster than
+    /// its rate.
     pub fn line_share_percent(&self) -> Option<f64> {
         self.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
     }
@@ -80,7 +82,7 @@ struct Upload {
     confirmed: usize,
     next: usize,
     in_flight: VecDeque<InFlight>,
-    /// Remainder of the frame that is being written.
+    /// Bytes of the current frame that are not yet written.
     writing: Option<(usize, usize)>,
     line_done: Duration,
     /// `true` if segments are sent one at a time, until the state of the controller is known again.
@@ -130,7 +132,8 @@ impl Upload {
             restarts: 0,
             halts: 0,
             window: window.clamp(3, WINDOW_MAX),
-            // As many bytes as the line transmits in 10 ms, so that statuses are received between two writes.
+            // Each write is limited to the bytes that the line transmits in 10 ms, so that statuses are received
+            // between two writes.
             chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
             start: now,
             bytes_done: 0,
@@ -187,7 +190,7 @@ impl<P: Port> Session<P> {
     /// (trajectory state Stop). The arm does not move. Calls `progress` after each confirmed segment; `progress` can
     /// cancel the upload with [`Flow::Cancel`].
     ///
-    /// The first segment deletes the trajectory that the controller had.
+    /// The first segment deletes the earlier trajectory in the controller.
     ///
     /// # Errors
     ///
@@ -282,7 +285,7 @@ impl<P: Port> Session<P> {
         Ok(false)
     }
 
-    /// Writes a piece or waits for a record. Returns `true` if a segment was confirmed.
+    /// Writes a part of a frame or waits for a record. Returns `true` if a segment was confirmed.
     fn advance(&mut self, up: &mut Upload) -> Result<bool, Error> {
         if up.writing.is_none() && up.may_send() {
             if up.next == 0 {
@@ -341,8 +344,8 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match record.data {
-            // The only segment in flight is rejected as out of order. So it had arrived earlier, and only its confirmation
-            // was lost.
+            // The controller rejects the only segment in flight because its number is out of order. So the segment had
+            // arrived earlier, and only the confirmation was lost.
             DataStatus::IncorrectSegmentOrder if up.probing && up.confirmed > 0 => {
                 up.confirm();
                 Ok(())
@@ -353,8 +356,8 @@ impl<P: Port> Session<P> {
                     return Err(LinkError::Denied { request: FrameType::Trajectory, reason }.into());
                 }
                 if self.port.halts().all != up.halts {
-                    // The Stop of another program made the controller drop the upload. The port had not yet blocked this
-                    // segment.
+                    // The Stop of another program made the controller drop the upload. The segment was sent before the
+                    // port began to block segments.
                     return Err(LinkError::Port(PortError::Halted { by: None }).into());
                 }
                 Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
@@ -368,8 +371,8 @@ impl<P: Port> Session<P> {
         if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
         }
-        // All segments are sent, and the status shows that the trajectory is complete. So only confirmations were lost. (An
-        // old status cannot be the reason: the trajectory state has been Null since segment 0 was confirmed.)
+        // All segments are sent, and the status shows that the trajectory is complete. So only confirmations were lost.
+        // (The status cannot be old, because the trajectory state has been Null since segment 0 was confirmed.)
         if up.next == up.frames.len()
             && up.confirmed > 0
             && self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop)

@@ -1,5 +1,5 @@
-//! Tables of numbers, with a header line or in the form of existing programs: 19 columns of int16 or float without a
-//! header.
+//! Tables of numbers, with a header line or in the format of existing programs, which is 19 columns of int16 or float
+//! without a header.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use super::{Form, Loaded, Point, ScaleError, Trajectory};
 use crate::file::{FileError, Place, number, rows, short};
 use crate::waypoints;
 
-/// Number of columns of the forms without a header: time, 6 positions, 6 velocities, 6 accelerations.
+/// Number of columns in the formats without a header: 1 time, 6 positions, 6 velocities and 6 accelerations.
 const COLUMNS: usize = 1 + 3 * JOINTS;
 
 pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
@@ -48,7 +48,7 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
             return Err(FileError::at(Place::line(line), format!("{n} columns without a header; {help}")));
         }
     }
-    // The float form always contains a decimal point, and the int16 form never does.
+    // The float format always contains a decimal point, and the int16 format never contains one.
     let whole = rows(text)
         .all(|(_, cells)| cells.iter().all(|c| c.bytes().all(|b| b.is_ascii_digit() || b"+-".contains(&b))));
     if whole { int16(text) } else { float(text) }
@@ -164,14 +164,14 @@ fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }
 
-/// Returns the column for a name in a header, and the factor from its unit. Column 0 is the time. From 1 on the columns are
-/// those of the forms without a header.
+/// Returns the column for a name in a header, and the factor from its unit. Column 0 is the time. Columns from 1 have the
+/// same order as in the formats without a header.
 fn column_of(name: &str) -> Option<(usize, f64)> {
     let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
     if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
         return Some((0, 1.0));
     }
-    // A unit may follow: q1_rad, qd1_rad_s, qdd1_rad_s2, q1_deg, qd1_deg_s, qdd1_deg_s2.
+    // The name may contain a unit, as in q1_rad, qd1_rad_s, qdd1_rad_s2, q1_deg, qd1_deg_s, qdd1_deg_s2.
     let (name, unit) = match (name.split_once("_rad"), name.split_once("_deg")) {
         (Some((head, _)), _) => (head, 1.0),
         (None, Some((head, _))) => (head, 1f64.to_radians()),
@@ -250,12 +250,12 @@ impl Trajectory {
 
     /// Like [`Trajectory::to_csv`], with 17 significant digits in each number.
     pub fn to_exact_csv(&self) -> String {
-        // Adding zero turns −0 into 0.
+        // Adding zero changes −0 to 0.
         self.csv_with(|v| format!(",{:.16e}", v + 0.0))
     }
 
-    /// Returns the trajectory in the form of 19 columns of integers without a header. These are exactly the values in the
-    /// frames.
+    /// Returns the trajectory in the format of 19 columns of integers without a header. The values are exactly those in
+    /// the frames.
     ///
     /// # Errors
     ///

@@ -1,30 +1,30 @@
 //! Fits a trajectory (points at a fixed step) to samples at any times, and derives missing velocities and accelerations.
 //!
-//! Units are those of a trajectory: s, rad, rad/s, rad/s², joints from base to wrist.
+//! The units are s, rad, rad/s and rad/s², as in a trajectory, and the joints are in order from base to wrist.
 //!
 //! # Derived values
 //!
 //! - **Positions only**: a cubic spline through the positions (continuous position, velocity and acceleration) gives
-//!   velocities and accelerations. The velocity at the first and at the last sample is 0. The acceleration there is not 0,
-//!   so the motion begins and ends with a step in acceleration.
-//! - **Positions and velocities**: for each joint, a cubic spline through the velocities gives the accelerations. So the
-//!   rounding of positions has no effect on them. The spline is natural: the jerk is 0 at the ends. The velocities are
-//!   used unchanged, at the ends too.
+//!   velocities and accelerations. The velocity at the first and at the last sample is 0. The acceleration at these samples
+//!   is not 0, so the motion begins and ends with a step in acceleration.
+//! - **Positions and velocities**: for each joint, a cubic spline through the velocities gives the accelerations. So
+//!   rounded positions have no effect on the accelerations. The spline is natural: the jerk is 0 at the ends. The
+//!   velocities are used unchanged, also at the ends.
 //! - **All three channels**: nothing is derived.
 //!
 //! # Time
 //!
 //! If the times of the samples are on a grid of whole milliseconds (within 50 µs, steps of 1 to 1000 ms), the samples
-//! become the points unchanged. All others are resampled to 10 ms, or to a longer step if 10 ms would give more points than
-//! the controller can store. Between samples the trajectory follows a quintic with the position, velocity and acceleration
-//! of both samples. The last point is the last sample. If the duration is not a whole number of steps, the remainder of the
-//! motion is stretched to a whole step.
+//! become the points unchanged. All other samples are resampled to a step of 10 ms. If the controller cannot store so many
+//! points, the step is longer. Between samples the trajectory follows a quintic with the position, velocity and
+//! acceleration of both samples. The last point is the last sample. If the duration is not a whole number of steps, the
+//! remainder of the motion is stretched to a whole step.
 //!
 //! # Overshoot
 //!
 //! A spline passes through every sample, but between two samples it may leave the interval between their positions. After a
-//! step it overshoots by some 10 % of the step if the samples are equally spaced. The fit does not limit this.
-//! [`Fitted::overshoot`] reports the overshoot of each joint, and
+//! step in position, the spline overshoots by about 10 % of the step if the samples are equally spaced. The fit does not
+//! limit the overshoot. [`Fitted::overshoot`] reports the overshoot of each joint, and
 //! [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) checks the fitted trajectory, also between the points.
 //! With denser samples near a change of direction the overshoot is small.
 //!
@@ -55,14 +55,14 @@ use super::{Point, Trajectory};
 /// Samples of a motion, as read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// Times, s. The times strictly increase. The first one need not be 0.
+    /// Times, s. The times strictly increase. The first time may differ from 0.
     pub times: Vec<f64>,
     /// Positions in rad, one row for each time.
     pub position: Vec<[f64; JOINTS]>,
-    /// Velocities in rad/s, one row for each time. `None`: they are derived.
+    /// Velocities in rad/s, one row for each time. If `None`, the velocities are derived.
     pub velocity: Option<Vec<[f64; JOINTS]>>,
-    /// Accelerations in rad/s², one row for each time. `None`: they are derived. Accelerations without velocities are
-    /// ignored.
+    /// Accelerations in rad/s², one row for each time. If `None`, the accelerations are derived. Accelerations without
+    /// velocities are ignored.
     pub acceleration: Option<Vec<[f64; JOINTS]>>,
 }
 
@@ -81,7 +81,8 @@ pub struct Fitted {
 const STEP_MS: u16 = 10;
 /// Maximum deviation of a time from the grid, s.
 const REGULAR: f64 = 50e-6;
-/// Longest duration that is resampled, s. A longer trajectory does not fit into the controller at any useful step.
+/// Longest duration that is resampled, s. A longer trajectory does not fit into the memory of the controller at any
+/// useful step.
 const DURATION_MAX: f64 = 86_400.0;
 
 /// Reason why no trajectory can be fitted to the samples.
@@ -104,13 +105,13 @@ pub enum FitError {
     /// The time of this sample (from 0) is not later than the time before it.
     #[error("sample {0}: its time is not after the time of the previous sample")]
     Time(usize),
-    /// The samples last longer than a day. The value is their duration, s.
+    /// The samples last longer than a day. The value is the duration of the samples, s.
     #[error("the duration {0} s is longer than a day")]
     Duration(f64),
 }
 
 impl Samples {
-    /// Returns the trajectory through the samples. Without samples it is empty, and does not pass a check.
+    /// Returns the trajectory through the samples. Without samples, the trajectory is empty and does not pass a check.
     ///
     /// # Errors
     ///
@@ -221,7 +222,7 @@ impl Samples {
     }
 }
 
-/// Returns 10 ms, or a longer step if 10 ms would give too many points.
+/// Returns 10 ms, or a longer step if a step of 10 ms would result in too many points.
 fn resampled_step(duration: f64) -> u16 {
     let fits = (duration * 1e3 / (POINTS_MAX - 1) as f64).ceil();
     fits.clamp(f64::from(STEP_MS), 60_000.0) as u16
@@ -296,7 +297,7 @@ mod tests {
         };
         let over = points.windows(2).map(between).fold(0.0, f64::max) - 1.0;
         assert!((0.08..0.12).contains(&over), "{over}");
-        // The ends are at rest, but they have an acceleration if the path begins to bend at once.
+        // The velocity at the ends is 0, but the acceleration is not 0 if the path begins to bend at once.
         assert_eq!((points[0].velocity, points[9].velocity), ([0.0; 6], [0.0; 6]));
         let bent = Samples {
             times: vec![0.0, 0.5, 1.0],

@@ -9,7 +9,7 @@ use super::Point;
 pub struct Overshoot {
     /// Joint.
     pub joint: Joint,
-    /// Distance outside the interval, rad.
+    /// Distance between the curve and the interval, rad.
     pub beyond_rad: f64,
     /// Position at the overshoot, rad.
     pub position_rad: f64,
@@ -17,11 +17,12 @@ pub struct Overshoot {
     pub after: usize,
 }
 
-/// Smallest overshoot that is reported, rad. Such an overshoot moves a point at a distance of one metre by 1 mm.
+/// Smallest overshoot that is reported, rad. An overshoot of this size moves a point that is 1 m from the joint axis by
+/// 1 mm.
 const LEAST: f64 = 1e-3;
 
-/// Returns the largest overshoot of each joint that has one. The curve consists of the cubics with these positions and
-/// velocities at these times (s).
+/// Returns the largest overshoot of each joint that has an overshoot. The curve consists of cubics that have these
+/// positions and velocities at these times (s).
 pub(super) fn overshoots(times: &[f64], points: &[Point]) -> Vec<Overshoot> {
     let of_joint = |joint: Joint| {
         let j = joint.index();
@@ -44,10 +45,11 @@ fn outside(x: f64, low: f64, high: f64) -> f64 {
     (x - high).max(low - x)
 }
 
-/// Returns the extrema of a cubic in the unit interval. The cubic runs from 0 to `d`, with the slopes `v0` and `v1` at the ends.
+/// Returns the extrema of a cubic in the unit interval. The value of the cubic goes from 0 to `d`, with the slopes `v0` and `v1`
+/// at the ends.
 fn extrema(d: f64, v0: f64, v1: f64) -> [Option<f64>; 2] {
     let (c2, c3) = (3.0 * d - 2.0 * v0 - v1, v0 + v1 - 2.0 * d);
-    // v0 + 2·c2·u + 3·c3·u² = 0, solved in a form without cancellation.
+    // v0 + 2·c2·u + 3·c3·u² = 0, solved in a form that avoids loss of digits.
     let root = (c2 * c2 - 3.0 * c3 * v0).sqrt();
     let q = -(c2 + root.copysign(c2));
     [q / (3.0 * c3), v0 / q].map(|u| (u > 0.0 && u < 1.0).then_some(u * (v0 + u * (c2 + u * c3))))
@@ -82,8 +84,8 @@ mod tests {
         let loaded = Loaded::parse(text, None).unwrap();
         let [over] = loaded.overshoot[..] else { panic!("{:?}", loaded.overshoot) };
         assert_eq!((over.joint.number(), over.after), (1, 2));
-        // The spline goes through 0, 0.5, 0.5, 0 with rest at both ends. The spline turns at 1.5 s, with slopes of ±0.5
-        // rad/s at the two middle points.
+        // The spline passes through the positions 0, 0.5, 0.5, 0 and is at rest at both ends. The spline changes
+        // direction at 1.5 s, with slopes of ±0.5 rad/s at the two middle points.
         assert!(
             (over.beyond_rad - 0.125).abs() < 1e-9 && (over.position_rad - 0.625).abs() < 1e-9,
             "{over:?}"

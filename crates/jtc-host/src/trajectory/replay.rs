@@ -1,7 +1,7 @@
 //! Extraction of a trajectory from a recording.
 //!
 //! A sample of an execution contains the path time of the controller in milliseconds. So the path can be reconstructed even
-//! if the times of the samples are disturbed by the line, the host or pauses.
+//! if the times of the samples are irregular because of the line, the host or pauses.
 
 use std::path::Path;
 
@@ -15,10 +15,10 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Minimum spacing of points, ms. If any two consecutive points are this far apart or more, all points are kept.
+/// Minimum spacing of points, ms. If two consecutive points are at least this far apart, all points are kept.
 const GRID_MS: u32 = 10;
 
-/// Spacing of measured positions, s. With a smaller spacing the encoder noise would appear as speed.
+/// Spacing of measured positions, s. With a smaller spacing, encoder noise would look like motion.
 const MEASURED_S: f64 = 0.04;
 /// Movement below which the arm is considered at rest, rad.
 const STILL: f64 = 0.002;
@@ -26,7 +26,8 @@ const STILL: f64 = 0.002;
 /// First columns in the header of a recording as CSV.
 const CSV_HEADER: &str = "time_s,state,tes,point,";
 
-/// Returns `true` if the file is a recording. MCAP is recognised by the file name, and CSV by the header.
+/// Returns `true` if the file is a recording of an execution or a motion by hand. MCAP is recognised by the file name,
+/// and CSV by the header.
 pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
     let mcap = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     mcap || text.is_some_and(|text| text.trim_start_matches('\u{feff}').starts_with(CSV_HEADER))
@@ -78,7 +79,7 @@ fn held(recording: &Recording) -> Option<Loaded> {
 fn read(path: &Path) -> Result<Recording, FileError> {
     Recording::read(path).map_err(|e| match e {
         RecordingError::Io { path, source } => FileError::Io { path, source },
-        // The message begins with the name of the file.
+        // The error message begins with the name of the file.
         other => {
             let words = other.to_string();
             let name = path.display().to_string();
@@ -89,7 +90,8 @@ fn read(path: &Path) -> Result<Recording, FileError> {
     })
 }
 
-/// Reads a recording and extracts the measured motion. The result is the last teaching, or else the last execution.
+/// Reads a recording and extracts the measured motion. The result is the last teaching, or, without teaching, the last
+/// execution.
 pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
     let mut loaded = measured(&recording.samples).map_err(|e| e.in_file(path))?;
@@ -99,8 +101,8 @@ pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the last measured motion, without the standstill before and after it. The result is a motion by hand, or else
-/// a motion along a trajectory.
+/// Returns the last measured motion, without the standstill before and after the motion. The result is a motion by hand,
+/// or, without one, a motion along a trajectory.
 fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let by_hand = samples.iter().any(|s| s.state == ControllerState::Teaching);
     let timed = if by_hand { led(samples) } else { followed(samples) };
@@ -120,7 +122,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
         let problem = "the recording contains no motion by hand and no execution in which the arm moves";
         return Err(FileError::at(Place::default(), problem));
     };
-    // Keeps one position at rest at each end.
+    // One position at rest is kept at each end.
     let kept = first.saturating_sub(1)..(last + 2).min(path.times.len());
     let (times, position) = (path.times[kept.clone()].to_vec(), path.position[kept].to_vec());
     let start = times.first().copied().unwrap_or(0.0);
@@ -133,7 +135,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the last motion by hand, with the times of the recording.
+/// Returns the last motion by hand, at the times of the recording.
 fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let taught = |s: &Sample| s.state == ControllerState::Teaching;
     let end = samples.iter().rposition(taught).map_or(0, |i| i + 1);
@@ -141,8 +143,8 @@ fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     samples[begin..end].iter().map(|s| (s.time_s, s)).collect()
 }
 
-/// Returns the last execution including its pauses, with the times of its path. The times of the host have jitter, and they
-/// are meaningless in virtual time. The last sample is the pose in which the arm came to rest.
+/// Returns the last execution including its pauses, at the path times. The host times have jitter, and they have no
+/// meaning in a simulation with virtual time. The last sample is the pose in which the arm came to rest.
 fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let on_path = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
     let end = samples.iter().rposition(on_path).map_or(0, |i| i + 1);
@@ -163,7 +165,7 @@ fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     timed
 }
 
-/// Positions of a path that the recording contains, with the controller's milliseconds.
+/// Positions of a path that the recording contains, with the millisecond count of the controller.
 #[derive(Default)]
 struct Seen {
     ms: Vec<u32>,
@@ -171,8 +173,8 @@ struct Seen {
 }
 
 impl Seen {
-    /// Keeps every tenth millisecond and both ends. A path that is known at each millisecond has more points than the
-    /// controller can store.
+    /// Returns every tenth millisecond of the path and both ends. A path with a point at each millisecond has more
+    /// points than the controller can store.
     fn thinned(self) -> Self {
         let last = self.ms.len().saturating_sub(1);
         if self.ms.iter().zip(self.ms.iter().skip(1)).any(|(a, b)| b - a >= GRID_MS) {
@@ -211,7 +213,8 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
                 velocity: sample.joints.map(|joint| joint.set_velocity),
                 acceleration: sample.joints.map(|joint| joint.set_acceleration),
             },
-            // The recording contains set values only on the path. The path ends at rest, close to the previous sample.
+            // The recording contains commanded values only while the arm moves on the path. The path ends at rest,
+            // close to the previous sample.
             (Some(TrajectoryState::Finish), Some(place)) => {
                 Point { position: place.position, ..Point::default() }
             }
@@ -254,12 +257,12 @@ mod tests {
     use super::*;
     use crate::sample::JointSample;
 
-    /// Returns a sample at `point` with the set positions of a smooth path of 2 s.
+    /// Returns a sample at `point` with the commanded positions of a smooth path of 2 s.
     fn sample(trajectory: TrajectoryState, point: u32) -> Sample {
         let s = f64::from(point) / 2_000.0;
         let q = 0.3 * s * s * (3.0 - 2.0 * s);
         let joint = JointSample { set_position: q, position: q + 1e-4, ..JointSample::UNKNOWN };
-        // The host's times are meaningless in virtual time.
+        // The host times have no meaning in virtual time.
         Sample { trajectory: trajectory.into(), point, joints: [joint; JOINTS], ..Sample::default() }
     }
 
@@ -292,8 +295,8 @@ mod tests {
         assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
     }
 
-    /// `jtc sim` records each millisecond, and a minute of it has more points than the controller can store. The commanded
-    /// values are restored, including velocities and accelerations.
+    /// `jtc sim` records each millisecond, and one minute has more points than the controller can store. The replay
+    /// restores the commanded values, including velocities and accelerations.
     #[test]
     fn a_long_path_known_at_each_millisecond_can_be_run_again() {
         let at = |ms: u32| {

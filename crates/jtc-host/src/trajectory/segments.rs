@@ -7,7 +7,7 @@ use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 /// Maximum number of points of a segment for which CRC-16 detects every double bit error in the frame.
 const SEGMENT_POINTS: usize = 113;
-/// Points per segment if 113 would need more than 100 segments.
+/// Number of points per segment if 113 points per segment would need more than 100 segments.
 const SEGMENT_POINTS_LONG: usize = 120;
 
 /// Options for the upload.
@@ -20,7 +20,7 @@ pub struct UploadOptions {
 }
 
 impl UploadOptions {
-    /// Returns the number of points per segment for a trajectory of `points`.
+    /// Returns the number of points per segment for a trajectory of `points` points.
     pub fn segment_points(&self, points: usize) -> usize {
         let usual = if points > SEGMENT_POINTS * SEGMENTS_MAX { SEGMENT_POINTS_LONG } else { SEGMENT_POINTS };
         self.points_per_segment.unwrap_or(usual).clamp(1, SEGMENT_POINTS_MAX)

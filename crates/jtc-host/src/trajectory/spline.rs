@@ -1,4 +1,4 @@
-//! Curves through points: the cubic spline for a file with only positions, and the quintic between two points of a
+//! Curves through points. The cubic spline is for a file with only positions, and the quintic connects two points of a
 //! trajectory.
 
 use jtc_core::JOINTS;
@@ -9,8 +9,8 @@ pub(super) fn column(rows: &[[f64; JOINTS]], j: usize) -> Vec<f64> {
     rows.iter().map(|r| r[j]).collect()
 }
 
-/// Returns the first derivatives of a cubic spline through `y` at its knots. If `rest` is set, the ends are at rest. If
-/// not, they have no curvature.
+/// Returns the first derivatives of a cubic spline through `y` at its knots. If `rest` is set, the slope at the ends is
+/// 0. Otherwise the curvature at the ends is 0.
 pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
     let n = y.len();
     if n < 2 {
@@ -18,7 +18,8 @@ pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
     }
     let h = |i: usize| t[i + 1] - t[i];
     let delta = |i: usize| (y[i + 1] - y[i]) / h(i);
-    // Rows of the tridiagonal system: below, diagonal, above, right side.
+    // Elements of each row of the tridiagonal system: below the diagonal, on the diagonal, above the diagonal, and
+    // right-hand side.
     let row = |i: usize| -> [f64; 4] {
         match (i, rest) {
             (i, true) if i == 0 || i == n - 1 => [0.0, 1.0, 0.0, 0.0],
@@ -30,7 +31,7 @@ pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
             }
         }
     };
-    // Thomas algorithm; the system is diagonally dominant.
+    // The Thomas algorithm is stable here, because the system is diagonally dominant.
     let (mut above, mut right) = (vec![0.0; n], vec![0.0; n]);
     for i in 0..n {
         let [below, diagonal, up, value] = row(i);

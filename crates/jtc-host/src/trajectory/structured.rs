@@ -1,4 +1,4 @@
-//! JSON in the project's own form, and `trajectory_msgs/JointTrajectory` as JSON or YAML.
+//! JSON in the format of this project, and `trajectory_msgs/JointTrajectory` as JSON or YAML.
 
 use jtc_core::JOINTS;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use super::fit::{FitError, Samples};
 use super::{Form, Loaded, Trajectory};
 use crate::file::{FileError, Place};
 
-/// The project's own JSON form.
+/// JSON format of this project.
 #[derive(Serialize, Deserialize)]
 struct JsonForm {
     step_ms: Option<u16>,
@@ -70,7 +70,7 @@ impl RosTime {
 
 pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
     let wrong = |e: serde_json::Error| FileError::at(Place::line(e.line()), format!("JSON: {e}"));
-    // The ROS form is tried only if the text does not have the project's own form.
+    // The ROS format is tried only if the text is not in the format of this project.
     match serde_json::from_str::<JsonForm>(text) {
         Ok(form) => own(form),
         Err(e) if text.contains("position_rad") => Err(wrong(e)),
@@ -79,7 +79,7 @@ pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<
 }
 
 pub(super) fn read_yaml(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
-    // A trajectory of 12,000 points has some 300,000 nodes.
+    // A trajectory of 12,000 points has about 300,000 YAML nodes.
     let options = serde_saphyr::options! {
         budget: serde_saphyr::budget! { max_nodes: 2_000_000, max_events: 4_000_000 },
         with_snippet: false,
@@ -117,7 +117,7 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     samples.acceleration = all_or_none(&form.points, "acceleration_rad_s2", |p| p.acceleration_rad_s2)?;
     let exact = form.step_ms;
     let mut loaded = finish(samples, Form::Json)?;
-    // A single point keeps the step of the file, even a step above 1 s, with which the times of several points would be
+    // A single point keeps the step of the file, even if it is above 1 s. With several points, such times would be
     // considered irregular.
     if let (Some(step_ms), 1) = (exact, loaded.trajectory.points.len()) {
         loaded.trajectory.step_ms = step_ms;
@@ -125,7 +125,7 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the values if all points have them. Returns `None` if none of the points has them.
+/// Returns the values if all points have values. Returns `None` if no point has values.
 fn all_or_none<P, const N: usize>(
     points: &[P],
     name: &str,

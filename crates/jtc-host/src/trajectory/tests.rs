@@ -15,7 +15,7 @@ fn problem(text: &str) -> String {
 }
 
 proptest! {
-    /// The integers of the int16 form are sent unchanged.
+    /// The integers of the int16 format are sent unchanged.
     #[test]
     fn the_int16_form_round_trips_exactly(raw in prop::collection::vec(any::<i16>(), 18)) {
         let mut text = String::from("0");
@@ -55,7 +55,8 @@ fn every_int16_value_round_trips() {
     }
 }
 
-/// Section 1: an encoder rejects a value outside the scale. The encoder never wraps or clips the value.
+/// Section 1 of the requirements: an encoder rejects a value that is out of range. The encoder never wraps or clips the
+/// value.
 #[test]
 fn values_outside_the_scale_are_refused_by_name() {
     let mut point = Point::default();
@@ -108,7 +109,8 @@ points:
 ---
 ";
 
-/// As in waypoint files, a unit is recognised in upper and lower case, and an option cannot convert the numbers again.
+/// Units are recognised in upper and lower case, as in waypoint files. If a file states a unit, an option cannot
+/// convert the numbers again.
 #[test]
 fn a_unit_in_a_header_counts_in_letters_of_any_case() {
     let zeros = ",0,0,0,0,0\n";
@@ -131,7 +133,7 @@ fn a_unit_in_a_header_counts_in_letters_of_any_case() {
     assert!(both.contains("\"Q1_DEG\": this column occurs twice"), "{both}");
 }
 
-/// Every column that waypoint files have and trajectories do not have is recognised as such.
+/// The reader recognises every column that occurs only in waypoint files.
 #[test]
 fn columns_of_waypoints_are_known_as_such() {
     for name in "pose leg x y z qx qy qz qw roll pitch yaw x_m roll_deg".split(' ') {

@@ -11,7 +11,7 @@ use crate::file::{FileError, Place, number, rows, short};
 pub(super) const KNOWN: &str = "expected q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
                      qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
 
-/// Content of a column, or of a key in a JSON object.
+/// Meaning of a table column, or of a key in a JSON object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Column {
     Time,
@@ -19,7 +19,7 @@ pub(super) enum Column {
     Leg,
     /// Joint, from 0.
     Joint(usize),
-    /// Value of a flange pose: its index in the list of names.
+    /// Value of a flange pose, as an index into the list of names.
     Flange(usize),
 }
 

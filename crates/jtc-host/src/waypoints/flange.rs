@@ -1,4 +1,4 @@
-//! Flange poses in files: ten values; three give the position, and three or four the orientation.
+//! Flange poses in files. There are ten values: three for the position, and three or four for the orientation.
 
 use jtc_plan::kinematics::Orientation;
 
@@ -9,7 +9,8 @@ pub(super) const NAMES: [&str; 10] = ["x", "y", "z", "qx", "qy", "qz", "qw", "ro
 /// Indices of the angles.
 pub(super) const ANGLES: std::ops::Range<usize> = 7..10;
 
-/// Returns the pose for these values. Returns `None` if all are missing. If `point` is set, the orientation is not needed.
+/// Returns the flange pose for these values. Returns `None` if all values are missing. If `point` is set, the orientation
+/// is not needed.
 ///
 /// # Errors
 ///

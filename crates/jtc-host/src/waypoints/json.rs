@@ -1,5 +1,5 @@
-//! Waypoints as JSON: a list of objects whose keys are the names in the table's header. The list is the whole file, or
-//! `waypoints` of an object.
+//! Waypoints as JSON: a list of objects whose keys are the names in the table's header. The list is either the whole
+//! file or the value of the key `waypoints`.
 
 use std::fmt;
 
@@ -29,7 +29,7 @@ struct Entry {
     flange: [Option<f64>; NAMES.len()],
     /// `true` if a key contains a unit of angle.
     unit_named: bool,
-    /// Two keys for the same value, if the file has both.
+    /// Two keys for one value, if the file contains both keys.
     twice: Option<(String, String)>,
 }
 
@@ -106,7 +106,7 @@ impl<'de> Visitor<'de> for Keys {
     }
 }
 
-/// Stores a value if it is present. Returns `true` if it is.
+/// Stores a value if it is present. Returns `true` if the value is present.
 fn set<T>(to: &mut Option<T>, value: Option<T>) -> bool {
     let given = value.is_some();
     if given {

@@ -36,8 +36,8 @@ fn the_forms_say_the_same() {
     }
 }
 
-/// The flange pose of a joint position is written with a quaternion or with angles. The pose is converted back to that
-/// position.
+/// The flange pose of a joint position is written to a file with a quaternion or with angles. The pose is converted
+/// back to that position.
 #[test]
 fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     let arm = arm();
@@ -72,7 +72,7 @@ fn poses_of_the_flange_are_found_near_the_waypoint_before() {
             assert!((found[j] - q[j]).abs() < 1e-6, "{text}: {found:?}");
         }
     }
-    // The poses are too far away, without an orientation, and incomplete.
+    // The poses are invalid: one is too far away, one has no orientation, and one is incomplete.
     let far =
         WaypointFile::parse("x,y,z,roll,pitch,yaw\n9,0,0,0,0,0\n").unwrap().positions(&arm).unwrap_err();
     assert!(far.to_string().starts_with(", line 2: out of reach"), "{far}");
@@ -101,8 +101,8 @@ fn degrees_are_taken_only_where_the_file_names_no_unit() {
     assert!(named.in_degrees().unwrap_err().to_string().contains("states its units"));
 }
 
-/// A unit in the name of a column or key is recognised in upper and lower case, and an option cannot convert the numbers
-/// again.
+/// A unit in the name of a column or key is recognised in upper and lower case. In this case an option cannot convert
+/// the numbers again.
 #[test]
 fn a_unit_in_a_name_counts_in_letters_of_any_case() {
     let joint_headers = [
@@ -146,7 +146,7 @@ fn a_unit_in_a_name_counts_in_letters_of_any_case() {
     assert!(plain.in_degrees().is_ok());
 }
 
-/// Returns an object with these keys. The first value is 60, and the others are 0.
+/// Returns an object with these keys. The value of the first key is 60, and the values of the other keys are 0.
 fn header_keys(names: &str) -> String {
     let value = |i: usize| if i == 0 { 60 } else { 0 };
     names
@@ -157,7 +157,7 @@ fn header_keys(names: &str) -> String {
         .join(", ")
 }
 
-/// If a value is given twice, the reader does not guess which one is meant.
+/// If a file contains a value twice, the reader rejects the file instead of choosing one value.
 #[test]
 fn two_names_for_one_number_are_refused() {
     let joints = "\"q2\":0,\"q3\":0,\"q4\":0,\"q5\":0,\"q6\":0";

@@ -1,10 +1,11 @@
-//! Thinning of a recorded motion. Only a few positions remain, and every other one is close to a leg between them.
+//! Reduction of the number of positions of a recorded motion. Only a few positions remain. Every removed position is
+//! close to a straight leg between two remaining positions.
 
 use jtc_core::JOINTS;
 
-/// Returns the indices of the `positions` (rad) that remain. Every other position is within `tolerance` (rad) of the straight
-/// leg between its remaining neighbours, in the joint with the largest distance. The ends always remain (Ramer 1972; Douglas
-/// & Peucker 1973).
+/// Returns the indices of the `positions` (rad) that remain after the reduction. Every removed position is within `tolerance`
+/// (rad) of the straight leg between its remaining neighbours, in the joint with the largest distance. The first and the last
+/// position always remain (Ramer 1972; Douglas & Peucker 1973).
 pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     let last = positions.len().saturating_sub(1);
     let mut keep = vec![false; positions.len()];
@@ -13,7 +14,7 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
             *kept = true;
         }
     }
-    // A list instead of recursion, because a path may have many positions.
+    // The function uses a list and not recursion, because a path may have many positions.
     let mut parts = vec![(0, last)];
     while let Some((from, to)) = parts.pop() {
         let between = (from + 1..to).map(|i| (i, distance(&positions[i], &positions[from], &positions[to])));
@@ -27,7 +28,7 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
 }
 
 /// Returns the distance of `p` from the leg between `a` and `b`, at the point of the leg nearest to `p`. The result is the
-/// distance of the joint with the largest one, rad.
+/// largest distance of a joint, rad.
 fn distance(p: &[f64; JOINTS], a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
     let dot =
         |u: &dyn Fn(usize) -> f64, v: &dyn Fn(usize) -> f64| (0..JOINTS).map(|j| u(j) * v(j)).sum::<f64>();
@@ -44,7 +45,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// After thinning a random path, every removed position is near a leg between remaining ones.
+        /// After thinning a random path, every removed position is near a leg between two remaining positions.
         #[test]
         fn what_is_left_out_is_within_the_tolerance(
             steps in prop::collection::vec(prop::array::uniform6(-0.1..0.1f64), 2..80),

@@ -62,7 +62,8 @@ fn j34_an_arm_that_stands_elsewhere_is_refused_by_the_check() {
     assert!(error.contains("joint 2: +0.0210 rad away from the first point"), "{error}");
 }
 
-/// J-55: if the limits of arm and controller differ, the caller must accept this explicitly. Then the tighter limits apply.
+/// J-55: if the limits of arm and controller differ, the caller must accept this explicitly. If the caller accepts it, the
+/// tighter limits apply.
 #[test]
 fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     let mut arm = Arm::avena();
@@ -100,7 +101,7 @@ fn an_arm_that_is_none_checks_nothing() {
     assert!(matches!(error, CheckError::Arm(_)), "{error}");
 }
 
-/// Only the trajectory that is in the controller can be executed.
+/// The session executes only the trajectory that is in the controller.
 #[test]
 fn only_what_was_uploaded_is_executed() {
     let mut s = ready();
@@ -113,7 +114,7 @@ fn only_what_was_uploaded_is_executed() {
     };
     refused(&mut s, &first);
     s.upload(&first, |_| Flow::Continue).unwrap();
-    // The points are equal, but the check is another one and may have used another arm.
+    // The points are equal, but they belong to another check, which may have used another arm.
     refused(&mut s, &second);
     s.upload(&second, |_| Flow::Continue).unwrap();
     refused(&mut s, &first);
@@ -141,7 +142,8 @@ fn a_run_has_an_outcome_and_its_figures() {
     let error = summary.joints[0].max_error_mrad.unwrap();
     assert!(error > 0.0 && error < 20.0, "{error} mrad");
     assert_eq!(summary.joints[0].torque_limit_nm, Some(Arm::avena().joints[0].torque_max));
-    // The second run would start at the end of the first one. The controller rejects it (J-34), and the run reports this.
+    // The second execution would start where the first execution ended. The controller rejects it (J-34), and the
+    // second execution returns this error.
     let run = s.run(&checked, |_| Flow::Continue);
     assert!(matches!(run.outcome, Err(Error::Link(LinkError::Refused { .. }))), "{:?}", run.outcome);
 }
@@ -160,7 +162,7 @@ fn j60_what_remains_of_a_paused_motion_is_checked_with_the_payload() {
     session.pause().unwrap();
     let paused = |s: &Status| s.trajectory == TrajectoryState::Pause;
     session.wait_for("pause", Duration::from_secs(5), paused).unwrap();
-    // The first payload is too heavy for the remainder, the second is light enough.
+    // The first payload is too heavy for the remainder, and the second payload is light enough.
     for (mass, goes_on) in [(6.0, false), (0.1, true)] {
         session.set_payload(&Payload { mass, com: [0.0, 0.0, 0.1], ..Payload::NONE }).unwrap();
         match session.resume() {

@@ -1,4 +1,4 @@
-//! Session on a shared line. Rejections by the device and denials by the agent must be distinguished.
+//! Session on a shared line. The session must distinguish rejections by the device from denials by the agent.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -42,8 +42,8 @@ impl<P: Port> Port for SharedLine<P> {
     }
 }
 
-/// Returns a session on a shared line. Each frame is denied with the reason `own`, or, if it is `None`, rejected by the
-/// device.
+/// Returns a session on a shared line. The agent denies each frame with the reason `own`. If `own` is `None`, the
+/// device rejects the frame.
 fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     let arriving = Denials::default();
     let denials = arriving.clone();

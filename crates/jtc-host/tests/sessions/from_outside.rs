@@ -1,5 +1,5 @@
-//! An arm without brakes has fallen to an end stop, slightly outside a position limit. Moves lead back inside from there
-//! (J-36, J-58).
+//! An arm without brakes has fallen to an end stop, slightly outside a position limit. Motions back into the limits are
+//! permitted from this position (J-36, J-58).
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use jtc_sim::{SimConfig, World};
 
 use super::Sim;
 
-/// Returns a session in which the arm is held with joint 3 at this position.
+/// Returns a session with the arm in position hold and joint 3 at this position.
 fn held_at(position: f64) -> Sim {
     let start = [0.0, 0.0, position, 0.0, 0.0, 0.0];
     let world = World::new(SimConfig { baud: None, start, ..SimConfig::default() });

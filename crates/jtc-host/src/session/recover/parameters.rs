@@ -13,16 +13,17 @@ use crate::session::Session;
 /// Parameters that a recovery sends to a controller without torque (J-55).
 #[derive(Clone, Debug, Default)]
 pub enum RecoverParameters {
-    /// No parameters. A controller that needs some is rejected.
+    /// No parameters. No source: a controller that lacks parameters is rejected.
     #[default]
     None,
-    /// Parameters that are built into the controller or stored in it.
+    /// Default parameters of the controller, built in or stored.
     ControllerDefaults,
     /// Parameters of an arm.
     Arm {
         /// Arm with friction, gains and model.
         arm: Arc<Arm>,
-        /// `true` if the controller may have other values for settings that are not sent with friction, gains and model.
+        /// `true` if the caller accepts that the controller has other values for settings that are not sent with
+        /// friction, gains and model.
         accept_device_limits: bool,
     },
 }
@@ -41,14 +42,14 @@ impl RecoverParameters {
 }
 
 impl<P: Port> Session<P> {
-    /// Like [`Session::recover_until`]. First checks the parameters, and compares the arm's limits with those of the
-    /// controller.
+    /// Like [`Session::recover_until`]. Before the recovery, checks the parameters and compares the arm's limits with those
+    /// of the controller.
     ///
     /// # Errors
     ///
     /// Returns the errors of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if
-    /// controller and arm have different limits, and this is not accepted. After an error of these checks the controller is
-    /// unchanged.
+    /// controller and arm have different limits, and the caller does not accept this. If one of these checks fails, the
+    /// controller is unchanged.
     pub fn recover_with(
         &mut self,
         parameters: &RecoverParameters,
@@ -65,7 +66,7 @@ impl<P: Port> Session<P> {
         };
         let stops = self.port.halts().stops;
         let differences = arm.device_differences(&self.device_config()?);
-        // A Stop that arrived meanwhile also ends the recovery.
+        // A Stop that arrived during these checks also ends the recovery.
         let stopped = self.port.halts().stops != stops;
         if !differences.is_empty() && !accept_device_limits {
             return Err(CheckError::DeviceLimits { arm: arm.name.clone(), differences }.into());

@@ -13,11 +13,11 @@ pub enum ParameterSource<'a> {
     /// No source: a controller that lacks parameters is rejected.
     #[default]
     None,
-    /// Defaults of the controller, which are built into it or stored in it.
+    /// Default parameters of the controller, built in or stored.
     ControllerDefaults,
     /// All parameters of an arm. The parameters are sent to every controller without torque.
     Arm {
-        /// Name of the arm or its file.
+        /// Name of the arm or of the arm file.
         name: &'a str,
         /// Friction, gains and arm model.
         set: &'a ParameterSet,
@@ -25,7 +25,7 @@ pub enum ParameterSource<'a> {
 }
 
 impl ParameterSource<'_> {
-    /// Checks that an arm is complete: friction, gains and arm model.
+    /// Checks that an arm contains friction, gains and arm model.
     ///
     /// # Errors
     ///
@@ -49,9 +49,9 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Returns `true` if parameters must be sent. The parameters of an arm are sent once to every controller, and the
-    /// defaults to a controller that lacks some. All three parameters are always sent, so that those of two arms are never
-    /// mixed.
+    /// Returns `true` if parameters must be sent. Every controller receives the parameters of an arm once. Only a
+    /// controller that lacks parameters uses the defaults. All three parameters are always sent, so that the parameters of
+    /// two arms are never mixed.
     pub(super) fn due(&self, status: &Status, given: bool) -> bool {
         match self {
             ParameterSource::None => false,
@@ -60,7 +60,7 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Returns the step to report if parameters are not sent.
+    /// Returns the step that the recovery reports if it does not send parameters.
     pub(super) fn kept(&self, status: &Status) -> Option<RecoverStep> {
         match self {
             _ if status.jtc_init != 0 => None,

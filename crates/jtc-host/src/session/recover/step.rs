@@ -6,29 +6,31 @@ use crate::arm::Difference;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RecoverStep {
-    /// Controller and arm have different values for a setting, and the user accepts this.
+    /// Controller and arm have different values for a setting, and the user has accepted the difference.
     Differs(Difference),
     /// State of the controller.
     Found(String),
-    /// The operator must act: the safety input is low.
+    /// The safety input is low, so the operator must release the emergency stop.
     SafetyInput,
     /// The motion is stopped.
     Stop,
     /// Teaching is switched off.
     TeachOff,
-    /// Current errors are cleared: the controller's and those of these nodes.
+    /// The current errors of the controller and of these nodes are cleared.
     Clear(Vec<String>),
     /// Nodes are reset.
     Reset(Vec<String>),
-    /// Friction, gains and arm model are sent: the defaults of the controller, or the parameters of the arm with this name.
+    /// Friction, gains and arm model are set, to the defaults of the controller or to the parameters of the arm with this
+    /// name.
     Give(Option<String>),
-    /// No parameters are sent: the controller keeps its parameters.
+    /// No parameters are sent, so the controller keeps its parameters.
     Keep,
-    /// The user gave an arm, but its parameters are not sent, because the controller already holds the arm with others.
+    /// The parameters of the user's arm are not sent, because the controller already holds the arm with other
+    /// parameters.
     KeepHolding(String),
     /// Nodes start up.
     WaitNodes(Vec<String>),
-    /// The recovery is complete: HoldPos without errors.
+    /// The recovery is complete, and the controller is in HoldPos without errors.
     HoldPos,
 }
 

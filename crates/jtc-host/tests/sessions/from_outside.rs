@@ -73,7 +73,7 @@ fn j58_an_arm_outside_a_limit_approaches_a_trajectory() {
     finishes(&mut session, &start.checked);
 }
 
-/// The file begins at the position of the fallen arm. Existing hosts write such files.
+/// The file begins at the position of the fallen arm. Hosts of existing systems write such files.
 #[test]
 fn j36_a_file_that_begins_outside_a_limit_and_goes_inwards_is_run() {
     let arm = Arm::avena();

@@ -1,4 +1,4 @@
-//! Purpose of the torque margin of plans: the arm may be heavier than its model and have more friction.
+//! Tests of the torque margin of plans, for an arm that is heavier than its model and has more friction.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session};
 use jtc_sim::{ModelError, SimConfig, World};
 
-/// Returns a position of the arm. Each number gives a different position.
+/// Returns the joint positions with this number. Each number gives a different position.
 fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     let config = arm.config();
     std::array::from_fn(|j| {
@@ -18,9 +18,9 @@ fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     })
 }
 
-/// Moves an arm that has the default parameters with all masses × 1.1 and all friction × 1.2. The plans have this margin
-/// and full speed. Returns the largest share of a torque limit that the controller commanded, or the reason why a motion
-/// did not finish.
+/// Moves an arm that has the default parameters with all masses × 1.1 and all friction × 1.2. The motions are planned
+/// with this margin and at full speed. Returns the largest share of a torque limit that the controller commanded, or the
+/// reason why a motion did not finish.
 fn moved(margin_pct: f64, seed: u64) -> Result<f64, String> {
     let arm = Arm::avena();
     let model_error = ModelError {

@@ -12,7 +12,7 @@ use jtc_sim::{SimConfig, World};
 /// Returns a six-axis arm with a length of `scale` metres and axes along y and z. Masses scale with the third power, and
 /// torques with the fourth.
 fn description(scale: f64) -> String {
-    // Axis, offset to the next joint, mass, torque limit.
+    // Axis, offset to the next joint (m), mass (kg) and torque limit (N·m) of a joint.
     let parts = [
         ("0 0 1", [0.0, 0.0, 0.1], 4.0, 150.0),
         ("0 1 0", [0.0, 0.1, 0.1], 8.0, 150.0),
@@ -41,8 +41,8 @@ fn description(scale: f64) -> String {
     text + "</robot>"
 }
 
-/// Sends the parameters of `arm` to a controller whose real arm is `plant`, moves it, and then holds it for 5 s. Returns
-/// the largest position error of each joint during the motion, mrad.
+/// Sends the parameters of `arm` to a controller whose real arm is `plant`. Moves the arm, and then holds it for 5 s.
+/// Returns the largest position error of each joint during the motion, mrad.
 fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     let config = SimConfig {
         baud: None,
@@ -73,8 +73,8 @@ fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     Ok(joints.iter().map(|joint| joint.max_error_mrad.unwrap_or_default()).collect())
 }
 
-/// The rotors of the real arm are lighter or heavier than the proposed ones, which the controller does not know. The arm
-/// can still be held and moved.
+/// The rotors of the real arm are lighter or heavier than in the proposed parameters. The controller does not know this.
+/// The controller can still hold and move the arm.
 #[test]
 fn j41_j71_the_gains_that_are_proposed_move_an_arm_with_other_rotors() {
     let plain = include_str!("plain.urdf");
@@ -128,7 +128,7 @@ fn j71_gains_that_are_not_stable_are_given_to_no_controller() {
     assert_eq!(session.device_arm().ok(), before);
 }
 
-/// Small and large imported arms are held and moved with an error of a few mrad.
+/// The controller holds and moves small and large imported arms with an error of a few mrad.
 #[test]
 fn j41_an_imported_arm_follows_with_the_gains_that_are_proposed() {
     for scale in [0.6, 1.0, 1.2] {

@@ -1,4 +1,5 @@
-//! The client with the complete simulated controller: parameters, uploads on good and bad lines, execution and recovery.
+//! Tests of the client with the complete simulated controller: parameters, uploads on good and bad lines, execution and
+//! recovery.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
@@ -49,7 +50,7 @@ fn parameters_go_over_and_the_controller_becomes_ready() {
     let arm = Arm::avena();
     let file = ParameterFile { polynomial: arm.polynomial, table: arm.table, ..ParameterFile::default() };
     let table = s.push(&file.parameter_set(FrictionChoice::Table), |_| {}).unwrap();
-    // The long frame is sent twice, and both transmissions are confirmed.
+    // The client sends the long frame twice, and the controller confirms both transmissions.
     assert_eq!((table[0].times, table[0].bytes), (2, 10_566));
     assert_eq!(s.fresh_status().unwrap().friction_type, 1);
     let pushed = s.push(&Arm::avena().parameter_set(), |_| {}).unwrap();
@@ -75,7 +76,7 @@ fn uploads_fill_the_line() {
     }
 }
 
-/// A line that corrupts bytes towards the host.
+/// Serial line that corrupts bytes on the way to the host.
 struct Noisy {
     port: SimPort,
     random: u64,
@@ -104,11 +105,12 @@ impl Port for Noisy {
     }
 }
 
-/// J-04: records are one-shot. If a record is lost on the way to the host, an upload or a command must not fail.
+/// J-04: the controller sends each record only once. If a record is lost on the way to the host, an upload or a command
+/// must not fail.
 #[test]
 fn j04_lost_confirmations_are_survived() {
     for seed in 1..6 {
-        // About one status in ten arrives damaged.
+        // About one status in ten arrives damaged at the host.
         let mut s =
             Session::new(Noisy { port: ready(Some(921_600)).into_port(), random: seed, every: 1_700 });
         let options = UploadOptions { points_per_segment: Some(60), ..UploadOptions::default() };
@@ -124,7 +126,7 @@ fn j04_lost_confirmations_are_survived() {
     }
 }
 
-/// J-04, J-30: despite any losses on the line, the controller finally has every point.
+/// J-04, J-30: despite any losses on the line, the controller has every point at the end.
 #[test]
 fn uploads_survive_a_bad_line() {
     for (seed, kind) in [
@@ -201,7 +203,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     let Error::Motion(MotionError::RunFault { point, .. }) = &error else { panic!("{error}") };
-    // This is the point of the last status on the path, up to 40 ms before the fault.
+    // The reported point is from the last status on the path, up to 40 ms before the fault.
     assert!((459..600).contains(point), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
     assert!(error.to_string().contains("joint 3"), "{error}");
@@ -211,7 +213,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
         .unwrap_or_else(|e| panic!("{e}: {steps:?}"));
     assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0), "{steps:?}");
     assert!(steps.iter().any(|s| matches!(s, RecoverStep::Clear(_))));
-    // J-24: the arm never moves on its own.
+    // J-24: the arm never moves without a command.
     assert_ne!(status.trajectory, TrajectoryState::Execute);
 }
 
@@ -235,7 +237,8 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// A push ends a run: the arm yields and is then held. After clearing, the motion can be resumed.
+/// If a person pushes the arm, the motion ends: the arm yields and is then held. After the error is cleared, the client
+/// can resume the motion.
 #[test]
 fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     let mut s = ready(None);
@@ -261,7 +264,7 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
         jtc_host::labels::errors_line(&held)
     );
     assert!(jtc_host::labels::next_step(&held).to_string().contains("jtc clear"));
-    // A frame that moves the arm is not sent, and the error contains the cause.
+    // The client does not send a frame that moves the arm, and its error contains the cause.
     assert_eq!(s.resume().unwrap_err().code(), "held-stop");
     let error = s.ready_to_move(|_| (), || false).unwrap_err();
     assert!(error.code() == "held-stop" && error.to_string().contains("joint 5"), "{error}");
@@ -271,7 +274,8 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     assert!(!cleared.is_held_stop() && cleared.errors == 0);
 }
 
-/// After an encoder jump the arm is held. No motion is executed until the drive is reset, and the error says so.
+/// After a jump of the encoder position, the controller holds the arm. The controller executes no motion until the
+/// drive is reset, and the error message states this.
 #[test]
 fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     let mut s = ready(None);
@@ -287,7 +291,7 @@ fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     assert!(error.hint().contains("jtc reset --joints JOINT"), "{}", error.hint());
 }
 
-/// If no client waits for teaching any more, the arm must not become compliant.
+/// If the client no longer waits for teaching, the arm must not become compliant.
 #[test]
 fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     let mut s = ready(None);
@@ -298,7 +302,8 @@ fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     s.wait_ready(Duration::from_secs(15)).unwrap();
 }
 
-/// The controller answers only "incorrect value". The host finds the joint, the value and the bounds.
+/// The answer of the controller contains only "incorrect value". The host determines the joint, the value and the
+/// bounds.
 #[test]
 fn j06_a_refused_parameter_is_named() {
     let mut s = ready(Some(921_600));
@@ -321,7 +326,7 @@ fn j06_a_refused_parameter_is_named() {
     set.model.as_mut().unwrap().links[0].mass = 51.0;
     let text = refusal(&mut s, &set);
     assert!(text.contains("mass of a link (kg) 51 is outside 0..50"), "{text}");
-    // The arm still has its earlier parameters.
+    // The controller still has the earlier parameters of the arm.
     assert_eq!(s.fresh_status().unwrap().jtc_init, 0);
     s.push(&good, |_| ()).unwrap();
 }

@@ -42,7 +42,7 @@ fn inject(s: &mut Sim, kind: FaultKind, trigger: Trigger, ms: u64) {
     s.port_mut().world_mut().inject(Fault { kind, trigger, duration_ms: Some(ms) });
 }
 
-/// Injects a fault now and waits for its error.
+/// Injects a fault and waits for the error that it causes.
 fn fail(s: &mut Sim, kind: FaultKind, ms: u64) {
     inject(s, kind, Trigger::At(0), ms);
     s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();

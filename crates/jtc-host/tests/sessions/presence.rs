@@ -1,5 +1,5 @@
 //! Host supervision (J-59). The controller detects whether the session that commands the motion is alive. A session that
-//! only observes has no effect.
+//! only observes has no effect on this detection.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -14,7 +14,8 @@ use jtc_wire::{ControllerState, SettingValue, Status, TrajectoryState};
 
 use super::{Sim, motion, session};
 
-/// Returns a session in which the arm is held. `host_timeout_ms` was set by another session, so this session must read it.
+/// Returns a session in which the controller holds the arm. Another session has set `host_timeout_ms`, so this session
+/// must read this setting.
 fn supervised(ms: u16, baud: Option<u32>) -> Sim {
     let mut first = session(baud);
     let setting = settings::named("host_timeout_ms").unwrap().number;
@@ -68,7 +69,7 @@ fn j59_a_session_that_watches_its_teaching_keeps_it_going() {
     }
 }
 
-/// The other requests of a session are answered while it also sends its presence requests.
+/// The controller answers the other requests of a session that also sends presence requests.
 #[test]
 fn j50_requests_wait_for_the_answer_that_is_on_its_way() {
     let mut s = supervised(100, Some(115_200));

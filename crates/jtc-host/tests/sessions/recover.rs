@@ -1,4 +1,4 @@
-//! Recovery to HoldPos: the reports from each state, and cancelling by the user.
+//! Tests of the recovery to HoldPos: reports from each state, and cancelling by the user.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,7 +14,7 @@ use jtc_sim::FaultKind;
 
 use super::{Sim, fail, motion, ready, session};
 
-/// Starts a motion of some seconds from HoldPos.
+/// Starts a motion of several seconds from HoldPos.
 fn move_arm(s: &mut Sim) {
     let t = CheckedTrajectory::check(&motion(1.0, 50.0), &Arm::avena(), &[0.0; 6], &CheckOptions::default())
         .unwrap();
@@ -91,7 +91,7 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
         (status.state, status.trajectory),
         (ControllerState::HoldPos.into(), TrajectoryState::Stop.into())
     );
-    // In teaching the operator guides the arm, so teaching is not ended.
+    // In teaching the operator guides the arm, so the recovery does not end teaching.
     s.teach(true).unwrap();
     s.wait_for("teaching", Duration::from_secs(1), |s| s.state == ControllerState::Teaching).unwrap();
     let sent = s.statistics().frames_sent;
@@ -115,8 +115,8 @@ fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
     assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
 }
 
-/// J-55: a controller without parameters does not get the parameters of an arm that the user did not select, and an
-/// incomplete arm is not completed.
+/// J-55: a controller without parameters does not receive the parameters of an arm that the user did not select.
+/// Missing parameters of an incomplete arm are not added.
 #[test]
 fn j55_recover_gives_no_numbers_that_nobody_named() {
     let mut s = session(Some(921_600));
@@ -136,7 +136,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
     assert_eq!(s.statistics().frames_sent, sent);
 
-    // The controller has a parameter of another arm. The file's parameters are then all sent.
+    // The controller has a parameter of another arm. In this case, all parameters of the file are sent.
     s.use_default(jtc_host::session::Parameter::Pid).unwrap();
     let set = Arm::avena().parameter_set();
     let before = s.statistics().frames_sent;
@@ -150,7 +150,8 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // The arm is held, so parameters are not sent while they carry its weight. A step reports this.
+    // The controller holds the weight of the arm with the present parameters, so the recovery sends no others. A step
+    // of the recovery reports this.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
@@ -170,7 +171,7 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
     let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
     assert!(give < clear, "{steps:?}");
-    // If the user selects no arm, the controller keeps its parameters. A step reports this.
+    // If the user selects no arm, the controller keeps its parameters. A step of the recovery reports this.
     fail(&mut s, FaultKind::SafetyInput, 500);
     let mut steps = Vec::new();
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();

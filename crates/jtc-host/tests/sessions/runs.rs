@@ -11,7 +11,7 @@ use jtc_wire::Status;
 
 use super::{Sim, motion, ready};
 
-/// Front end that records its calls.
+/// Front end that records the calls it receives.
 #[derive(Default)]
 struct Diary {
     steps: Vec<String>,
@@ -19,9 +19,9 @@ struct Diary {
     /// After this number of calls, `is_cancelled` returns `true`.
     cancels_at: Option<usize>,
     asked: usize,
-    /// Point of the motion at which a stop is requested, ms.
+    /// Point of the motion at which the front end requests a stop, ms.
     stops_at: Option<u32>,
-    /// If `true`, full speed is requested at each status during the motion.
+    /// If `true`, the front end requests full speed at each status during the motion.
     speeds: bool,
     /// Number of statuses during the motion, and number of flows that were applied.
     statuses: usize,
@@ -95,7 +95,7 @@ impl Observer<SimPort> for Diary {
     }
 }
 
-/// Runs `trajectory` `runs` times, with approaches. At first the arm is held in the zero pose.
+/// Runs `trajectory` `runs` times, with approaches. At the start, the controller holds the arm in the zero pose.
 fn runs(diary: &mut Diary, session: &mut Sim, trajectory: &Trajectory, runs: u32) -> Result<Ended, String> {
     let (arm, options) = (Arm::avena(), CheckOptions::default());
     let approach_pct = Some(50.0);
@@ -119,7 +119,7 @@ fn j55_a_run_that_does_not_lead_back_has_an_approach_before_each_motion() {
     assert!((session.fresh_status().expect("a status").positions()[0] - 0.3).abs() < 2e-3);
 }
 
-/// After a cancellation no further motion begins. A motion that has begun continues to its end.
+/// After a cancellation no further motion begins. A motion in progress continues to its end.
 #[test]
 fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     let mut counted = Diary::default();
@@ -145,8 +145,8 @@ fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     }
 }
 
-/// The last status of a motion shows its end. The flow for this status is not applied, and the front end must tell its
-/// client so.
+/// The last status of a motion shows its end. The flow for this status is not applied, and the front end must report
+/// this to its client.
 #[test]
 fn j57_a_flow_for_the_last_status_of_a_motion_is_not_applied() {
     let mut diary = Diary { speeds: true, ..Diary::default() };

@@ -19,8 +19,8 @@ mod answers {
 
     pub(super) type Written = Rc<RefCell<Vec<u8>>>;
 
-    /// The controller answers each frame with `status` and the frame's record, and sends a status every 40 ms. From `end`
-    /// on it sends nothing.
+    /// Simulates a controller that answers each frame with `status` and the frame's record, and sends a status every 40
+    /// ms. After the time `end`, the controller sends nothing.
     pub(super) fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
         let written = Written::default();
         let taken = Rc::clone(&written);
@@ -69,7 +69,7 @@ fn j34_resume_only_after_a_pause() {
             "{error}"
         );
         assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
-        // Only if the motion may still be decelerating, the same command can succeed shortly afterwards.
+        // A repeated command can succeed only if the motion may still be decelerating.
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
     let (mut s, written) = answers::session(
@@ -93,8 +93,8 @@ fn j34_resume_only_after_a_pause() {
     }
 }
 
-/// The link is lost during a motion. The error states that the arm may be moving. A Stop is sent, because it may still
-/// arrive.
+/// The link is lost during a motion. The error states that the arm may be moving. The session sends a Stop, because the
+/// controller may still receive it.
 #[test]
 fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     let moving = jtc_wire::Status {
@@ -128,8 +128,8 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert_eq!(written.borrow().len(), 0);
 }
 
-/// A frame without a record may have arrived, and the arm may have been stopped over another line since. So a frame that
-/// moves or releases the arm is sent again only if its record reports damage.
+/// A frame without a record may have arrived, and a Stop from another line may have stopped the arm after that. So a
+/// frame that moves or releases the arm is sent again only if the record of the frame reports damage.
 #[test]
 fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     use jtc_wire::{DataStatus, FrameStatus, Response, Status, fixed};
@@ -138,8 +138,8 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
         trajectory: TrajectoryState::Pause.into(),
         ..Status::default()
     };
-    // `records` are the records for this frame, in order; later frames get none. `done` selects whether the controller
-    // executes the frame.
+    // `records` are the records for this frame, in order; later frames receive no record. `done` selects whether the
+    // controller executes the frame.
     let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
         let (written, mut count) = (answers::Written::default(), 0);
         let taken = std::rc::Rc::clone(&written);

@@ -4,9 +4,9 @@
 //!     cargo run --profile dist -p jtc-plan --example measure -- quality [CASES [SEED]]
 //!
 //! `speed` prints the processor time in ms, the shortest of several runs. `quality` prints a line for each kind of
-//! path: sum and maximum of the durations, each divided by the duration without a jerk limit, and the number of motions
-//! that became slower when all limits were doubled. If a file name follows the seed, the duration of each motion is
-//! written to that file.
+//! path. The line contains the sum and the maximum of the durations, each divided by the duration without a jerk limit.
+//! After these, it contains the number of motions that became slower when all limits were doubled. If a file name
+//! follows the seed, the duration of each motion is written to that file.
 use std::fmt::Write as _;
 
 use jtc_core::{Config, Parameters};
@@ -90,7 +90,7 @@ struct Set {
     paths: Vec<(Vec<JointVec>, f64)>,
 }
 
-/// A smooth closed curve.
+/// Waypoints on a smooth closed curve.
 fn curve(rng: &mut fastrand::Rng) -> impl Fn(usize) -> Vec<JointVec> {
     let amplitudes: [JointVec; 4] = std::array::from_fn(|_| random(rng, 0.5));
     move |count| {

@@ -1,7 +1,7 @@
-//! Plans the motions that standard input requests, for comparison with other implementations.
+//! Plans the motions that the lines of standard input describe, for comparison with other implementations.
 //!
-//! Each input line is a list of words; numbers have all their digits. The arm is the default one, without friction and
-//! payload:
+//! Each input line is a list of words. Numbers are written with all digits. The arm is the default one, without
+//! friction and payload:
 //!
 //! - `limits`, then velocity, acceleration, jerk (`inf`: no limit) and torque of six joints: sets the limits for the
 //!   lines that follow.
@@ -64,7 +64,7 @@ fn path(
     let start = Instant::now();
     let motion = along(&path, limits, (*with_torque == 1.0).then_some(arm))?;
     let taken = start.elapsed().as_secs_f64();
-    // The requested number of places, and the places at which the path changes its form.
+    // Points of the path: the requested number of points, and the points at which the path changes its form.
     let mut parameters: Vec<f64> = (0..=*places as usize).map(|i| path.end() * i as f64 / places).collect();
     parameters.extend(path.breaks());
     parameters.sort_by(f64::total_cmp);

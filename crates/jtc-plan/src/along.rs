@@ -8,10 +8,10 @@ use crate::motion::Motion;
 use crate::path::Path;
 use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 
-/// Plans the fastest motion from rest to rest along a path within velocity, acceleration and torque: time-optimal path parameterisation by
-/// reachability analysis (Pham and Pham 2018). If the limits have a jerk, an interior-point method shortens the time law. The method starts
-/// from a law that is averaged over a window, and uses velocity, acceleration, jerk and torque at places along the path. The motion is also
-/// verified between its samples, and slowed down until all limits hold.
+/// Plans the fastest motion from rest to rest along a path within the limits of velocity, acceleration and torque. The method is
+/// time-optimal path parameterisation by reachability analysis (Pham and Pham 2018). If the limits include a jerk limit, an interior-point
+/// method shortens the time law. The method starts from a law that is averaged over a window. It evaluates velocity, acceleration, jerk
+/// and torque at points along the path. The motion is also verified between its samples, and slowed down until it keeps all limits.
 ///
 /// # Errors
 ///
@@ -31,8 +31,8 @@ pub(crate) fn unexplained(
     along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
 
-/// Choices made for each section of a path. A repeated plan reuses them, so that the time law changes continuously with
-/// the path.
+/// Choices made for each section of a path. If a path is planned again, the planner reuses these choices, so that the
+/// time law changes continuously with the path.
 #[derive(Debug, Default)]
 pub(crate) struct Choices(Vec<Option<Choice>>);
 
@@ -40,11 +40,11 @@ pub(crate) struct Choices(Vec<Option<Choice>>);
 #[derive(Clone, Copy, Debug)]
 enum Choice {
     InteriorPoint,
-    /// Without a jerk limit, or averaged over a window with these shares.
+    /// Law without a jerk limit, or law averaged over a window with these shares.
     Other(Option<jerk::Shares>),
 }
 
-/// Like [`unexplained`], with a speed factor that depends on the waypoint passed last (counted from 1).
+/// Like [`unexplained`], with a speed factor that depends on the last passed waypoint (counted from 1).
 pub(crate) fn along_at(
     path: &dyn Path,
     limits: &Limits,
@@ -74,14 +74,14 @@ pub(crate) fn along_at(
     verify::finished(motion, limits, arm)
 }
 
-/// Returns the number (from 1) of the first waypoint at `s`; several waypoints in a row may have the same position.
-/// Without a waypoint at `s`, returns the last one passed.
+/// Returns the number (from 1) of the first waypoint at `s`. Several consecutive waypoints may have the same position.
+/// Without a waypoint at `s`, returns the last passed waypoint.
 fn first_waypoint(path: &dyn Path, s: f64) -> usize {
     let passed = |s: f64| if s < 0.0 { 0 } else { path.waypoint(s).unwrap_or(1) };
     passed(s).min(passed(s.next_down()) + 1)
 }
 
-/// Returns the sections between the stops.
+/// Returns the sections of the path between the stops.
 fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let end = path.end();
     if !(end.is_finite() && end > 0.0) {
@@ -105,7 +105,7 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let sections = ends.windows(2).map(|pair| {
         let (from, to) = (pair[0], pair[1]);
         let mut of_section = between(&waypoints, from, to);
-        // If a waypoint is repeated, the path passes it as many times.
+        // If a waypoint is repeated, the path passes it once for each repetition.
         let at = |place: f64| {
             waypoints.partition_point(|s| *s <= place) - waypoints.partition_point(|s| *s < place)
         };
@@ -133,7 +133,7 @@ fn of_section(
         .collect();
     let caps = caps(section, &cells, limits, arm)?;
     let plan = Plan { section, cells: &cells, reached: caps.clone(), caps, shares, limits, arm };
-    // On a straight line without torque limits, the averaged law is already the fastest.
+    // On a straight line without torque limits, the averaged law is already the fastest law.
     let is_straight = cells.iter().all(Cell::is_straight);
     let found = match *chosen {
         Some(Choice::Other(_)) => None,
@@ -161,7 +161,7 @@ fn of_section(
     }
 }
 
-/// Returns the motion of a law without a jerk limit, or of a law averaged over a window with the shares chosen for it.
+/// Returns the motion of a law without a jerk limit, or of a law averaged over a window with the chosen shares.
 fn without_interior(
     mut plan: Plan,
     shares: Option<jerk::Shares>,
@@ -172,7 +172,8 @@ fn without_interior(
     };
     let mut made = plan.make(shares, 0)?;
     let shares = made.shares;
-    // Friction is evaluated up to the highest speed in a cell. Each round estimates that speed better.
+    // Friction is evaluated up to the highest speed in each cell. Each round estimates this highest speed more
+    // accurately.
     plan.arm = Some(arm);
     let mut best: Option<Motion> = None;
     for _ in 0..TORQUE_ROUNDS {
@@ -190,7 +191,7 @@ fn without_interior(
     Ok((best.ok_or("the time of the motion is not finite")?, shares))
 }
 
-/// Returns the highest squared speed of each cell that velocity limits and friction permit.
+/// Returns the highest squared speed of each cell that the velocity limits and the friction permit.
 fn caps(
     section: &Section,
     cells: &[Cell],
@@ -213,49 +214,50 @@ fn caps(
 pub(crate) struct Plan<'a> {
     pub section: &'a Section<'a>,
     pub cells: &'a [Cell],
-    /// Highest squared speed of each cell.
+    /// Highest squared path speed in each cell.
     pub caps: Vec<f64>,
     /// Squared speed in each cell up to which friction is evaluated.
     pub reached: Vec<f64>,
-    /// Speed factor of each cell.
+    /// Factor that reduces the speed in each cell.
     pub shares: Vec<f64>,
     pub limits: &'a Limits,
     pub arm: Option<&'a ArmDynamics<'a>>,
 }
 
-/// A time law and its motion.
+/// A time law and the motion that results from it.
 pub(crate) struct Made {
     pub law: Law,
     pub motion: Motion,
-    /// Shares of a jerk-limited law.
+    /// Shares of the limits that a jerk-limited law uses.
     pub shares: Option<jerk::Shares>,
 }
 
-/// Number of times that an interior-point law is repaired, by slowing down the cells in which a limit is violated
+/// Number of times that an interior-point law is repaired. A repair slows down the cells in which a limit is violated
 /// between samples.
 const INTERIOR_REPAIRS: usize = 1;
-/// Largest number of cells for which averages over a window are tried in addition.
+/// Largest number of cells for which laws averaged over a window are also tried.
 const FEW: usize = 200;
-/// Number of times that a section is planned with torque.
+/// Number of times that a section is planned with torque limits.
 const TORQUE_ROUNDS: usize = 4;
-/// Least share of the duration that a round must save to justify another round.
+/// Minimum share of the duration that a round must save; otherwise no further round follows.
 const WORTH: f64 = 0.004;
 /// Largest factor between a cell's speeds in two consecutive rounds.
 const FASTER: f64 = 1.1;
 
-/// Number of times that single cells are slowed down because of a limit violated between samples, before the whole
+/// Number of times that single cells are slowed down because a limit is violated between samples. After that, the whole
 /// motion is slowed down.
 const REPAIRS: usize = 4;
-/// The whole motion is slowed down, instead of another repair, if the factor is at most this.
+/// Maximum time factor for which the whole motion is slowed down instead of repairing it again.
 const LEFT_OVER: f64 = 1.001;
 
 impl Plan<'_> {
-    /// Returns the law and its motion. Cells in which a limit is violated between the samples are slowed down up to `repairs` times.
+    /// Returns the time law and its motion. Cells in which a limit is violated between the samples are slowed down up to `repairs`
+    /// times.
     fn make(&self, shares: Option<jerk::Shares>, repairs: usize) -> Result<Made, String> {
         if self.limits.has_jerk() { jerk::limited(self, shares, repairs) } else { self.without_jerk(repairs) }
     }
 
-    /// Returns squared speeds of the cells, slightly higher than those of a law.
+    /// Returns squared speeds of the cells that are slightly higher than the speeds of a law.
     fn reached_by(&self, law: &Law) -> Vec<f64> {
         let speed = |s: f64| law.at(law.time_of(s)).1;
         let mut before = 0.0;
@@ -293,7 +295,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Returns the time factor that each cell needs to keep its limits.
+    /// Returns, for each cell, the factor on the time with which the motion keeps all limits.
     pub(crate) fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {

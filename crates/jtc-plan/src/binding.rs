@@ -3,7 +3,7 @@ use std::fmt;
 
 use jtc_wire::Joint;
 
-/// Kind of a limit.
+/// Kind of limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum LimitKind {
@@ -15,12 +15,12 @@ pub enum LimitKind {
     Jerk,
     /// Joint torque, N·m.
     Torque,
-    /// A time given for a waypoint. The limits permit a faster motion.
+    /// A time that the request specifies for a waypoint. The limits permit a faster motion.
     GivenTime,
 }
 
 impl LimitKind {
-    /// Returns the name in lower case, for sentences.
+    /// Returns the name of the limit in lower case, for use in sentences.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Velocity => "velocity",
@@ -49,13 +49,13 @@ impl fmt::Display for LimitKind {
     }
 }
 
-/// Time interval with its binding limit: the limit that is reached or nearly reached, so that a faster motion would
+/// Time interval with its binding limit. The motion reaches or nearly reaches this limit, so that a faster motion would
 /// exceed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binding {
-    /// Start of the interval, s from the start.
+    /// Start of the interval, in seconds after the start of the motion.
     pub from: f64,
-    /// End of the interval, s from the start.
+    /// End of the interval, in seconds after the start of the motion.
     pub to: f64,
     /// Joint that is closest to its limit.
     pub joint: Joint,

@@ -9,28 +9,29 @@ use crate::{JOINTS, JointVec, PlanError, thin};
 const SAME: f64 = 1e-9;
 /// Smallest difference of directions that is treated as a corner.
 const STRAIGHT: f64 = 1e-9;
-/// If the sum of the two directions is shorter than this, the path turns back (within some 3°) and stops instead of
-/// rounding the corner.
+/// Length of the sum of the two directions below which the path turns back (within about 3°). The path then stops
+/// instead of rounding the corner.
 const BACK: f64 = 0.05;
 
 /// Straight legs in joint space between waypoints, with rounded corners. The path leaves a leg and reaches the next one
-/// within `blend` rad of the waypoint between them, measured on the joint that moves most.
+/// within `blend` rad of the waypoint between the two legs. This distance is measured on the joint that moves most.
 ///
-/// In a corner the direction changes from one leg to the next along a smooth step, whose slope rises, stays constant
-/// and falls. The curvature is therefore continuous, the path stays in the triangle of the corner, and no joint
-/// overshoots. A corner takes at most half of each of its legs. Two collinear legs have no corner. The path stops if it
-/// turns back on itself, if a waypoint is given twice in a row, and at every waypoint if the blend is 0.
+/// In a corner, the direction changes from one leg to the next as a smooth step. The slope of the step rises, stays
+/// constant and falls. The curvature is therefore continuous, the path stays in the triangle of the corner, and no
+/// joint overshoots. A rounded corner uses at most half of each adjacent leg. Two collinear legs have no corner. The
+/// path stops at a waypoint if it turns back there, or if the waypoint is repeated. If the blend is 0, the path stops
+/// at every waypoint.
 ///
 /// The path parameter is the distance in rad that the joint with the largest movement covers along the straight legs.
 #[derive(Clone, Debug)]
 pub struct BlendedPath {
     /// Corners without repetitions.
     corners: Vec<Corner>,
-    /// An entry for each given waypoint.
+    /// List with an entry for each waypoint of the request.
     given: Vec<Given>,
 }
 
-/// Place of a waypoint on the path.
+/// Location of a waypoint on the path.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     /// Index of the last corner that is at or before the waypoint.
@@ -43,12 +44,12 @@ struct Given {
 struct Corner {
     position: JointVec,
     parameter: f64,
-    /// Direction of the leg that begins here.
+    /// Direction of the leg that begins at this corner.
     direction: JointVec,
-    /// Half of the parameter range of the rounding; 0: not rounded.
+    /// Half of the parameter range of the rounding; 0 if the corner is not rounded.
     half: f64,
     stop: bool,
-    /// `true` if the path stops only because it turns back here.
+    /// `true` if the path stops at this corner only because it turns back.
     leads_back: bool,
 }
 
@@ -97,9 +98,10 @@ impl BlendedPath {
         }
     }
 
-    /// Returns the path without the corners that lie within `share` of the blend from the straight line between the
-    /// remaining corners, in order along it. Waypoints are removed only if they are so dense that the whole line stays
-    /// within their blend. Waypoints for which `keep` returns `true` stay. Returns `None` if no corner can be removed.
+    /// Returns the path without the corners that are close to the straight line between the remaining corners. Such a
+    /// corner is at most `share` of the blend from the line, and the corners are in order along the line. Waypoints are
+    /// removed only if they are so dense that the whole line stays within the blend of the removed waypoints. Waypoints
+    /// for which `keep` returns `true` are not removed. Returns `None` if no corner can be removed.
     pub(crate) fn thinned(&self, blend: f64, share: f64, keep: &dyn Fn(usize) -> bool) -> Option<Self> {
         let mut stays: Vec<bool> = self.corners.iter().map(|c| c.stop && !c.leads_back).collect();
         for (i, given) in self.given.iter().enumerate() {
@@ -166,17 +168,17 @@ impl BlendedPath {
         distance(a, b) <= SAME
     }
 
-    /// Returns the index of the leg at `s`; at a corner, of the next leg.
+    /// Returns the index of the leg at `s`. At a corner, this is the next leg.
     fn leg(&self, s: f64) -> usize {
         let after = self.corners.partition_point(|c| c.parameter <= s);
         after.saturating_sub(1).min(self.corners.len() - 2)
     }
 
-    /// Returns the point on the straight leg.
+    /// Returns the point of the straight leg at `s`.
     fn on_leg(&self, leg: usize, s: f64) -> PathPoint {
         let (from, to) = (&self.corners[leg], &self.corners[leg + 1]);
         let (gone, left) = (s - from.parameter, to.parameter - s);
-        // Computed from the nearer end, so that both ends are exact.
+        // The point is computed from the nearer end of the leg, so that both ends are exact.
         let position = std::array::from_fn(|j| {
             if gone <= left {
                 from.position[j] + gone * from.direction[j]
@@ -204,8 +206,9 @@ impl BlendedPath {
     }
 }
 
-/// Step from 0 at 0 to 1 at 1 whose slope rises, stays constant and falls for a third each. No other step with a slope of at most 3/2 has a
-/// smaller second derivative. Returns the integral, the value and the slope of the step at `u`.
+/// Evaluates a step function from 0 (at 0) to 1 (at 1). Its slope rises, stays constant and falls, each for a third of the interval. Of
+/// all steps with a slope of at most 3/2, this step has the smallest second derivative. Returns the integral, the value and the slope
+/// of the step at `u`.
 fn step(u: f64) -> (f64, f64, f64) {
     const THIRD: f64 = 1.0 / 3.0;
     if u < THIRD {
@@ -220,7 +223,7 @@ fn step(u: f64) -> (f64, f64, f64) {
 }
 
 impl Corner {
-    /// Decides how the path passes the corner; `before` is the direction of the leg that ends here.
+    /// Determines how the path passes the corner. `before` is the direction of the leg that ends at the corner.
     fn round(&mut self, before: &JointVec, half: f64) {
         let size = |sign: f64| {
             let parts = before.iter().zip(&self.direction).map(|(a, b)| (b + sign * a).abs());
@@ -261,7 +264,7 @@ impl Path for BlendedPath {
         let mut breaks = Vec::with_capacity(4 * inner.len());
         for corner in inner {
             if corner.half > 0.0 {
-                // Two adjacent corners share one break.
+                // Two adjacent rounded corners share one break.
                 let begin = corner.parameter - corner.half;
                 if breaks.last().is_none_or(|last| begin > last + 0.01 * corner.half) {
                     breaks.push(begin);
@@ -273,7 +276,7 @@ impl Path for BlendedPath {
                 breaks.push(corner.parameter);
             }
         }
-        // A corner next to a stop or an end needs no break there.
+        // A rounded corner that touches a stop or an end needs no additional break at that point.
         breaks.retain(|b| *b > 0.0 && *b < self.end());
         breaks
     }
@@ -300,7 +303,8 @@ impl Waypointed for BlendedPath {
     }
 }
 
-/// Returns the waypoints without consecutive duplicates, and for each given waypoint its index in them.
+/// Returns the waypoints without consecutive duplicates, and, for each waypoint of the request, its index in the
+/// shorter list.
 fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanError> {
     let mut corners: Vec<Corner> = Vec::with_capacity(waypoints.len());
     let mut given = Vec::with_capacity(waypoints.len());

@@ -1,4 +1,4 @@
-//! Division of a section of a path into cells, with the effect of the joint limits on its parameter.
+//! Division of a section of a path into cells, with the effect of the joint limits on the path parameter.
 use jtc_wire::Joint;
 
 use crate::compose::Section;
@@ -6,7 +6,7 @@ use crate::path::PathPoint;
 use crate::profile::Bounds;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Numbers of cells into which the parts of a path are divided.
+/// Number of cells into which each part of a path is divided.
 struct Division {
     straight: usize,
     curved: usize,
@@ -15,19 +15,19 @@ struct Division {
 }
 
 const COARSE: Division = Division { straight: 6, curved: 3, least: 120 };
-/// For a law whose acceleration changes only at the ends of cells.
+/// Number of cells for a law whose acceleration changes only at the ends of cells.
 const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
 /// Share of the torque available for motion that the path speed may use.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the usable torque that a plan uses.
 const TORQUE_SHARE: f64 = 0.9975;
-/// Share of the torque limit that must be available for motion if friction grows with the speed. With less, the speed
-/// is lowered.
+/// Minimum share of the torque limit that must be available for motion when friction increases with the speed. If less
+/// torque is available, the speed is reduced.
 const MOTION_SHARE: f64 = 0.05;
-/// Share of the torque available above holding that must stay available for motion, if that is less.
+/// Share of the torque above the holding torque that must remain available for motion, if this is the smaller value.
 const STANDING_SHARE: f64 = 0.5;
-/// Share of the torque limit that is enough to move slowly.
+/// Share of the torque limit that is sufficient for a slow motion.
 const CREEP_SHARE: f64 = 0.002;
 
 /// Parts of the torque at a point, N·m. With q̈ = q′·s̈ + q″·ṡ² the torque is hold + mass·s̈ + speed·ṡ², plus friction.
@@ -51,7 +51,7 @@ impl Loads {
     }
 }
 
-/// End of a cell.
+/// Quantities at one end of a cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct End {
     pub point: PathPoint,
@@ -69,8 +69,8 @@ pub(crate) struct Cell {
     pub third: JointVec,
 }
 
-/// Returns the cells of a section. With `fine` the cells are smaller, for a law whose acceleration changes only at
-/// their ends.
+/// Returns the cells of a section. If `fine` is set, the cells are smaller, for a law whose acceleration changes only
+/// at the ends of the cells.
 pub(crate) fn cells(
     section: &Section,
     arm: Option<&ArmDynamics>,
@@ -85,7 +85,7 @@ pub(crate) fn cells(
         let is_straight = inside.iter().all(|p| p.second == [0.0; JOINTS]);
         let count = if is_straight { division.straight } else { division.curved };
         let count = count.max(division.least / section.parts_of_path);
-        // Near a rest the speed changes within a short distance.
+        // Near a point at which the arm is at rest, the speed changes within a short distance.
         let (begins, ends) = (from == section.from && !fine, to == section.to && !fine);
         let share = |i: usize| {
             let u = i as f64 / count as f64;
@@ -116,14 +116,14 @@ pub(crate) fn cells(
     Ok(cells)
 }
 
-/// Checks that a place is within the position limits and that the path has a direction there.
+/// Checks that a point of the path is within the position limits, and that the path has a direction at this point.
 fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Result<(), PlanError> {
     let leg = section.path.waypoint(s).unwrap_or(1);
     let numbers = point.first.iter().chain(&point.second);
     if numbers.into_iter().any(|x| !x.is_finite()) {
         return Err(PlanError::Path { leg, parameter: s });
     }
-    // The tolerance allows for rounding between two positions at the limit.
+    // The tolerance allows for rounding between two positions that are exactly at the limit.
     for joint in Joint::ALL {
         let (value, (min, max)) = (point.position[joint.index()], limits.position[joint.index()]);
         if !(min - 1e-9..=max + 1e-9).contains(&value) {
@@ -133,8 +133,8 @@ fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Res
     Ok(())
 }
 
-/// Torque available for motion up (`high`) and down (`low`) at one end of a cell, N·m: the usable torque minus the
-/// holding torque and minus the highest friction torque up to the speed, in the direction of the path.
+/// Torque available for motion up (`high`) and down (`low`) at one end of a cell, N·m. This is the usable torque minus
+/// the holding torque, and minus the highest friction torque up to the speed in the direction of the path.
 pub(crate) struct Room {
     pub high: JointVec,
     pub low: JointVec,
@@ -142,7 +142,7 @@ pub(crate) struct Room {
     limit: JointVec,
 }
 
-/// Returns the torque of a joint that a plan may use if the holding torque is `hold`, N·m.
+/// Returns the torque of a joint (N·m) that a plan may use if the holding torque is `hold`.
 pub(crate) fn planned_torque(arm: &ArmDynamics, limits: &Limits, j: usize, hold: f64) -> f64 {
     TORQUE_SHARE * arm.usable_torque(limits, j, hold)
 }
@@ -162,8 +162,8 @@ impl Room {
         room
     }
 
-    /// Returns the joint with the smallest excess over `needed`, and its available torque as a share of the joint's
-    /// torque limit.
+    /// Returns the joint whose available torque exceeds `needed` by the smallest amount. Also returns this torque as a
+    /// share of the joint's torque limit.
     fn least(&self, limits: &Limits, needed: &JointVec) -> (f64, usize) {
         let share = |j: usize| self.high[j].min(self.low[j]) / limits.torque[j];
         let over = |j: &usize| share(*j) - needed[*j];
@@ -190,7 +190,7 @@ impl Cell {
         cap
     }
 
-    /// Returns the squared speed, at most `cap`, at which friction leaves torque for motion.
+    /// Returns the squared speed, at most `cap`, at which torque remains for motion after friction.
     ///
     /// # Errors
     ///
@@ -217,7 +217,7 @@ impl Cell {
                     break;
                 }
                 if cap <= SLOWEST * fastest {
-                    // Enough torque to move slowly.
+                    // The torque is sufficient for a slow motion.
                     if share > CREEP_SHARE {
                         break;
                     }
@@ -231,9 +231,10 @@ impl Cell {
         Ok(cap)
     }
 
-    /// Returns limits of the parameter speed (its square is at most `cap`) and of the parameter acceleration. The two
-    /// limits are independent: any combination within both keeps the joints within their limits. The curvature may use
-    /// `share` of the acceleration and jerk limits. Friction is considered up to the squared speed `reached`.
+    /// Returns limits of the speed and the acceleration of the path parameter. The squared speed is at most `cap`. The
+    /// two limits are independent: any combination of speed and acceleration within these two limits keeps the joints
+    /// within their limits. The curvature of the path may use the share `share` of the acceleration and jerk limits.
+    /// Friction is considered up to the squared speed `reached`.
     pub(crate) fn bounds(
         &self,
         cap: f64,
@@ -278,7 +279,7 @@ impl Cell {
         for j in 0..JOINTS {
             let (first, second) = (end.point.first[j].abs(), end.point.second[j].abs());
             most = most.min((limits.acceleration[j] - second * cap) / first);
-            // Half of the remaining jerk is kept for changes of the acceleration.
+            // Half of the remaining jerk is reserved for changes of the acceleration.
             let left = limits.jerk[j] - self.third[j].abs() * cap * speed;
             most = most.min(0.5 * left / (3.0 * second * speed));
         }

@@ -1,29 +1,30 @@
-//! Chooses which corners are rounded, and which waypoints are corners.
+//! Choice of the corners that are rounded, and of the waypoints that are corners.
 //!
-//! A stop at a corner is always within the blend, and so is a line close to dense waypoints. The planner uses the
-//! fastest option.
+//! A path that stops at a corner is always within the blend. A straight line close to dense waypoints is also within
+//! the blend. The planner uses the fastest option.
 use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
-/// Maximum deviations of dropped waypoints from the line, as shares of the blend.
+/// Maximum distances of dropped waypoints from the straight line, as shares of the blend.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// With a jerk limit, a path is not planned if it has at least this many times the corners of a thinned version.
+/// Minimum ratio of the corners of a path to those of its thinned version for which the path itself is not planned
+/// (with a jerk limit).
 const DENSE: usize = 8;
-/// Number of rounds in which corners become stops.
+/// Number of rounds in which rounded corners are replaced by stops.
 const ROUNDS: usize = 5;
-/// A corner is replaced by a stop if the stop takes less than this share of the time with the rounded corner.
+/// Time with a stop, as a share of the time with the rounded corner, below which the corner is replaced by a stop.
 const WORTH: f64 = 0.99;
 
-/// Fastest motion found so far (without its limiting constraints) and its path.
+/// Fastest motion found so far, without its limiting constraints, and the path of this motion.
 pub(crate) struct Chosen {
     pub path: BlendedPath,
     pub motion: Motion,
 }
 
-/// Plans several motions through `path`'s waypoints and returns the fastest: along the path itself; with some waypoints
-/// dropped or stops at some corners; and with a stop at each waypoint. Waypoints for which `keep` returns `true` are
-/// not dropped.
+/// Plans several motions through the waypoints of `path` and returns the fastest motion. The options are the path
+/// itself, a path without some waypoints or with stops at some corners, and a path with a stop at each waypoint.
+/// Waypoints for which `keep` returns `true` are not dropped.
 pub(crate) fn fastest(
     path: BlendedPath,
     blend: f64,
@@ -67,7 +68,7 @@ pub(crate) fn fastest(
                 _ => break,
             }
         }
-        // Another plan would give the same motion.
+        // A further plan would result in an identical motion.
         let is_planned =
             |best: &Timed| best.path.corners() == all_stops.corners() && best.path.stops_everywhere();
         let with_stops: f64 = all_stops.legs().map(|(a, b)| rest_to_rest(&a, &b, &line_limits)).sum();
@@ -85,7 +86,7 @@ pub(crate) fn fastest(
     }
 }
 
-/// A path with its motion and the times at the middles of its legs.
+/// A path with its motion and the times at which the motion passes the middle of each leg.
 struct Timed {
     path: BlendedPath,
     motion: Motion,
@@ -108,7 +109,7 @@ impl Timed {
         Ok(Self { path, motion, middles })
     }
 
-    /// Returns the rounded corners that take longer than a stop at the same place. The time with a stop is half the
+    /// Returns the rounded corners that take longer than a stop at that corner. The time with a stop is half the
     /// rest-to-rest time of each adjacent leg.
     fn slow_corners(&self, limits: &Limits) -> Vec<usize> {
         let at_rest: Vec<f64> = self.path.legs().map(|(a, b)| rest_to_rest(&a, &b, limits)).collect();
@@ -123,7 +124,7 @@ impl Timed {
 /// A path that has the middles of its legs as additional waypoints.
 struct WithMiddles<'a> {
     path: &'a BlendedPath,
-    /// Parameter of each place; `true` for the middle of a leg.
+    /// Parameter of each waypoint, with `true` for the middle of a leg.
     places: Vec<(f64, bool)>,
 }
 
@@ -172,7 +173,8 @@ fn rest_to_rest(from: &JointVec, to: &JointVec, limits: &Limits) -> f64 {
     };
     let (speed, acceleration, jerk) =
         (least(&limits.velocity), least(&limits.acceleration), least(&limits.jerk));
-    // Positions are fractions of the line. The speed-up takes `ramp` seconds and covers half of `ramp` times the speed.
+    // Positions are fractions of the line. The acceleration phase lasts `ramp` seconds, and its distance is half of
+    // `ramp` times the speed.
     let ramp = |speed: f64| {
         if speed * jerk < acceleration * acceleration {
             2.0 * (speed / jerk).sqrt()

@@ -4,44 +4,45 @@ use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Shortest piece with a jerk limit, s. In a shorter piece rounding errors dominate the third derivative.
+/// Minimum duration of a piece with a jerk limit, s. In a shorter piece, rounding errors dominate the third derivative.
 const SHORTEST: f64 = 2e-4;
-/// Shortest piece without a jerk limit, s. In a shorter piece rounding errors dominate the second derivative.
+/// Minimum duration of a piece without a jerk limit, s. In a shorter piece, rounding errors dominate the second
+/// derivative.
 const SHORTEST_WITHOUT_JERK: f64 = 1e-5;
 /// Largest distance of the middle of a piece from the path, rad.
 const AWAY: f64 = 1e-9;
-/// Largest error of the acceleration in the middle of a piece, as a share of its limit.
+/// Largest error of the acceleration in the middle of a piece, as a share of the acceleration limit.
 const ACCELERATION_AWAY: f64 = 1e-3;
-/// Maximum number of times that a piece is halved to keep these errors.
+/// Maximum number of times that a piece is halved to stay within the two error limits above.
 const HALVINGS: u8 = 7;
 
-/// Section of a path from stop to stop, with the places at which the path changes its form.
+/// Section of a path from one stop to the next, with the points at which the path changes its form (breaks).
 pub(crate) struct Section<'a> {
     pub path: &'a dyn Path,
     pub from: f64,
     pub to: f64,
-    /// Breaks in ascending order, without the ends.
+    /// Parameters of the breaks in ascending order, without the ends of the section.
     pub breaks: Vec<f64>,
     /// Parameters of the waypoints that belong to the section, in ascending order. The waypoint at the start of a
-    /// section belongs to it only if it is the start of the path.
+    /// section belongs to the section only if it is the start of the path.
     pub waypoints: Vec<f64>,
     /// Number of parts between the breaks of the whole path.
     pub parts_of_path: usize,
 }
 
 impl Section<'_> {
-    /// Returns position and derivatives at the parameter `s`, evaluated inside the interval `side` between two breaks.
+    /// Returns position and derivatives at the parameter `s`, evaluated inside the part `side` between two breaks.
     pub(crate) fn at(&self, s: f64, side: (f64, f64)) -> PathPoint {
         self.path.at(s.clamp(side.0.next_up(), side.1.next_down().max(side.0.next_up())))
     }
 
-    /// Returns start and end of each part (a part lies between two breaks).
+    /// Returns the start and end of each part between two breaks.
     pub(crate) fn parts(&self) -> impl Iterator<Item = (f64, f64)> {
         let ends = || self.breaks.iter().copied();
         std::iter::once(self.from).chain(ends()).zip(ends().chain([self.to]))
     }
 
-    /// Returns the motion along the section. The first waypoint time is the start of the section.
+    /// Returns the motion along the section. The first time in the list of waypoint times is the start of the section.
     pub(crate) fn motion(&self, law: &Law, limits: &Limits) -> Motion {
         let mut pieces = Vec::new();
         let shortest = if limits.has_jerk() { SHORTEST } else { SHORTEST_WITHOUT_JERK };
@@ -70,7 +71,7 @@ impl Section<'_> {
         Motion::new(pieces, self.path.at(self.to).position, times)
     }
 
-    /// Returns start and end time of each part; no part is shorter than the shortest piece.
+    /// Returns the start and end time of each part. Each part is at least as long as the minimum duration of a piece.
     fn times(&self, law: &Law) -> Vec<(f64, f64)> {
         let mut times: Vec<f64> = vec![0.0];
         times.extend(self.breaks.iter().map(|s| law.time_of(s - self.from)));
@@ -90,7 +91,7 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// Adds as many pieces as are needed to stay on the path.
+    /// Adds as many pieces as the motion needs to stay on the path.
     fn pieces(&self, pieces: &mut Vec<Piece>, halvings: u8) {
         let (from, to) = (self.from, self.to);
         if to <= from {
@@ -98,7 +99,7 @@ impl Part<'_> {
         }
         let length = to - from;
         let mut start = self.state(from, 1.0);
-        // A piece starts exactly at the end of the previous piece, so that rounding causes no jump.
+        // A piece starts exactly at the end of the previous piece, so that rounding does not cause a jump.
         if let Some(last) = pieces.last() {
             let end = last.at(last.length);
             (start.position, start.velocity) = (end.position, end.velocity);
@@ -122,7 +123,7 @@ impl Part<'_> {
         })
     }
 
-    /// Returns the state at `time`, after (1) or before (−1) a jump.
+    /// Returns the state at `time`, just after (1) or just before (−1) a jump.
     fn state(&self, time: f64, after: f64) -> State {
         let (s, v, a) = self.law.beside(time, after);
         let at = self.section.at(self.section.from + s, self.side);

@@ -1,10 +1,10 @@
-//! Distance of two joint positions.
+//! Distance between two sets of joint positions.
 use jtc_wire::Joint;
 
 use crate::JointVec;
 
-/// Returns the joint whose position differs most between `a` and `b`, and the difference, rad. If a difference is NaN,
-/// that joint is returned.
+/// Returns the joint whose position differs most between `a` and `b`, and the difference, rad. If the difference of a
+/// joint is NaN, returns that joint.
 pub fn furthest_joint(a: &JointVec, b: &JointVec) -> (Joint, f64) {
     let apart = |joint: Joint| (joint, (b[joint.index()] - a[joint.index()]).abs());
     let [first, others @ ..] = Joint::ALL;
@@ -14,7 +14,7 @@ pub fn furthest_joint(a: &JointVec, b: &JointVec) -> (Joint, f64) {
         .fold(apart(first), |most, next| if next.1.total_cmp(&most.1).is_ge() { next } else { most })
 }
 
-/// Returns the distance of the joint that moves most, rad.
+/// Returns the distance that the joint with the largest movement covers, rad.
 pub(crate) fn distance(a: &JointVec, b: &JointVec) -> f64 {
     a.iter().zip(b).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }

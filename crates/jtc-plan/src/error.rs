@@ -5,7 +5,7 @@ use crate::LimitKind;
 use crate::kinematics::PoseError;
 use crate::limits::MARGIN_MAX;
 
-/// Reason why a motion cannot be planned. Waypoints and legs are counted from 1; leg 1 leads from waypoint 1 to
+/// Reason why a motion cannot be planned. Waypoints and legs are counted from 1. Leg 1 is the path from waypoint 1 to
 /// waypoint 2.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -29,7 +29,8 @@ pub enum PlanError {
     /// A position outside the limits.
     #[error("waypoint {waypoint}, {}", self.what())]
     Position {
-        /// Waypoint outside the limits, or the last waypoint before the position outside the limits; from 1.
+        /// Number (from 1) of the waypoint outside the limits, or of the last waypoint before the position outside the
+        /// limits.
         waypoint: usize,
         /// Joint of the position.
         joint: Joint,
@@ -50,7 +51,7 @@ pub enum PlanError {
         /// Value of the limit.
         value: f64,
     },
-    /// A range without positions.
+    /// A position range that contains no positions.
     #[error("{joint}: lowest position {min} rad is not below the highest position, {max} rad")]
     Range {
         /// Joint of the range.
@@ -76,7 +77,7 @@ pub enum PlanError {
         /// Blend, rad.
         value: f64,
     },
-    /// An invalid time, or a time that is not after the previous one.
+    /// An invalid time, or a time that is not later than the previous time.
     #[error("waypoint {waypoint}: time {time} s is not after {before} s")]
     Time {
         /// Waypoint, from 1.
@@ -92,33 +93,34 @@ pub enum PlanError {
         .limit.name()
     )]
     TooEarly {
-        /// Previous waypoint with a given time, from 1.
+        /// Number (from 1) of the previous waypoint with a specified time.
         from: usize,
         /// Waypoint, from 1.
         waypoint: usize,
         /// Joint that needs the longest time.
         joint: Joint,
-        /// Limit that the joint reaches.
+        /// Limit that this joint reaches.
         limit: LimitKind,
-        /// Given time from waypoint `from` to this one, s.
+        /// Specified time from waypoint `from` to this waypoint, s.
         given: f64,
-        /// Shortest possible time, s; 5 % longer than the given time if only the adjacent legs leave no margin.
+        /// Shortest possible time, s. If only the adjacent legs cause the error, it is 5 % longer than the specified
+        /// time.
         shortest: f64,
     },
-    /// The torque does not suffice at any speed.
+    /// The torque is not sufficient at any speed.
     #[error("waypoint {waypoint}, {}", self.what())]
     Torque {
-        /// Waypoint of the failure, or the last waypoint before it; from 1.
+        /// Number (from 1) of the waypoint with the failure, or of the last waypoint before the failure.
         waypoint: usize,
-        /// Joint with too little torque.
+        /// Joint whose torque is not sufficient.
         joint: Joint,
         /// Required torque, N·m.
         torque: f64,
-        /// Torque available for it, N·m.
+        /// Torque available for this joint, N·m.
         limit: f64,
-        /// Torque limit of the joint, N·m; `limit` is a share of it.
+        /// Torque limit of the joint, N·m; `limit` is a share of this torque.
         whole: f64,
-        /// `true` if the torque is too small even to hold the arm there: at the start, at a stop or at the end.
+        /// `true` if the torque is too small even to hold the arm at rest (at the start, at a stop or at the end).
         holding: bool,
     },
     /// A path with NaN or infinite positions or derivatives, or without a length.
@@ -129,10 +131,10 @@ pub enum PlanError {
         /// Parameter of the path.
         parameter: f64,
     },
-    /// The flange cannot reach the pose, or cannot follow a line or an arc to it.
+    /// The flange cannot reach the pose, or cannot follow a line or an arc to this pose.
     #[error(transparent)]
     Flange(#[from] PoseError),
-    /// No time law was found, because of a defect of the planner or extreme values.
+    /// The planner found no time law, because of a defect of the planner or extreme values.
     #[error("leg {leg}: no time law within the limits: {reason}")]
     NoTimeLaw {
         /// Leg, from 1.
@@ -143,7 +145,8 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Returns the waypoint in the message, counted from 1, if there is one. Returns the invalid one of two waypoints.
+    /// Returns the number (from 1) of the waypoint in the message, if the message contains one. Returns the waypoint
+    /// that is invalid, of two waypoints.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::NotFinite { waypoint, .. }

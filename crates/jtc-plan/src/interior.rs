@@ -1,12 +1,12 @@
 //! Time laws with limited jerk, by an interior-point method (Boyd and Vandenberghe 2004).
 //!
 //! The squared speed of the parameter is a quadratic spline of the parameter, with a knot at the end of each cell. The
-//! acceleration is half its slope, and the jerk is half its second derivative times the speed. Velocity, acceleration
-//! and torque are therefore linear in the coefficients; the jerk is linear except for the root of the squared speed.
-//! Newton's method minimises the sum of the time and the barriers of all limits, without the second derivatives of the
-//! limits. Only neighbouring coefficients are coupled, so the time of a step is proportional to the length of the path.
-//! In the first and the last cell the jerk is constant: from rest the squared speed rises with the power 4/3, which a
-//! spline cannot represent.
+//! acceleration is half the slope of the spline. The jerk is half its second derivative times the speed. Squared
+//! velocity, acceleration and torque are therefore linear in the coefficients. The jerk is linear except for the root
+//! of the squared speed. Newton's method minimises the sum of the time and the barriers of all limits, without the
+//! second derivatives of the limits. Only neighbouring coefficients are coupled, so the time of a step is proportional
+//! to the length of the path. In the first and the last cell the jerk is constant. Near rest the squared speed rises
+//! with the power 4/3, which a spline cannot represent.
 mod place;
 mod problem;
 mod spline;
@@ -17,13 +17,13 @@ use spline::knot;
 use crate::along::Plan;
 use crate::law::Law;
 
-/// Shares of the time that the barriers may cost, one per round.
+/// Shares of the total time that the barriers may cost, one for each round.
 const GAPS: [f64; 3] = [0.2, 0.04, 0.008];
-/// Maximum number of steps for each share.
+/// Maximum number of steps in each round.
 const STEPS: usize = 12;
-/// Newton's method ends with a step that promises less than this share of the allowed barrier cost.
+/// Predicted gain of a step, as a share of the allowed barrier cost, below which Newton's method ends.
 const WORTH: f64 = 0.25;
-/// Smallest fraction of a step that is tried.
+/// Smallest fraction of a Newton step that the line search tries.
 const SHORTEST: f64 = 1e-3;
 /// Factors that lower squared speeds outside the limits, and the largest number of reductions.
 const LOWER: f64 = 0.85;
@@ -34,7 +34,7 @@ const LOWER_MAX: usize = 100;
 struct Problem<'a> {
     plan: &'a Plan<'a>,
     places: Vec<Place>,
-    /// Knots, between the first and the last cell.
+    /// Knots of the spline, between the first and the last cell.
     knots: Vec<f64>,
     /// First and last coefficient, each divided by its neighbour.
     ties: (f64, f64),
@@ -49,7 +49,7 @@ impl<'a> Problem<'a> {
         (c[0], c[n - 1]) = (self.ties.0 * c[1], self.ties.1 * c[n - 2]);
     }
 
-    /// Returns the time plus `barrier` times the barriers; infinite outside the limits.
+    /// Returns the time plus `barrier` times the barriers. The result is infinite outside the limits.
     fn value(&self, c: &[f64], barrier: f64) -> f64 {
         let mut sum = 0.0;
         for place in &self.places {
@@ -59,14 +59,14 @@ impl<'a> Problem<'a> {
         sum
     }
 
-    /// Returns the step of Newton's method, and its predicted gain.
+    /// Returns the step of Newton's method, and the predicted gain of this step.
     fn step(&self, c: &[f64], barrier: f64) -> Option<(Vec<f64>, f64)> {
         let n = c.len();
         let (mut gradient, mut hessian) = (vec![0.0; n], vec![[0.0f64; 3]; n]);
         for place in &self.places {
             place.add_to(&mut gradient, &mut hessian, self.plan, c, barrier);
         }
-        // The first and the last coefficient follow their neighbours.
+        // The first and the last coefficient are determined by their neighbours.
         let (first, last) = self.ties;
         gradient[1] += first * gradient[0];
         hessian[1][0] += first * (2.0 * hessian[0][1] + first * hessian[0][0]);
@@ -81,7 +81,7 @@ impl<'a> Problem<'a> {
         Some((step, promise))
     }
 
-    /// Returns the coefficients of a spline near a law.
+    /// Returns the coefficients of a spline that is close to a time law.
     fn near(&self, law: &Law) -> Vec<f64> {
         let n = self.knots.len() as isize + 1;
         let place = |i: isize| 0.5 * (knot(&self.knots, i - 1) + knot(&self.knots, i));
@@ -90,7 +90,7 @@ impl<'a> Problem<'a> {
         c
     }
 
-    /// Lowers the speeds until all limits hold.
+    /// Reduces the speeds until all limits are kept.
     fn within(&self, c: &mut [f64], by: f64) -> Option<()> {
         self.tied(c);
         let lower = |c: &mut [f64], by: f64| c.iter_mut().for_each(|c| *c *= by);
@@ -135,7 +135,8 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Solves a symmetric positive definite system with two bands next to the diagonal and the right-hand side `-right`.
+/// Solves a symmetric positive definite system of equations with the right-hand side `-right`. The matrix has two bands
+/// next to the diagonal.
 fn solved(bands: &mut [[f64; 3]], right: &[f64]) -> Option<Vec<f64>> {
     let n = bands.len();
     let mut x: Vec<f64> = right.iter().map(|r| -r).collect();
@@ -169,7 +170,7 @@ fn solved(bands: &mut [[f64; 3]], right: &[f64]) -> Option<Vec<f64>> {
     Some(x)
 }
 
-/// Search for the fastest law along a plan's cells.
+/// Search for the fastest time law along the cells of a plan.
 pub(crate) struct Search<'a> {
     plan: &'a Plan<'a>,
     /// Coefficients of the last spline found.
@@ -178,7 +179,7 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Starts near a law.
+    /// Creates a search that starts near a given time law.
     pub(crate) fn new(plan: &'a Plan<'a>, near: &Law) -> Option<Self> {
         let c = Problem::new(plan, &vec![1.0; plan.cells.len()])?.near(near);
         Some(Self { plan, c, found: false })

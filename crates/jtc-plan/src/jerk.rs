@@ -1,8 +1,9 @@
 //! Time laws with limited jerk.
 //!
-//! The fastest law under limits of the parameter's speed and acceleration is averaged over a time window. A jump of the
-//! acceleration then becomes a ramp as long as the window. With a window of acceleration divided by jerk, the jerk
-//! limit holds. [`crate::profile`] ensures that the averaged law keeps the limits of the cells around it.
+//! The fastest law under limits of the parameter's speed and acceleration is averaged over a time window. The averaging
+//! changes a jump of the acceleration to a ramp that is as long as the window. If the length of the window is the
+//! acceleration divided by the jerk, the law keeps the jerk limit. [`crate::profile`] ensures that the averaged law
+//! keeps the limits of the cells around it.
 use crate::along::{Made, Plan};
 use crate::cells::Cell;
 use crate::interior::Search;
@@ -15,10 +16,10 @@ use crate::{JOINTS, Limits};
 const LOWER: f64 = 0.7;
 /// Maximum number of attempts.
 const ATTEMPTS: usize = 24;
-/// Shares of acceleration and jerk that the curvature may use, in the order of the attempts: nearly all if the path
-/// keeps its speed in curves, less if its speed must change there.
+/// Shares of acceleration and jerk that the curvature may use, in the order of the attempts. Nearly all may be used if
+/// the speed is constant in curves, and less if the speed must change there.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
-/// The whole motion is slowed down, instead of another repair, if the factor is at most this.
+/// Maximum time factor for which the whole motion is slowed down instead of repairing it again.
 const LEFT_OVER: f64 = 1.002;
 /// Like [`LEFT_OVER`], for an interior-point law.
 const LITTLE: f64 = 1.005;
@@ -30,11 +31,12 @@ const JERK_SHARE: f64 = 0.995;
 pub(crate) struct Shares {
     /// Share of the acceleration along the path.
     acceleration: f64,
-    /// Share of acceleration and jerk for the curvature.
+    /// Share of acceleration and jerk that the curvature may use.
     curvature: f64,
 }
 
-/// Returns the best of several laws with different shares of the limits, or the law with these `shares`.
+/// Returns the best of several laws with different shares of the limits. If `shares` is set, returns the law with these
+/// shares.
 pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Result<Made, String> {
     let none = || String::from("no attempt took a finite time");
     let shares = shares.or_else(|| best_shares(plan)).ok_or_else(none)?;
@@ -107,7 +109,7 @@ fn best_shares(plan: &Plan) -> Option<Shares> {
 fn bounds(plan: &Plan, shares: Shares) -> Vec<Bounds> {
     let of_cell = |(i, cell): (usize, &Cell)| {
         let bounds = cell.bounds(plan.caps[i], plan.reached[i], shares.curvature, plan.limits, plan.arm);
-        // Reduced by the speed factor of the cell.
+        // The limit is reduced by the speed factor of the cell.
         let slow = plan.shares[i] * plan.shares[i];
         let (up, down) = (bounds.up * slow * shares.acceleration, bounds.down * slow * shares.acceleration);
         Bounds { cap: bounds.cap * slow, up, down, ..bounds }
@@ -115,7 +117,7 @@ fn bounds(plan: &Plan, shares: Shares) -> Vec<Bounds> {
     plan.cells.iter().enumerate().map(of_cell).collect()
 }
 
-/// A law, its motion, and the time factor of each cell.
+/// A time law, its motion, and the time factor of each cell.
 struct Attempt {
     law: Law,
     motion: Motion,
@@ -131,12 +133,13 @@ impl Attempt {
         Self { law, motion, slower }
     }
 
-    /// Returns the duration if the whole motion is slowed down, s.
+    /// Returns the duration (s) that results if the whole motion is slowed down.
     fn duration(&self) -> f64 {
         self.motion.duration() * self.slower.iter().copied().fold(1.0, f64::max)
     }
 
-    /// Slows down the cells in which a limit is violated, as long as that is faster than slowing down the whole motion.
+    /// Slows down the cells in which a limit is violated, as long as the result is faster than slowing down the whole
+    /// motion.
     fn repair(&mut self, plan: &Plan, mut bounds: Vec<Bounds>, repairs: usize) {
         let mut slower = self.slower.clone();
         for _ in 0..repairs {
@@ -157,7 +160,7 @@ impl Attempt {
     }
 }
 
-/// Returns the window in which no joint's acceleration along a straight line changes faster than its jerk permits, s.
+/// Returns the length of the window (s) with which each joint keeps its jerk limit along a straight line.
 fn window(cells: &[Cell], bounds: &[Bounds], limits: &Limits) -> f64 {
     let mut longest = 0.0f64;
     for (cell, bounds) in cells.iter().zip(bounds) {

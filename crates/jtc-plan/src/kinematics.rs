@@ -31,28 +31,28 @@ pub use route::{LegKind, Route, RoutePoint};
 pub use singular::{SINGULAR, SingularKind, Singularity};
 pub use target::{Target, resolve};
 
-/// Iterations that refine a closed-form solution. Two are enough if the arm matches the closed form; more are needed
-/// near a singular pose.
+/// Maximum number of iterations that refine a closed-form solution. Two iterations are sufficient if the arm matches
+/// the closed form. Near a singular pose, more iterations are needed.
 const REFINE: usize = 25;
-/// Iterations of a search.
+/// Maximum number of iterations of a search.
 const SEARCH: usize = 60;
 
 /// Kinematics of an arm within its position limits: converts joint positions to flange poses and back.
 ///
-/// Poses are poses of the flange in the base frame, with positions in m; joint positions are in rad. A solution brings
-/// the flange to the pose within 1 nm and 1 nrad.
+/// Poses are poses of the flange in the base frame, with positions in m; joint positions are in rad. With a solution,
+/// the flange is within 1 nm and 1 nrad of the pose.
 ///
-/// For arms with a spherical wrist, and for arms with three parallel axes such as the default arm and the arms of
-/// Universal Robots, all solutions are computed in closed form. The parameters of the model show to which kind an arm
-/// belongs. For any other arm the solutions are found by iteration from many fixed starting values, which may miss a
-/// solution in rare cases.
+/// All solutions are computed in closed form for arms with a spherical wrist or with three parallel axes. Examples of
+/// three parallel axes are the default arm and the arms of Universal Robots. The kind of an arm is determined from the
+/// parameters of the model. For any other arm the solutions are found by iteration from many fixed starting values,
+/// which may miss a solution in rare cases.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
     chain: Chain,
     limits: [(f64, f64); JOINTS],
-    /// Geometry with a closed form.
+    /// Geometry of the arm, if it has a closed form.
     exact: Option<Geometry>,
-    /// Geometry that nearly has a closed form.
+    /// Geometry with a closed form that is close to the arm.
     near: Option<Geometry>,
 }
 
@@ -88,10 +88,10 @@ impl Kinematics {
         std::array::from_fn(|row| std::array::from_fn(|joint| jacobian[(row, joint)]))
     }
 
-    /// Returns the joint positions within the limits that bring the flange to `target`. If there are several solutions,
-    /// returns the nearest to `near`, with the smallest sum of squared joint motions.
+    /// Returns the joint positions within the limits at which the flange is at `target`. If there are several
+    /// solutions, returns the solution nearest to `near`, which has the smallest sum of squared joint motions.
     ///
-    /// A singular target has infinitely many solutions; one near `near` is returned.
+    /// A singular target has infinitely many solutions; a solution near `near` is returned.
     ///
     /// # Errors
     ///
@@ -103,25 +103,27 @@ impl Kinematics {
             return Err(PoseError::NotFinite { what: "a nearby joint position", value: bad });
         }
         let mut found = self.solutions(&goal, near);
-        // In a singular pose this solution may be nearer than the one of the closed form. Full turns are handled below.
+        // In a singular pose this solution may be nearer than the solution in closed form. Full turns of a joint are
+        // handled below.
         found.extend(search::converge(&self.chain, &goal, near, SEARCH));
         let distance = |q: &JointVec| q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         let within = found.iter().filter_map(|q| turns::nearest(q, near, &self.limits));
         within.min_by(|a, b| distance(a).total_cmp(&distance(b))).ok_or_else(|| self.reason(&goal, &found))
     }
 
-    /// Returns all joint positions within the limits that bring the flange to `target`, without duplicates. Each
-    /// solution appears with every joint within (−π, π] and, if the limits permit, with joints turned by ±2π. Returns
-    /// an empty list for an invalid pose.
+    /// Returns all joint positions within the limits at which the flange is at `target`, without duplicates. The list
+    /// contains each solution with every joint within (−π, π]. If the limits permit, it also contains the solution with
+    /// joints turned by ±2π. Returns an empty list for an invalid pose.
     ///
-    /// A singular target has infinitely many solutions; some of them are returned.
+    /// A singular target has infinitely many solutions; the list contains some of these.
     pub fn all(&self, target: &Pose) -> Vec<JointVec> {
         let Ok(goal) = orientation::checked(target) else { return Vec::new() };
         let found = self.solutions(&goal, &[0.0; JOINTS]);
         found.iter().flat_map(|q| turns::variants(q, &self.limits)).collect()
     }
 
-    /// Returns the singular pose at or near `q`. A smaller [`Singularity::smallest`] means nearer.
+    /// Returns the singular pose at or near `q`. A smaller value of [`Singularity::smallest`] means that the pose is
+    /// nearer.
     pub fn singularity(&self, q: &JointVec) -> Singularity {
         let geometry = self.exact.as_ref().or(self.near.as_ref());
         singular::nearest(&self.chain, geometry, &self.chain.at(q))
@@ -155,7 +157,7 @@ impl Kinematics {
         }
     }
 
-    /// Returns an error that tells how far a pose without a solution is out of reach.
+    /// Returns an error with the distance by which a pose without a solution is out of reach.
     fn missing(&self, goal: &Frame) -> PoseError {
         let least = |weights: [f64; 6], from: &JointVec| {
             search::descend(&self.chain, goal, *from, &Vector6::from(weights), 100)

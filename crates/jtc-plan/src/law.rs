@@ -1,6 +1,6 @@
 //! Time laws: position on a section of a path as a function of time.
 
-/// A part of a law in which the third derivative of the parameter is constant.
+/// Part of a time law in which the third derivative of the parameter is constant.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Phase {
     /// Start, s.
@@ -22,11 +22,11 @@ impl Phase {
     }
 }
 
-/// A time law of a section of a path, from rest to rest; the parameter begins at 0 and never decreases.
+/// Time law of a section of a path, from rest to rest. The path parameter begins at 0 and never decreases.
 #[derive(Clone, Debug)]
 pub(crate) struct Law {
     pub phases: Vec<Phase>,
-    /// Parameter at the end.
+    /// Value of the path parameter at the end.
     pub end: f64,
     /// `true` if the law begins and ends at rest.
     pub rests: bool,
@@ -71,7 +71,8 @@ impl Law {
         (s.clamp(0.0, self.end), v.max(0.0), a)
     }
 
-    /// Like [`Law::at`], just after `t` (1) or just before it (−1), because the acceleration may jump at `t`.
+    /// Like [`Law::at`], but evaluates the law just after `t` (1) or just before `t` (−1), because the acceleration may
+    /// jump at `t`.
     pub(crate) fn beside(&self, t: f64, after: f64) -> (f64, f64, f64) {
         const NEAR: f64 = 1e-10;
         let (s, speed, _) = self.at(t);
@@ -90,7 +91,7 @@ impl Law {
         let phase = &self.phases[self.phases.partition_point(|p| p.s <= s).saturating_sub(1)];
         let (mut low, mut high) = (0.0, phase.length);
         let mut t = 0.5 * high;
-        // Newton's method, bracketed between two bounds.
+        // The root is found by Newton's method within two bounds.
         for _ in 0..60 {
             let (at, speed, _) = phase.at(t);
             if at < s {
@@ -108,8 +109,8 @@ impl Law {
         phase.start + t
     }
 
-    /// Returns the law averaged over a window of `window` seconds. Each jump of the acceleration becomes a ramp of that
-    /// length, and the law takes `window` seconds longer. Only for laws without a jerk limit.
+    /// Returns the law averaged over a window of `window` seconds. Each jump of the acceleration becomes a ramp as long
+    /// as the window, and the law takes `window` seconds longer. This function is only for laws without a jerk limit.
     pub(crate) fn averaged(&self, window: f64) -> Self {
         let ends: Vec<f64> = self.phases.iter().map(|p| p.start).chain([self.duration()]).collect();
         let mut times: Vec<f64> = ends.iter().copied().chain(ends.iter().map(|t| t + window)).collect();
@@ -124,7 +125,7 @@ impl Law {
             let now = |t: f64| if t >= self.duration() { (self.end, 0.0, 0.0) } else { self.at(t) };
             let (head, tail) = (now(start), now(start - window));
             let (speed, acceleration) = ((head.0 - tail.0) / window, (head.1 - tail.1) / window);
-            // In the middle of a phase no acceleration jumps.
+            // In the middle of a phase, the acceleration does not jump.
             let middle = start + 0.5 * length;
             let inside = |t: f64| if t <= 0.0 { 0.0 } else { now(t).2 };
             let jerk = (inside(middle) - inside(middle - window)) / window;

@@ -1,15 +1,15 @@
-//! Limits at a point of a path, expressed in the coefficients of a spline.
+//! Limits at a point of a path, expressed by the coefficients of a spline.
 use crate::along::Plan;
 use crate::{JOINTS, JointVec};
 
-/// Weights of three neighbouring coefficients, which add up to a value.
+/// Weights of three neighbouring coefficients. The weighted sum is one value of the spline.
 pub(super) type Three = [f64; 3];
 
-/// A point at which limits must hold, such as the end of a cell.
+/// A point at which the limits must be kept, such as the end of a cell.
 pub(super) struct Place {
-    /// Index of the first coefficient.
+    /// Index of the first of the three coefficients.
     pub at: usize,
-    /// Squared speed, its slope and its second derivative.
+    /// Weights of the squared speed, its slope and its second derivative.
     pub b: Three,
     pub slope: Three,
     pub bend: Three,
@@ -19,8 +19,8 @@ pub(super) struct Place {
     pub acceleration: [JointVec; 2],
     /// Highest squared speed, if speed, acceleration and torque are limited at this point.
     pub cap: f64,
-    /// Weights of the reciprocal speed, here and at the middle of the cell, in the time; and the squared speed at the
-    /// middle.
+    /// Weights of the reciprocal speed in the time, at this point and at the middle of the cell. Also the squared speed
+    /// at the middle.
     pub weight: f64,
     pub middle: (Three, f64),
     pub torque: Option<Torque>,
@@ -60,8 +60,8 @@ impl Place {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Returns this place's part of the time and of the sum of the logarithms of the margins to the limits; `None`
-    /// outside the limits.
+    /// Returns the contribution of this point to the time, and to the sum of the logarithms of the margins to the
+    /// limits. `None` outside the limits.
     pub(super) fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
         let c = &c[self.at..self.at + 3];
         let b = dot(&self.b, c);
@@ -101,8 +101,8 @@ impl Place {
         is_inside.then(|| (time, product.ln()))
     }
 
-    /// Adds this place's part to the derivatives of the time plus `barrier` times the barriers, with respect to the
-    /// coefficients.
+    /// Adds the contribution of this point to the derivatives with respect to the coefficients. The function is the
+    /// time plus `barrier` times the barriers.
     pub(super) fn add_to(
         &self,
         gradient: &mut [f64],
@@ -147,8 +147,8 @@ impl Place {
         }
     }
 
-    /// Returns the derivatives of the barriers with respect to squared speed, slope and bend: first, and second (00,
-    /// 11, 22, 01, 02, 12).
+    /// Returns the first and second derivatives of the barriers with respect to squared speed, slope and bend. The
+    /// second derivatives are in the order 00, 11, 22, 01, 02, 12.
     fn barriers(&self, plan: &Plan, b: f64, slope: f64, bend: f64) -> ([f64; 3], [f64; 6]) {
         let speed = b.sqrt();
         let (mut g, mut h) = ([0.0f64; 3], [0.0f64; 6]);
@@ -188,7 +188,8 @@ impl Place {
     }
 }
 
-/// Adds a barrier with the derivatives `one` and `two` to the gradient and the second derivatives (00, 11, 22, 01, 02, 12).
+/// Adds a barrier with the derivatives `one` and `two` to the gradient and to the second derivatives (in the order 00, 11,
+/// 22, 01, 02, 12).
 fn add(g: &mut [f64; 3], h: &mut [f64; 6], d: &[f64; 3], one: f64, two: f64) {
     for i in 0..3 {
         g[i] += one * d[i];

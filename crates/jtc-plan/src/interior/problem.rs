@@ -1,4 +1,4 @@
-//! Limits in a plan's cells, evaluated at points.
+//! Limits in the cells of a plan, evaluated at points.
 use super::Problem;
 use super::place::{Place, Three, Torque};
 use super::spline::knot;
@@ -10,7 +10,7 @@ use crate::{JOINTS, JointVec};
 /// Squared speed, its slope and its second derivative.
 type Values = (Three, Three, Three);
 
-/// The spline between two knots.
+/// Section of the spline between two knots.
 struct Span {
     left: Values,
     middle: Values,
@@ -85,8 +85,8 @@ impl<'a> Problem<'a> {
         Some(problem)
     }
 
-    /// Adds the jerk limit at one end of a cell. If `whole` has a duration, also adds the other limits, with the
-    /// duration as the weight.
+    /// Adds the jerk limit at one end of a cell. If `whole` contains a duration, also adds the other limits, weighted
+    /// with this duration.
     fn push(
         &mut self,
         (cell, side): (usize, usize),
@@ -137,7 +137,7 @@ impl<'a> Problem<'a> {
         self.places.push(place);
     }
 
-    /// Returns a place with a jerk limit only.
+    /// Returns a point that has only a jerk limit.
     fn place(
         &self,
         cell: usize,

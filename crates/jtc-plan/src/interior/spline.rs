@@ -2,7 +2,7 @@
 use super::Problem;
 use crate::law::{Law, Phase};
 
-/// Largest relative change of speed in two phases of a law, and largest number of phase pairs per cell.
+/// Largest relative change of speed in a pair of phases of a law, and largest number of phase pairs per cell.
 const ALIKE: f64 = 0.2;
 const PARTS_MAX: f64 = 4.0;
 
@@ -11,7 +11,7 @@ impl Problem<'_> {
     pub(super) fn law(&self, c: &[f64]) -> Law {
         let cells = self.plan.cells;
         let spans = self.knots.len() - 1;
-        // Parameter, speed, acceleration at the knots.
+        // Parameter, speed and acceleration at each knot.
         let states: Vec<(f64, f64, f64)> = (0..=spans)
             .map(|k| {
                 let i = k as isize;
@@ -43,7 +43,7 @@ impl Problem<'_> {
     }
 }
 
-/// Returns parameter, speed and acceleration of a spline at a fraction of a cell with these ends.
+/// Returns parameter, speed and acceleration of a spline at a fraction of the cell between these two knots.
 fn between(from: (f64, f64, f64), to: (f64, f64, f64), share: f64) -> (f64, f64, f64) {
     let way = share * (to.0 - from.0);
     let acceleration = from.2 + share * (to.2 - from.2);
@@ -51,7 +51,7 @@ fn between(from: (f64, f64, f64), to: (f64, f64, f64), share: f64) -> (f64, f64,
     (from.0 + way, square.max(0.0).sqrt(), acceleration)
 }
 
-/// Adds two phases of equal length that match parameter, speed and acceleration at both ends; returns the time at the end.
+/// Adds two phases of equal length that match parameter, speed and acceleration at both ends. Returns the end time.
 fn phases_between(
     phases: &mut Vec<Phase>,
     start: f64,
@@ -69,7 +69,7 @@ fn phases_between(
     start + length
 }
 
-/// Returns the knot with an index; outside the range, the first or the last one.
+/// Returns the knot with an index. If the index is out of range, returns the first or the last knot.
 pub(super) fn knot(knots: &[f64], k: isize) -> f64 {
     knots[k.clamp(0, knots.len() as isize - 1) as usize]
 }

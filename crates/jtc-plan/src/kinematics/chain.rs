@@ -1,4 +1,4 @@
-//! The arm as six axes in space: forward kinematics, Jacobian and its rate.
+//! Model of the arm as six axes in space, with forward kinematics, the Jacobian and its rate.
 use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, Pose};
 use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
 
@@ -39,7 +39,7 @@ pub(crate) fn logarithm(rotation: &Matrix3<f64>) -> Vector3<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation)).scaled_axis()
 }
 
-/// Axes of an arm at the positions of the forward kinematics.
+/// Axes of an arm at given joint positions.
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
     dynamics: Dynamics,
@@ -50,7 +50,7 @@ pub(crate) struct Chain {
     pub zero: Axes,
 }
 
-/// Axes and flange at some joint positions, in the base frame.
+/// Axes and flange at given joint positions, in the base frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Axes {
     /// Directions, unit vectors.
@@ -141,7 +141,7 @@ mod tests {
     use crate::kinematics::test_arms;
     use proptest::prelude::*;
 
-    /// Returns central differences of the frame per unit of the parameter: (translation, rotation).
+    /// Returns central differences of the frame per unit of the parameter: for translation and rotation.
     fn difference(before: &Frame, after: &Frame, step: f64) -> Vector6<f64> {
         let shift = (after.position - before.position) / (2.0 * step);
         let turn = logarithm(&(after.rotation * before.rotation.transpose())) / (2.0 * step);

@@ -1,33 +1,35 @@
 //! Inverse kinematics in closed form, for two geometries that cover most arms.
 //!
 //! * **Spherical wrist**: the last three axes meet in a point (Pieper 1968), and two adjacent axes of the first three
-//!   are parallel or meet. The first three joints bring the point to its place, the last three give the orientation.
+//!   are parallel or meet. The first three joints move this point to its position, and the last three joints set the
+//!   orientation.
 //! * **Three parallel axes**: the second, third and fourth axis are parallel, and the fifth meets the sixth, as in the
-//!   arms of Universal Robots (Hawkins 2013). The first joint brings the intersection of axes 5 and 6 to the right
-//!   coordinate along the parallel axes, the fifth and the sixth turn the flange, and the three parallel joints are a
-//!   planar arm.
+//!   arms of Universal Robots (Hawkins 2013). The first joint moves the intersection of axes 5 and 6 to the required
+//!   coordinate along the parallel axes. The fifth and the sixth joint turn the flange, and the three parallel joints
+//!   form a planar arm.
 //!
 //! Everything is computed in the base frame from the axes at the joint positions 0 (product of exponentials, Brockett
-//! 1984; decomposition by Elias and Wen, IK-Geo, 2022), so the choice of the frames on the axes does not matter.
+//! 1984; decomposition by Elias and Wen, IK-Geo, 2022), so the result does not depend on the frames chosen on the axes.
 use jtc_dynamics::JointVec;
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::{Axes, Frame, turn};
 use super::subproblems::{across, turn_onto, turn_to_length, turn_to_value, turned};
 
-/// Largest sine of an angle, and largest distance in m, that are treated as zero when a geometry is recognised. Larger
-/// than the rounding errors of a robot description. Solutions for the ideal geometry are refined with the actual arm.
+/// Largest sine of an angle, and largest distance in m, that are treated as zero when a geometry is recognised. This
+/// tolerance is larger than the rounding errors of a robot description. Solutions for the ideal geometry are refined
+/// with the actual arm.
 pub(crate) const EXACT: f64 = 1e-5;
-/// Like [`EXACT`], for an arm whose calibration differs from its ideal geometry. The closed form then gives good
-/// starting values for a search.
+/// Like [`EXACT`], for an arm whose calibration differs from its ideal geometry. For such an arm, the closed form
+/// supplies good starting values for a search.
 pub(crate) const NEAR: f64 = 0.02;
 
 /// A geometry with a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Geometry {
-    /// The last three axes meet in `centre` (m, at the positions 0).
+    /// Last three axes meet in `centre` (m, at the joint positions 0).
     SphericalWrist { centre: Vector3<f64>, shoulder: Shoulder },
-    /// Axes 2, 3 and 4 are parallel, axes 5 and 6 meet in `centre` (m, at the positions 0).
+    /// Axes 2, 3 and 4 are parallel, and axes 5 and 6 meet in `centre` (m, at the joint positions 0).
     ThreeParallel { centre: Vector3<f64> },
 }
 
@@ -69,9 +71,9 @@ impl Geometry {
         None
     }
 
-    /// Returns joint positions that bring the flange to `goal`, up to rounding and the deviations from the ideal
-    /// geometry. There are at most eight; some of them may not reach the goal. A joint that the goal leaves free stays
-    /// at `hint`.
+    /// Returns joint positions at which the flange is at `goal`, except for rounding and the deviations from the ideal
+    /// geometry. There are at most eight solutions, and some of these may not reach the goal. A joint that the goal
+    /// does not determine stays at `hint`.
     pub(super) fn solve(&self, zero: &Axes, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let rotation = goal.rotation * zero.flange.rotation.transpose();
         let motion = Motion { rotation, shift: goal.position - rotation * zero.flange.position };
@@ -89,11 +91,11 @@ impl Geometry {
     }
 }
 
-/// Returns the point in which two axes meet, if they do.
+/// Returns the point in which two axes meet, or `None` if they do not meet.
 fn meeting(zero: &Axes, a: usize, b: usize, tolerance: f64) -> Option<Vector3<f64>> {
     let (u, v) = (zero.axis[a], zero.axis[b]);
     let normal = u.cross(&v);
-    // The meeting point of nearly parallel axes is undefined.
+    // The intersection of nearly parallel axes is undefined.
     if normal.norm() < 0.05 {
         return None;
     }
@@ -104,7 +106,7 @@ fn meeting(zero: &Axes, a: usize, b: usize, tolerance: f64) -> Option<Vector3<f6
     ((first - second).norm() < tolerance).then_some((first + second) * 0.5)
 }
 
-/// A displacement: x ↦ rotation·x + shift.
+/// Rigid displacement x ↦ rotation·x + shift.
 struct Motion {
     rotation: Matrix3<f64>,
     shift: Vector3<f64>,
@@ -122,10 +124,10 @@ fn moved(zero: &Axes, j: usize, angle: f64, point: &Vector3<f64>) -> Vector3<f64
 }
 
 impl Shoulder {
-    /// Returns up to four solutions of the first three joints that bring `centre` to `target`.
+    /// Returns up to four solutions of the first three joints with which `centre` is at `target`.
     ///
-    /// With y = E₃·centre and z = E₁⁻¹·target, E₂ takes y to z: both have the same coordinate along axis 2 and the same
-    /// distance from each of its points.
+    /// With y = E₃·centre and z = E₁⁻¹·target, E₂ takes y to z: y and z have equal coordinates along axis 2 and equal
+    /// distances from each point of the axis.
     fn place(
         &self,
         zero: &Axes,
@@ -135,8 +137,8 @@ impl Shoulder {
     ) -> Vec<[f64; 3]> {
         let (h, p) = (&zero.axis, &zero.point);
         let (forearm, reach) = (centre - p[2], target - p[0]);
-        // Joint 1 follows from the required coordinate of z along axis 2, and joint 3 from the coordinate of y. Both
-        // are in m from the point of the joint's own axis.
+        // Joint 1 follows from the required coordinate of z along axis 2, and joint 3 from the coordinate of y. The two
+        // coordinates are in m, measured from the point on the axis of the joint.
         let first = |along: f64| {
             let found = turn_to_value(&h[1], &h[0], &reach, along - h[1].dot(&p[0]), -hint[0]);
             found.into_iter().map(|angle| -angle).collect::<Vec<_>>()
@@ -210,12 +212,12 @@ fn three_parallel(
 ) {
     let (h, p) = (&zero.axis, &zero.point);
     let along = &h[1];
-    // The parallel joints do not move the centre along their axes.
+    // The parallel joints do not move the centre in the direction of their axes.
     let height = along.dot(&(centre - p[0]));
     for back in turn_to_value(along, &h[0], &(goal.apply(centre) - p[0]), height, -hint[0]) {
         let q1 = -back;
         let rest = turn(&h[0], back) * goal.rotation;
-        // These joints do not change the angle between their axes and the last axis.
+        // The parallel joints do not change the angle between their axes and the last axis.
         for q5 in turn_to_value(along, &h[4], &h[5], along.dot(&(rest * h[5])), hint[4]) {
             let fifth = turn(&h[4], q5);
             let q6 = -turn_onto(&h[5], &(fifth.transpose() * along), &(rest.transpose() * along), -hint[5]);
@@ -228,8 +230,8 @@ fn three_parallel(
     }
 }
 
-/// Solves joints 2, 3 and 4, whose axes are parallel. Axis 4 must reach the point `to`, and the total turn about axis 2
-/// is `sum` (rad).
+/// Solves joints 2, 3 and 4, whose axes are parallel. Axis 4 must reach the point `to`, and the sum of the three
+/// rotations about axis 2 is `sum` (rad).
 fn planar_arm(
     zero: &Axes,
     to: &Vector3<f64>,

@@ -3,11 +3,11 @@ use jtc_wire::Joint;
 
 use super::singular::Singularity;
 
-/// Reason why a pose of the flange has no joint positions, or why the flange cannot follow a line.
+/// Reason why a pose of the flange cannot be reached, or why the flange cannot follow a line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// A number is NaN or infinite.
+    /// A value that is NaN or infinite.
     #[error("{what} is {value}, not a finite number")]
     NotFinite {
         /// Name of the value, such as `position x`.
@@ -36,10 +36,10 @@ pub enum PoseError {
     OutOfReach {
         /// Distance of the position from the origin of the base, m.
         distance: f64,
-        /// Distance from the nearest flange position found to the requested one, m.
+        /// Distance between the requested position and the nearest flange position that was found, m.
         missing: f64,
     },
-    /// The flange can reach the position, but not in this orientation.
+    /// The flange can reach the position, but not with this orientation.
     #[error(
         "out of reach in this orientation: the flange reaches this position, {distance:.3} m from the origin of the base, but its nearest \
          orientation differs by {missing:.3} rad"
@@ -47,30 +47,30 @@ pub enum PoseError {
     Orientation {
         /// Distance of the position from the origin of the base, m.
         distance: f64,
-        /// Angle from the nearest flange orientation found at the position to the requested one, rad.
+        /// Angle between the requested orientation and the nearest orientation that was found at this position, rad.
         missing: f64,
     },
-    /// The arm would reach the pose only with a joint outside its limits.
+    /// The arm can reach the pose only with a joint outside its limits.
     #[error("{joint} would be at {value:.4} rad, its limits are {low:.4} and {high:.4} rad")]
     OutsideLimits {
-        /// Joint that is farthest outside, in the solution that exceeds the limits least.
+        /// Joint that is farthest outside its limits, in the solution that exceeds the limits least.
         joint: Joint,
-        /// Position of the joint there, rad.
+        /// Position of this joint in that solution, rad.
         value: f64,
         /// Lowest position, rad.
         low: f64,
         /// Highest position, rad.
         high: f64,
     },
-    /// A line of the flange leads through or past a singular pose.
+    /// A line of the flange that passes through or near a singular pose.
     #[error("{0}")]
     Singular(Singularity),
-    /// A line of the flange requires a joint to turn far within a short distance.
+    /// A line of the flange on which a joint must turn far within a short distance.
     #[error("{joint} would need to turn by {step:.3} rad within {distance:.6} m")]
     JointStep {
         /// Joint.
         joint: Joint,
-        /// Required turn of the joint, rad.
+        /// Angle by which the joint must turn, rad.
         step: f64,
         /// Distance on the line within which the joint must turn, m.
         distance: f64,
@@ -83,7 +83,7 @@ pub enum PoseError {
         /// Distance of the second point from the straight line, m; 0 if the first and the last point are the same.
         distance: f64,
     },
-    /// Two orientations that are half a turn apart.
+    /// Two orientations with an angle of half a turn between them.
     #[error(
         "the orientation is half a turn from that of the waypoint before, so the direction of the turn is ambiguous"
     )]
@@ -94,7 +94,7 @@ pub enum PoseError {
     /// An arc without its `via` point.
     #[error("the end of an arc does not follow a point on the arc (`via`)")]
     NoVia,
-    /// Joint positions at the end of a line that the arm does not have in its current configuration.
+    /// Joint positions at the end of a line that the arm cannot have in its current configuration.
     #[error(
         "the line ends there with {joint} at {value:.4} rad, not at {wanted:.4} rad: the arm keeps its configuration along a line"
     )]
@@ -118,7 +118,7 @@ pub enum PoseError {
     /// An error at one of several waypoints.
     #[error("waypoint {waypoint}: {source}")]
     Waypoint {
-        /// Waypoint, counted from 1.
+        /// Number of the waypoint, from 1.
         waypoint: usize,
         /// Error at the waypoint.
         source: Box<PoseError>,
@@ -126,12 +126,12 @@ pub enum PoseError {
     /// An error on one of several legs.
     #[error("leg {leg} (to waypoint {}), {distance:.4} m of {length:.4} m along it: {source}", leg + 1)]
     Leg {
-        /// Leg, counted from 1; it leads from the waypoint with the same number to the next.
+        /// Number of the leg, from 1. Leg n is between waypoints n and n + 1.
         leg: usize,
-        /// Distance along the leg, m. A turn of 1 rad is counted as [`RADIUS`](super::RADIUS) m, if the turn is then
-        /// longer than the distance.
+        /// Distance along the leg, m. A turn of 1 rad counts as [`RADIUS`](super::RADIUS) m if this length is greater
+        /// than the translation.
         distance: f64,
-        /// Length of the leg, in the same unit.
+        /// Length of the leg, m, computed in the same way as the distance along the leg.
         length: f64,
         /// Error on the leg.
         source: Box<PoseError>,
@@ -144,8 +144,8 @@ impl PoseError {
         Self::Waypoint { waypoint, source: Box::new(self) }
     }
 
-    /// Returns the waypoint in the message, counted from 1, if there is one. For a leg, this is the waypoint at its
-    /// end.
+    /// Returns the number (from 1) of the waypoint in the message, if the message contains one. For a leg, this is the
+    /// waypoint at the end of the leg.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::Waypoint { waypoint, .. } => Some(*waypoint),

@@ -11,42 +11,44 @@ use super::trace::Trace;
 use super::{Kinematics, PoseError, outside};
 use crate::{Path, PathPoint};
 
-/// Largest turn of a joint between two samples, rad. With steps this small, the iteration stays with its solution and
+/// Largest rotation of a joint between two samples, rad. With such small steps, the iteration follows one solution and
 /// does not miss a singular pose.
 const TURN: f64 = 0.02;
 /// Largest and smallest distance between two samples, m.
 const STEP: (f64, f64) = (0.01, 1e-7);
-/// Largest turn of a joint between two breaks, rad. Up to this turn the curve is simple enough.
+/// Largest rotation of a joint between two breaks, rad. Up to this rotation, the curve is simple enough for the
+/// planner.
 const SIMPLE: f64 = 0.25;
-/// Number of points on the rest of the leg that are tested to find out if it leaves the arm's reach.
+/// Number of points on the remainder of the leg that are tested. The test detects whether the leg leaves the reach of
+/// the arm.
 const LOOK_AHEAD: usize = 40;
 
 /// A path through joint space on which the flange moves on straight lines and arcs, with corners blended within a radius.
 ///
-/// Its parameter is the length of the legs, m (a turn of 1 rad is counted as [`RADIUS`](super::RADIUS)). With a blend
-/// radius of 0 the path stops at each corner. Each query computes the position by inverse kinematics, so the flange is
-/// on its line up to rounding; derivatives come from the Jacobian and its rate.
+/// The path parameter is the length of the legs, m (a turn of 1 rad is counted as [`RADIUS`](super::RADIUS)). With a
+/// blend radius of 0 the path stops at each corner. Each query computes the position by inverse kinematics, so the flange
+/// is on the line except for rounding. The derivatives are computed from the Jacobian and its rate.
 ///
 /// The arm keeps its initial configuration (elbow, wrist, shoulder).
 #[derive(Clone, Debug)]
 pub struct FlangePath {
     chain: Chain,
     trace: Trace,
-    /// Joint positions along the path, in the order of the parameter, from which the iteration starts.
+    /// Joint positions along the path, from which the iteration starts, in the order of the path parameter.
     samples: Vec<(f64, JointVec)>,
     breaks: Vec<f64>,
 }
 
 impl FlangePath {
-    /// Creates the path from the joint positions `start` (rad) along `legs`. Corners are blended within `blend` m, at
-    /// most half of each leg; with 0 the path stops there. The first waypoint is the start, so leg 1 leads to
-    /// waypoint 2. Legs without motion are skipped.
+    /// Creates the path from the joint positions `start` (rad) along `legs`. Corners are blended within `blend` m,
+    /// which is limited to half of each leg. If `blend` is 0, the path stops at the corners. The first waypoint is the
+    /// start, so waypoint 2 is the end of leg 1. Legs without motion are skipped.
     ///
     /// # Errors
     ///
     /// [`PoseError::Waypoint`] for an invalid pose or a pose without a solution within the limits, [`PoseError::Leg`]
-    /// for an error along a leg: a joint at its limit, a singular pose, the end of the arm's reach. Both report the
-    /// first place with an error; waypoints are checked first.
+    /// for an error along a leg: a joint at its limit, a singular pose, the end of the arm's reach. Each error is the
+    /// first along the path. Waypoints are checked before legs.
     pub fn new(
         kinematics: &Kinematics,
         start: &JointVec,
@@ -69,8 +71,8 @@ impl FlangePath {
         Ok(Self { chain: chain.clone(), trace, samples, breaks })
     }
 
-    /// Returns the parameter at which leg `number` (from 1), an arc, passes its `via` point. A rounded corner may cut
-    /// the point off.
+    /// Returns the parameter at which leg `number` (from 1), an arc, passes its `via` point. The rounding of a corner
+    /// may remove this point from the path.
     pub(crate) fn via(&self, number: usize) -> Option<f64> {
         self.trace.via(number)
     }
@@ -114,7 +116,7 @@ impl Path for FlangePath {
     }
 }
 
-/// Runs Newton's iteration from near a solution; returns the solution and the arm there.
+/// Runs Newton's iteration from a value near a solution. Returns the solution and the arm in this position.
 fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
     let mut axes = chain.at(&q);
     let mut residual = chain.residual(goal, &axes);
@@ -126,14 +128,14 @@ fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
         if left.norm() < residual.norm() {
             (q, axes, residual) = (tried, there, left);
         } else {
-            // Converged down to rounding, or not a finite number.
+            // The iteration has converged except for rounding, or the value is not finite.
             break;
         }
     }
     (q, axes)
 }
 
-/// Returns the first and second derivative of the joint positions by the path's parameter.
+/// Returns the first and second derivative of the joint positions with respect to the path parameter.
 fn derivatives(axes: &Axes, place: &Place) -> Option<(Vector6<f64>, Vector6<f64>)> {
     let stack = |a: &Vector3<f64>, b: &Vector3<f64>| Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
     let factors = axes.jacobian().lu();
@@ -142,8 +144,8 @@ fn derivatives(axes: &Axes, place: &Place) -> Option<(Vector6<f64>, Vector6<f64>
     Some((first, factors.solve(&rest)?))
 }
 
-/// Returns the places at which the path changes its form, and places in between, so that no joint turns far between two
-/// of them.
+/// Returns the points at which the path changes its form, and points between these, so that no joint turns far between
+/// two points.
 fn breaks(trace: &Trace, samples: &[(f64, JointVec)]) -> Vec<f64> {
     let mut all = trace.breaks();
     let mut turned = [0.0; JOINTS];
@@ -169,7 +171,7 @@ struct Follower<'a> {
     s: f64,
     q: JointVec,
     axes: Axes,
-    /// Sign of the Jacobian's determinant, which changes only in a singular pose.
+    /// Sign of the determinant of the Jacobian. The sign changes only in a singular pose.
     sign: f64,
 }
 
@@ -189,7 +191,7 @@ impl<'a> Follower<'a> {
         for corner in corners {
             while self.s < corner {
                 let left = corner - self.s;
-                // Avoids a tiny step at the end.
+                // This condition avoids a tiny step at the end.
                 let wanted = if step >= left { corner } else { self.s + step.min(0.5 * left) };
                 match self.try_step(wanted)? {
                     Some(()) => {
@@ -203,14 +205,15 @@ impl<'a> Follower<'a> {
         Ok(samples)
     }
 
-    /// Advances to `s`. Returns `None` if the step must be shorter, and an error if the path ends there.
+    /// Advances to `s`. Returns `None` if the step must be shorter, and an error if the arm cannot follow the path
+    /// further.
     fn try_step(&mut self, s: f64) -> Result<Option<()>, PoseError> {
         let chain = &self.kinematics.chain;
         let place = self.trace.at(s);
         let (q, axes) = newton(chain, &place.frame, self.q);
         let (joint, turn) = largest_turn(&self.q, &q);
         let left = chain.residual(&place.frame, &axes);
-        // Written so that NaN is not accepted as arrival.
+        // With this form of the condition, NaN does not count as arrival.
         let arrived = left.norm() <= TOLERANCE;
         if arrived && turn <= TURN {
             self.check(s, &q, &axes)?;
@@ -244,9 +247,9 @@ impl<'a> Follower<'a> {
         outside(q, &self.kinematics.limits).map_or(Ok(()), |error| Err(self.on_leg(s, error)))
     }
 
-    /// Checks the limits at every turning point of a joint between here and `s`.
+    /// Checks the limits at every turning point of a joint between the current point and `s`.
     fn check_between(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
-        // Slightly inside, so that a corner's derivatives are evaluated on this side.
+        // The point is slightly inside the interval, so that the derivatives at a corner are evaluated on this side.
         let inset = 1e-3 * (s - self.s);
         let rate = |at: f64, axes: &Axes| derivatives(axes, &self.trace.at(at)).unwrap_or_default().0;
         let (before, after) = (rate(self.s + inset, &self.axes), rate(s - inset, axes));
@@ -262,8 +265,8 @@ impl<'a> Follower<'a> {
         Ok(())
     }
 
-    /// Returns the error for a singular pose at `s`, or for the end of the arm's reach if the rest of the leg has no
-    /// solution.
+    /// Returns the error for a singular pose at `s`, or for the end of the arm's reach if the remainder of the leg has
+    /// no solution.
     fn singular(&self, s: f64, axes: &Axes) -> PoseError {
         let (_, along, length) = self.trace.whereabouts(s);
         for k in 0..=LOOK_AHEAD {
@@ -283,7 +286,7 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Returns the joint that turns farthest, and its turn, rad.
+/// Returns the joint with the largest rotation, and this rotation, rad.
 fn largest_turn(from: &JointVec, to: &JointVec) -> (Joint, f64) {
     let turns = Joint::ALL.map(|joint| (joint, (to[joint.index()] - from[joint.index()]).abs()));
     turns.into_iter().fold(turns[0], |worst, turn| if turn.1 > worst.1 { turn } else { worst })

@@ -7,15 +7,16 @@ use super::chain::{Frame, exponential, logarithm};
 use super::orientation::checked;
 use super::subproblems::turned;
 
-/// Length in m that a turn of the flange by 1 rad is counted as. If the turn is longer than the translation, it is the
-/// length of the leg.
+/// Length that corresponds to a rotation of the flange by 1 rad, m. If the rotation in this measure is longer than the
+/// translation, it is the length of the leg.
 pub const RADIUS: f64 = 0.25;
 
-/// Length below which a leg is considered as no movement, m.
+/// Length below which a leg counts as no movement, m.
 pub(crate) const SHORTEST: f64 = 1e-9;
-/// Three points are considered to be in line if the second is closer than this to the line through the others, m.
+/// Distance of the second of three points from the line through the first and third, below which the three points count
+/// as collinear, m.
 const IN_LINE: f64 = 1e-6;
-/// Deviation from half a turn below which the direction of a turn is ambiguous, rad.
+/// Deviation from half a turn below which the direction of the rotation is ambiguous, rad.
 const HALF_TURN: f64 = 1e-6;
 
 /// Leg of a flange path, which starts at the end of the previous leg. The orientation turns at a constant rate about
@@ -42,11 +43,11 @@ pub(crate) struct Place {
     pub frame: Frame,
     /// Velocity, m per unit.
     pub velocity: Vector3<f64>,
-    /// Rotation vector in the base frame, rad per unit.
+    /// Angular velocity as a rotation vector in the base frame, rad per unit.
     pub spin: Vector3<f64>,
     /// Acceleration, m per squared unit.
     pub acceleration: Vector3<f64>,
-    /// Rate of the spin, rad per squared unit.
+    /// Rate of change of the angular velocity, rad per squared unit.
     pub spin_rate: Vector3<f64>,
 }
 
@@ -72,13 +73,13 @@ enum Way {
     Arc(Circle, f64),
 }
 
-/// An arc of a circle.
+/// Arc of a circle.
 #[derive(Clone, Debug)]
 struct Circle {
     centre: Vector3<f64>,
     /// Vector from the centre to the beginning.
     arm: Vector3<f64>,
-    /// Unit vector about which the arc turns.
+    /// Unit vector of the rotation axis of the arc.
     normal: Vector3<f64>,
     /// Angle of the arc, rad.
     angle: f64,
@@ -135,7 +136,7 @@ impl Drawn {
     }
 }
 
-/// Returns the arc from a pose through a point to another pose.
+/// Returns the arc that begins at a pose, passes a point and ends at another pose.
 fn circle(from: &Frame, via: &[f64; 3], to: &Frame) -> Result<Circle, PoseError> {
     if let Some(&value) = via.iter().find(|v| !v.is_finite()) {
         return Err(PoseError::NotFinite { what: "the `via` point of an arc", value });

@@ -1,22 +1,23 @@
-//! Orientations as users write them: quaternions, and roll, pitch and yaw.
+//! Orientations in the forms that users write: quaternions, and roll, pitch and yaw.
 use jtc_dynamics::Pose;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
 use super::PoseError;
 use super::chain::Frame;
 
-/// Maximum deviation of the length of a quaternion from 1, to allow for few digits.
+/// Maximum deviation of the length of a quaternion from 1, which permits values with few digits.
 const UNIT: f64 = 1e-3;
 /// Maximum deviation of the entries of RᵀR from the unit matrix.
 const ROTATION: f64 = 1e-6;
 
-/// An orientation of a flange pose.
+/// Orientation of a flange pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Orientation {
-    /// A unit quaternion x, y, z, w with the scalar last, as in ROS. Its length may deviate from 1 by a thousandth, to
-    /// allow for few digits.
+    /// A unit quaternion x, y, z, w with the scalar last, as in ROS. The length of the quaternion may deviate from 1 by
+    /// a thousandth, so that few digits are sufficient.
     Quaternion([f64; 4]),
-    /// Roll, pitch, yaw, rad: about the fixed axes x, y and z in this order, Rz(yaw)·Ry(pitch)·Rx(roll), as in a URDF.
+    /// Roll, pitch and yaw, rad, about the fixed axes x, y and z in this order: Rz(yaw)·Ry(pitch)·Rx(roll), as in a
+    /// URDF.
     Rpy([f64; 3]),
 }
 
@@ -48,7 +49,7 @@ impl Orientation {
     }
 }
 
-/// Returns the orientation of a pose as a unit quaternion x, y, z, w, with w not negative.
+/// Returns the orientation of a pose as a unit quaternion x, y, z, w, with w ≥ 0.
 pub fn quaternion_of(pose: &Pose) -> [f64; 4] {
     let rotation = Rotation3::from_matrix_unchecked(Frame::from(pose).rotation);
     let q = UnitQuaternion::from_rotation_matrix(&rotation);
@@ -56,8 +57,8 @@ pub fn quaternion_of(pose: &Pose) -> [f64; 4] {
     [q.i, q.j, q.k, q.w].map(|part| sign * part)
 }
 
-/// Returns the orientation of a pose as roll, pitch and yaw, rad, with the pitch within ±π/2. At a pitch of ±π/2 only
-/// the sum or the difference of roll and yaw is defined; the roll is then 0.
+/// Returns the orientation of a pose as roll, pitch and yaw, rad, with the pitch within ±π/2. At a pitch of ±π/2, only
+/// the sum or the difference of roll and yaw is defined. In this case the roll is 0.
 pub fn rpy_of(pose: &Pose) -> [f64; 3] {
     let r = &pose.rotation;
     let flat = r[2][1].hypot(r[2][2]);
@@ -147,7 +148,7 @@ mod tests {
         let long = at(Orientation::Quaternion([0.0, 0.0, 1.0, 1.0])).unwrap_err();
         assert_eq!(long, PoseError::NotUnit { length: 2f64.sqrt() });
         assert_eq!(long.to_string(), "the quaternion has the length 1.414214, expected 1");
-        // Three digits are precise enough.
+        // A precision of three digits is sufficient.
         at(Orientation::Quaternion([0.0, 0.0, 0.707, 0.707])).unwrap();
         let nan = at(Orientation::Rpy([0.0, f64::NAN, 0.0])).unwrap_err();
         assert!(matches!(nan, PoseError::NotFinite { what: "pitch", .. }), "{nan}");
@@ -175,7 +176,7 @@ mod tests {
             prop_assert!(rpy_of(&pose).iter().zip(rpy).all(|(a, b)| (a - b).abs() < 1e-9));
         }
 
-        /// If roll and yaw are ambiguous, the returned values give the same orientation.
+        /// If roll and yaw are ambiguous, the returned values describe the same orientation.
         #[test]
         fn upright_pitches_return_the_same_orientation(roll in -3.1..3.1f64, yaw in -3.1..3.1f64, up in any::<bool>()) {
             let pitch = if up { std::f64::consts::FRAC_PI_2 } else { -std::f64::consts::FRAC_PI_2 };

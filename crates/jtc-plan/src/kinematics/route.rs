@@ -1,4 +1,5 @@
-//! Routes: sections that are straight in joint space, and sections on which the flange follows lines and arcs.
+//! Routes, which consist of sections that are straight in joint space and sections on which the flange follows lines
+//! and arcs.
 use jtc_dynamics::JointVec;
 
 use super::target::one;
@@ -6,20 +7,20 @@ use super::{FlangePath, Kinematics, Leg, PoseError, Target};
 use crate::path::Waypointed;
 use crate::{BlendedPath, Path, PathPoint, PlanError, furthest_joint};
 
-/// Largest distance between the joint positions of a waypoint and the end of a line that leads there, rad.
+/// Largest distance between the joint positions of a waypoint and the end of the line to this waypoint, rad.
 const SAME: f64 = 1e-5;
 
 /// Kind of motion from the previous waypoint to a waypoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LegKind {
-    /// Straight in joint space.
+    /// Straight motion in joint space.
     #[default]
     Joint,
-    /// With the flange on a straight line.
+    /// Motion with the flange on a straight line.
     Line,
-    /// A point that the arc to the next waypoint passes. Its orientation is ignored.
+    /// A point that the arc to the next waypoint passes. The orientation of this point is ignored.
     Via,
-    /// With the flange on an arc through the previous waypoint, which must be [`LegKind::Via`].
+    /// Motion with the flange on an arc through the previous waypoint, whose kind must be [`LegKind::Via`].
     Arc,
 }
 
@@ -28,18 +29,18 @@ pub enum LegKind {
 pub struct RoutePoint {
     /// Position of the waypoint.
     pub target: Target,
-    /// Kind of motion to the waypoint; ignored for the first waypoint.
+    /// Kind of motion to the waypoint. For the first waypoint, the kind is ignored.
     pub leg: LegKind,
 }
 
 /// A path through waypoints, straight in joint space or with the flange on lines and arcs. The path stops between
 /// sections of different kinds.
 ///
-/// Along lines and arcs the arm keeps the configuration (elbow, wrist, shoulder) that it has at the start of the first
-/// of them. A flange pose at the end of a line is reached in this configuration; joint positions there must be in the
-/// same configuration. Any other flange pose is reached with the solution nearest to the previous waypoint.
+/// Along lines and arcs, the arm keeps its configuration (elbow, wrist, shoulder) from the start of the first line or
+/// arc. The arm reaches a flange pose at the end of a line in this configuration. Joint positions at the end of a line
+/// must also have this configuration. For any other flange pose, the solution nearest to the previous waypoint is used.
 ///
-/// The parameter continues from section to section: rad in joint space, m along lines and arcs.
+/// The path parameter continues from section to section. It is in rad in joint space, and in m along lines and arcs.
 #[derive(Clone, Debug)]
 pub struct Route {
     sections: Vec<Section>,
@@ -52,8 +53,9 @@ pub struct Route {
 struct Section {
     way: Way,
     begin: f64,
-    /// Places at which the path changes its form, including the ends: by the route's parameter and by the section's own
-    /// parameter. The sum of parameters is rounded; the rounding must not move a place to the other side of a change.
+    /// Points at which the path changes its form, including the ends, as values of the route parameter and of the
+    /// section parameter. The sum of parameters is rounded. This must not move a point to the other side of a change of
+    /// form.
     marks: Vec<(f64, f64)>,
 }
 
@@ -84,7 +86,7 @@ impl Section {
         Self { way, begin, marks }
     }
 
-    /// Converts the route's parameter to the section's own parameter.
+    /// Converts the route parameter to the section parameter.
     fn own(&self, s: f64) -> f64 {
         let behind = self.marks.partition_point(|mark| mark.0 <= s);
         match (behind.checked_sub(1).map(|i| self.marks[i]), self.marks.get(behind)) {
@@ -100,13 +102,14 @@ impl Section {
 
 impl Route {
     /// Creates the route through `points`. If the first point is a flange pose, the solution nearest to `near` (rad) is
-    /// used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]), corners
-    /// between lines and arcs within `blend_m` m (see [`FlangePath`]). With 0 the path stops at the corner.
+    /// used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]). Corners
+    /// between lines and arcs are rounded within `blend_m` m (see [`FlangePath`]). If the value is 0, the path stops at
+    /// the corner.
     ///
     /// # Errors
     ///
     /// [`PlanError::TooFew`], [`PlanError::Blend`], and [`PlanError::Flange`] with the impossible waypoint, or with the
-    /// leg and the distance on it (see [`PoseError`]). [`PoseError::NoMotion`] if all waypoints are at the same
+    /// leg and the distance along the leg (see [`PoseError`]). [`PoseError::NoMotion`] if all waypoints are at the same
     /// position.
     pub fn new(
         kinematics: &Kinematics,
@@ -138,8 +141,8 @@ impl Route {
         if route.sections.is_empty() { Err(PoseError::NoMotion.into()) } else { Ok(route) }
     }
 
-    /// Returns the joint positions at the waypoints, rad. For a rounded corner these are the positions of the corner
-    /// itself.
+    /// Returns the joint positions at the waypoints, rad. For a rounded corner, the result is the position of the
+    /// corner itself.
     pub fn positions(&self) -> &[JointVec] {
         &self.positions
     }
@@ -158,7 +161,7 @@ impl Route {
         self.positions.last().copied().unwrap_or_default()
     }
 
-    /// Appends a section; `waypoints` are the section's own parameters at its waypoints, except the first.
+    /// Appends a section. `waypoints` contains the section parameter at each waypoint of the section except the first.
     fn push(&mut self, way: Way, waypoints: &[f64]) {
         let section = Section::new(way, self.end);
         self.waypoints.extend(waypoints.iter().map(|own| self.end + own));
@@ -225,7 +228,7 @@ impl Route {
                     same(&reached, &wanted).map_err(|e| e.at_waypoint(first + k))?;
                     wanted
                 }
-                // A solution has rounding errors.
+                // A solution of the inverse kinematics has rounding errors.
                 _ => std::array::from_fn(|j| {
                     let (low, high) = kinematics.limits()[j];
                     reached[j].clamp(low, high)
@@ -244,7 +247,7 @@ impl Route {
     }
 }
 
-/// Legs of the flange, and the numbers (from 1) of the waypoints at their ends.
+/// Legs of the flange, and for each leg the number (from 1) of the waypoint at its end.
 struct Legs {
     legs: Vec<Leg>,
     ends: Vec<usize>,
@@ -258,7 +261,7 @@ impl Legs {
         self.ends.partition_point(|end| *end < self.first + index) + 1
     }
 
-    /// Returns an error of these legs with the waypoint and leg numbers of the route.
+    /// Converts an error of these legs to an error with the waypoint and leg numbers of the route.
     fn numbered(&self, error: PoseError) -> PoseError {
         let end = |leg: usize| leg.checked_sub(1).and_then(|i| self.ends.get(i)).copied();
         match error {
@@ -275,7 +278,7 @@ impl Legs {
     }
 }
 
-/// Returns the legs to `points`; the first of them is waypoint number `first`.
+/// Returns the legs to `points`. The first of these points is waypoint number `first`.
 fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<Legs, PoseError> {
     let (mut legs, mut ends, mut via) = (Vec::new(), Vec::new(), None);
     for (k, point) in points.iter().enumerate() {
@@ -306,7 +309,7 @@ fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<
     Ok(Legs { legs, ends, first })
 }
 
-/// Checks that the arm reaches the wanted joint positions, not another configuration.
+/// Checks that the arm reaches the requested joint positions and not another configuration.
 fn same(reached: &JointVec, wanted: &JointVec) -> Result<(), PoseError> {
     let (joint, away) = furthest_joint(reached, wanted);
     if away > SAME {
@@ -368,7 +371,7 @@ mod tests {
     use super::*;
     use jtc_dynamics::JOINTS;
 
-    /// A parameter on one side of a change of form is on the same side in the section.
+    /// If a parameter is on one side of a change of form, the section parameter is on the same side.
     #[test]
     fn rounding_does_not_lead_across_a_mark() {
         let ends = [[0.0; JOINTS], [0.7, 0.1, 0.0, 0.0, 0.0, 0.0], [0.1, 0.3, 0.0, 0.0, 0.0, 0.0]];

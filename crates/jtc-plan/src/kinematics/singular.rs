@@ -1,4 +1,4 @@
-//! Singular poses, in which the flange cannot move in some direction.
+//! Singular poses, in which the flange cannot move in at least one direction.
 use std::fmt;
 
 use jtc_dynamics::JOINTS;
@@ -9,30 +9,31 @@ use super::chain::{Axes, Chain};
 use super::closed_form::{Geometry, Shoulder};
 use super::subproblems::across;
 
-/// Smallest singular value of the Jacobian that is permitted on a path of the flange (see [`Singularity::smallest`]):
-/// half a degree from aligned wrist axes, and a few degrees from the stretched arm.
+/// Smallest singular value of the Jacobian that is permitted on a path of the flange (see [`Singularity::smallest`]).
+/// This corresponds to half a degree from aligned wrist axes, and to a few degrees from the stretched arm.
 pub const SINGULAR: f64 = 0.01;
 
 /// Kind of singular pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SingularKind {
-    /// The wrist: the axes of joints 4 and 6 are parallel, with joint 5 at 0 or half a turn away.
+    /// Wrist singularity: the axes of joints 4 and 6 are parallel, with joint 5 at 0 or half a turn.
     Wrist,
-    /// The elbow: the arm is stretched, or folded.
+    /// Elbow singularity: the arm is stretched or folded.
     Elbow,
-    /// The shoulder: the wrist centre is on the axis of joint 1, or joint 1 cannot move it sideways.
+    /// Shoulder singularity: the wrist centre is on the axis of joint 1, or joint 1 cannot move the wrist centre
+    /// sideways.
     Shoulder,
     /// Any other singular pose, or a singular pose of an arm without a known geometry.
     Other,
 }
 
-/// The singular pose that the arm is in or next to.
+/// Singular pose in which the arm is, or to which it is close.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Singularity {
     /// Kind of the singular pose.
     pub kind: SingularKind,
-    /// Joints that can move with the flange almost at rest.
+    /// Joints that can move while the flange is almost at rest.
     pub joints: Vec<Joint>,
     /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm: the
     /// smallest motion of the flange for joint motions of 1 rad in total (the root of the sum of squares). 0 in the
@@ -67,17 +68,17 @@ impl fmt::Display for Singularity {
     }
 }
 
-/// Entries above this share of the largest entry belong to joints that move.
+/// Share of the largest entry above which an entry belongs to a joint that moves.
 const TAKES_PART: f64 = 0.2;
-/// If the sine of the wrist angle is smaller than this, a singular pose of an arm without a planar elbow is reported as
-/// a wrist singularity.
+/// Sine of the wrist angle below which a singular pose of an arm without a planar elbow is reported as a wrist
+/// singularity.
 const NAMED: f64 = 0.1;
 
-/// Returns the smallest singular value of the Jacobian and the unit vector of its joint motions. If a joint position is
-/// NaN or infinite, returns NaN and 0.
+/// Returns the smallest singular value of the Jacobian and the unit vector of the corresponding joint motions. If a
+/// joint position is NaN or infinite, returns NaN and 0.
 pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, Vector6<f64>) {
     let jacobian = chain.scaled_jacobian(axes);
-    // The iteration for singular values would not end with such values.
+    // With such values, the iteration for singular values would not end.
     if !jacobian.iter().all(|entry| entry.is_finite()) {
         return (f64::NAN, Vector6::zeros());
     }
@@ -95,10 +96,11 @@ pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -
     Singularity { kind: geometry.map_or(SingularKind::Other, |g| kind(chain, g, axes)), joints, smallest }
 }
 
-/// Returns the kind that belongs to the factor of the Jacobian's determinant nearest to 0.
+/// Returns the kind of singularity. The kind corresponds to the factor of the Jacobian's determinant that is nearest to
+/// 0.
 fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     let (h, p) = (&axes.axis, &axes.point);
-    // Divided by its value with joint 5 a quarter turn away.
+    // The factor is divided by its value at a quarter turn of joint 5.
     let full = h[3].cross(&h[4]).norm() * h[4].cross(&h[5]).norm();
     let wrist = h[3].dot(&h[4].cross(&h[5])).abs() / full.max(f64::MIN_POSITIVE);
     let (centre, is_planar) = match geometry {
@@ -108,7 +110,7 @@ fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     if !is_planar {
         return if wrist < NAMED { SingularKind::Wrist } else { SingularKind::Other };
     }
-    // The last axes meet in a point on axis 5, which moves with that axis.
+    // The last axes meet in a point on axis 5, and this point moves with axis 5.
     let along = chain.zero.axis[4].dot(&(centre - chain.zero.point[4]));
     let centre = axes.point[4] + h[4] * along;
     let end = if matches!(geometry, Geometry::ThreeParallel { .. }) { p[3] } else { centre };

@@ -1,18 +1,19 @@
 //! Rotations that solve one equation of a closed form (the subproblems of Paden and Kahan).
 //!
-//! Each function takes a `hint`: the angle to return if the geometry leaves the angle free, as in singular poses. If a
-//! target is missed slightly (which happens for a nearly ideal arm), the nearest reachable target is used. The result
-//! is refined later, and dropped if it does not reach the goal.
+//! Each function takes a `hint`: the angle to return if the geometry does not determine the angle, as in singular
+//! poses. If a target is slightly out of reach (which happens for a nearly ideal arm), the nearest reachable target is
+//! used. The result is refined later. It is dropped if it does not reach the goal.
 use nalgebra::Vector3;
 
 use super::chain::turn;
 
-/// If a direction is shorter than this share of the vectors' lengths, it is lost in rounding, and the angle is free.
+/// Length of a direction, as a share of the lengths of the vectors, below which rounding dominates and the angle is not
+/// determined.
 const FREE: f64 = 1e-9;
 /// Largest excess of a target over the largest reachable value, as a share of the vectors' lengths.
 const SLACK: f64 = 1e-3;
 
-/// Returns the angle of a rotation about `axis` that turns `from` to the direction of `to`, as seen along the axis.
+/// Returns the angle of a rotation about `axis` that turns `from` to the direction of `to`, in a view along the axis.
 pub(crate) fn turn_onto(axis: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>, hint: f64) -> f64 {
     let (a, b) = (across(axis, from), across(axis, to));
     if a.norm() <= FREE * from.norm() || b.norm() <= FREE * to.norm() {

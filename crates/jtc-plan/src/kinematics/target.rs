@@ -1,4 +1,4 @@
-//! Contents of a waypoint file: joint positions or poses of the flange.
+//! Targets of motions: joint positions or poses of the flange.
 use jtc_dynamics::{JointVec, Pose};
 
 use super::{Kinematics, PoseError, outside};
@@ -18,7 +18,7 @@ pub enum Target {
 /// # Errors
 ///
 /// [`PoseError::Waypoint`] with the number of the first target without a solution, counted from 1, and the reason (see
-/// [`Kinematics::solve`]). Joint positions must also be within the limits.
+/// [`Kinematics::solve`]). Targets that are joint positions must also be within the limits.
 pub fn resolve(
     kinematics: &Kinematics,
     targets: &[Target],
@@ -33,7 +33,7 @@ pub fn resolve(
     Ok(found)
 }
 
-/// Returns joint positions for a target; for a pose, the solution nearest to `before`.
+/// Returns joint positions for a target. For a pose, this is the solution nearest to `before`.
 pub(crate) fn one(
     kinematics: &Kinematics,
     target: &Target,

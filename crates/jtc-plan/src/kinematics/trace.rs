@@ -1,29 +1,29 @@
 //! Path of the flange: consecutive legs with blended corners.
 //!
-//! A blend begins at the distance r before the corner and ends at the distance r after it. In between, the parameter of
-//! the previous leg slows down to a stop while the parameter of the next leg starts. Let τ run from −r to r, let w rise
-//! smoothly from 0 to 1, and W = ∫w. The place is then the place of the previous leg at τ − W plus the displacement of
-//! the next leg by W. Position and orientation have continuous second derivatives. The position stays within the
-//! triangle of the corner if the legs are straight.
+//! A blend begins at the distance r before the corner and ends at the distance r after it. Between these two points,
+//! the parameter of the previous leg slows down to a stop while the parameter of the next leg starts. Let τ go from −r
+//! to r, let w rise smoothly from 0 to 1, and let W = ∫w. The point is then the point of the previous leg at τ − W plus
+//! the displacement of the next leg by W. Position and orientation have continuous second derivatives. The position
+//! stays within the triangle of the corner if the legs are straight.
 use nalgebra::Vector3;
 
 use super::PoseError;
 use super::chain::Frame;
 use super::leg::{Drawn, Leg, Place, RADIUS, SHORTEST};
 
-/// If the cosine of the angle between two legs is below this, the path turns back. No blend can keep the flange moving
-/// there.
+/// Cosine of the angle between two legs below which the path turns back. At such a corner the flange must stop, with
+/// any blend.
 const WAY_BACK: f64 = -0.98;
 
-/// Path of the flange. Its parameter is the length of the legs, m.
+/// Path of the flange. The path parameter is the length of the legs, m.
 #[derive(Clone, Debug)]
 pub(crate) struct Trace {
     legs: Vec<Drawn>,
     /// Parameter at the start of each leg, and at the end of the path.
     begins: Vec<f64>,
-    /// Blend radius after each leg, m; 0 for a stop.
+    /// Blend radius after each leg, m; 0 if the path stops.
     blends: Vec<f64>,
-    /// Number of legs in the request; some may have no motion.
+    /// Number of legs in the request; some of these may have no motion.
     given: usize,
 }
 
@@ -53,13 +53,13 @@ impl Trace {
         self.begins[self.legs.len()]
     }
 
-    /// Returns the index of the leg that `s` belongs to; a corner belongs to the leg after it.
+    /// Returns the index of the leg to which `s` belongs. A corner belongs to the leg after the corner.
     fn leg(&self, s: f64) -> usize {
         let behind = self.begins.partition_point(|&begin| begin <= s);
         behind.saturating_sub(1).min(self.legs.len() - 1)
     }
 
-    /// Returns the number of the leg at `s`, counted from 1, the distance along it, and its length, m.
+    /// Returns the number (from 1) of the leg at `s`, the distance along this leg, and its length, m.
     pub(super) fn whereabouts(&self, s: f64) -> (usize, f64, f64) {
         let k = self.leg(s);
         (self.legs[k].number, s - self.begins[k], self.legs[k].length)
@@ -78,7 +78,7 @@ impl Trace {
         }
     }
 
-    /// Returns the places of required stops.
+    /// Returns the parameters at which the path must stop.
     pub(super) fn stops(&self) -> Vec<f64> {
         let inner = self.blends.iter().zip(&self.begins[1..self.legs.len()]);
         inner.filter(|(blend, _)| **blend == 0.0).map(|(_, &s)| s).collect()
@@ -126,7 +126,7 @@ fn blended(before: &Drawn, behind: &Drawn, r: f64, tau: f64) -> Place {
     let sum = 2.0 * r * t * t * t * (1.0 - 0.5 * t);
     let (a, b) = (before.at(before.length + tau - sum), behind.at(sum));
     let corner = &before.to;
-    // Rotation of the flange by the next leg since the corner.
+    // Rotation of the flange along the next leg after the corner.
     let since = b.frame.rotation * corner.rotation.transpose();
     let spin: Vector3<f64> = since * a.spin;
     Place {
@@ -162,7 +162,8 @@ mod tests {
         ]
     }
 
-    /// Returns the largest difference between a point's derivatives and the finite differences of its neighbours.
+    /// Returns the largest difference between a point's derivatives and the finite differences of the neighbouring
+    /// points.
     fn wrong(trace: &Trace, s: f64) -> f64 {
         let step = 1e-5;
         let (before, here, after) = (trace.at(s - step), trace.at(s), trace.at(s + step));
@@ -181,8 +182,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// The places include the ends of the blends: a second derivative that jumps there would show as half of the
-        /// jump.
+        /// The tested points include the ends of the blends. A jump of the second derivative at such an end would
+        /// appear as half of the jump.
         #[test]
         fn derivatives_are_those_of_the_places_and_continuous(
             start in pose(), legs in prop::collection::vec(leg(), 2..5), blend in 0.05..0.3f64, at in 0.0..1.0f64

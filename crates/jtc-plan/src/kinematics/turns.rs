@@ -1,28 +1,28 @@
-//! Equivalent joint positions, whole turns apart, within the position limits.
+//! Equivalent joint positions within the position limits, which differ by whole turns.
 use std::f64::consts::TAU;
 
 use jtc_dynamics::{JOINTS, JointVec};
 use jtc_wire::Joint;
 
-/// Distance beyond a limit that is tolerated, rad, because solutions have rounding errors.
+/// Distance beyond a limit that is tolerated because solutions have rounding errors, rad.
 pub(crate) const ROUNDING: f64 = 1e-10;
 
 type Limits = [(f64, f64); JOINTS];
 
-/// Returns `angle` if it is within the limits, up to rounding.
+/// Returns `angle` if it is within the limits, except for rounding.
 fn within(angle: f64, (low, high): (f64, f64)) -> Option<f64> {
     (low <= high && low - ROUNDING <= angle && angle <= high + ROUNDING).then(|| angle.clamp(low, high))
 }
 
 /// Moves each joint of `q` by whole turns as near to `near` as the limits permit. Returns `None` if a joint is outside
-/// its limits in every turn.
+/// its limits at every number of turns.
 pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<JointVec> {
     let mut found = *q;
     for (j, angle) in found.iter_mut().enumerate() {
         let turned = *angle + TAU * ((near[j] - *angle) / TAU).round();
         let ends = [limits[j].0, limits[j].1].map(|end| *angle + TAU * ((end - *angle) / TAU).round());
-        // The turn nearest to `near` may be outside. Then a turn next to one of the limits is the nearest, if any is
-        // inside.
+        // The turn nearest to `near` may be outside the limits. If so, a turn next to one of the limits is the nearest
+        // valid turn, if there is any.
         let candidates = [turned, ends[0], ends[0] + TAU, ends[1], ends[1] - TAU];
         let inside = candidates.into_iter().filter_map(|angle| within(angle, limits[j]));
         *angle = inside.min_by(|a, b| (a - near[j]).abs().total_cmp(&(b - near[j]).abs()))?;
@@ -53,7 +53,8 @@ pub(crate) struct Outside {
     pub beyond: f64,
 }
 
-/// Returns the joint that is farthest outside. For each joint the turn that is least outside is used.
+/// Returns the joint that is farthest outside its limits. For each joint the turn that is least outside the limits is
+/// used.
 pub(crate) fn outside(q: &JointVec, limits: &Limits) -> Outside {
     let mut worst = Outside { joint: Joint::ALL[0], value: q[0], beyond: f64::NEG_INFINITY };
     for (joint, (&angle, &(low, high))) in Joint::ALL.into_iter().zip(q.iter().zip(limits)) {

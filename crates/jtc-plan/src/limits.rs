@@ -4,8 +4,8 @@ use jtc_wire::Joint;
 
 use crate::{JOINTS, JointVec, LimitKind, PlanError};
 
-/// Time in which a joint may reach its highest acceleration from rest, s. The jerk limit of [`Limits::of`] follows from
-/// it.
+/// Minimum time in which a joint reaches its highest acceleration from an acceleration of 0, s. The jerk limit of
+/// [`Limits::of`] is computed from this time.
 pub const JERK_TIME: f64 = 0.1;
 
 /// Largest share of a torque limit that can be reserved as a margin.
@@ -20,9 +20,9 @@ pub struct Limits {
     pub velocity: JointVec,
     /// Highest acceleration, rad/s².
     pub acceleration: JointVec,
-    /// Highest jerk, rad/s³; infinite: no limit.
+    /// Highest jerk, rad/s³; infinite if there is no limit.
     pub jerk: JointVec,
-    /// Highest torque, N·m; used only if a motion is planned with an [`crate::ArmDynamics`].
+    /// Highest torque, N·m. The planner uses this limit only with an [`crate::ArmDynamics`].
     pub torque: JointVec,
     /// Share of the torque limit that is reserved as a margin, 0 to [`MARGIN_MAX`]; see
     /// [`crate::ArmDynamics::usable_torque`].
@@ -30,7 +30,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Returns the limits of an arm (J-43). The configuration of an arm has no jerk limit; here the jerk limit is the
+    /// Returns the limits of an arm (J-43). The configuration of an arm has no jerk limit, so the jerk limit is the
     /// highest acceleration divided by [`JERK_TIME`].
     pub fn of(config: &Config) -> Self {
         let of = |value: fn(&jtc_core::JointConfig) -> f64| config.joints.each_ref().map(value);
@@ -50,9 +50,9 @@ impl Limits {
         Self { margin: [share; JOINTS], ..self }
     }
 
-    /// Returns the limits for a share of the speed: velocity × `share`, acceleration × its square, jerk × its cube. A
-    /// motion that these three limits bind then takes 1/`share` of the time. Positions, torques and the torque margin
-    /// stay unchanged.
+    /// Returns the limits for a share of the speed. The velocity is multiplied by `share`, the acceleration by its
+    /// square, and the jerk by its cube. If these three limits determine the duration of a motion, its duration is
+    /// multiplied by 1/`share`. Positions, torques and the torque margin stay unchanged.
     pub fn at_speed(&self, share: f64) -> Self {
         Self {
             velocity: self.velocity.map(|v| v * share),
@@ -92,7 +92,7 @@ impl Limits {
                 (LimitKind::Torque, self.torque[j], true),
             ] {
                 let positive = value > 0.0 && (value.is_finite() || !finite);
-                // Squares and cubes of smaller values would be lost in rounding.
+                // Squares and cubes of smaller values would disappear in rounding errors.
                 if !positive || value < 1e-9 || (value > 1e9 && value.is_finite()) {
                     return Err(PlanError::Limit { joint, limit, value });
                 }
@@ -105,7 +105,7 @@ impl Limits {
         Ok(())
     }
 
-    /// Checks that `position` is within the limits. The error contains `waypoint`, counted from 1.
+    /// Checks that `position` is within the limits. The error contains `waypoint`, which is counted from 1.
     pub(crate) fn holds(&self, position: &JointVec, waypoint: usize) -> Result<(), PlanError> {
         for joint in Joint::ALL {
             let (value, (min, max)) = (position[joint.index()], self.position[joint.index()]);

@@ -4,7 +4,7 @@ use jtc_wire::Joint;
 use crate::binding::{Binding, LimitKind};
 use crate::{JOINTS, JointVec};
 
-/// Position, velocity and acceleration at one time.
+/// Position, velocity and acceleration at one point in time.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct State {
     /// Position, rad.
@@ -22,24 +22,24 @@ impl State {
     }
 }
 
-/// A part of a motion in which each joint's position is a polynomial of degree 5 in the time since `start`.
+/// Part of a motion in which each joint's position is a polynomial of degree 5 in the time since `start`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     /// Start, s.
     pub start: f64,
-    /// Length, above 0 s.
+    /// Duration of the piece, greater than 0 s.
     pub length: f64,
-    /// Coefficients per joint, in ascending order.
+    /// Coefficients of the polynomial of each joint, in ascending order.
     pub coefficients: [[f64; 6]; JOINTS],
 }
 
 impl Piece {
-    /// Returns the piece that leads from one state to another (Hermite).
+    /// Returns the piece that begins in one state and ends in another (Hermite interpolation).
     pub(crate) fn between(start: f64, length: f64, a: &State, b: &State) -> Self {
         let h = length;
         let coefficients = std::array::from_fn(|j| {
             let (p, v, c) = (a.position[j], a.velocity[j], 0.5 * a.acceleration[j]);
-            // Residual at the end; time is measured in lengths of the piece.
+            // Residual at the end of the piece. Time is measured in durations of the piece.
             let dp = b.position[j] - (p + h * (v + h * c));
             let dv = (b.velocity[j] - (v + 2.0 * h * c)) * h;
             let da = (b.acceleration[j] - 2.0 * c) * h * h;
@@ -69,7 +69,7 @@ impl Piece {
         self.coefficients.map(|[_, _, _, c3, c4, c5]| 6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
     }
 
-    /// Returns the piece with the same path, taking `factor` times as long.
+    /// Returns the piece on an identical path, with `factor` times the duration.
     pub(crate) fn stretched(&self, factor: f64) -> Self {
         let mut coefficients = self.coefficients;
         for c in &mut coefficients {
@@ -83,7 +83,7 @@ impl Piece {
     }
 }
 
-/// A motion in time, from rest to rest.
+/// Motion as a function of time, from rest to rest.
 #[derive(Clone, Debug)]
 pub struct Motion {
     pub(crate) pieces: Vec<Piece>,
@@ -95,19 +95,20 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Creates a motion from consecutive pieces without gaps; the last one comes to rest at `end`.
+    /// Creates a motion from consecutive pieces without gaps. At the end of the last piece, the arm is at rest at
+    /// `end`.
     pub(crate) fn new(pieces: Vec<Piece>, end: JointVec, waypoint_times: Vec<f64>) -> Self {
         Self { pieces, end: State::rest(end), binding: Vec::new(), slowed: None, waypoint_times }
     }
 
-    /// Returns the time from rest to rest, above 0 s.
+    /// Returns the duration from rest to rest, which is greater than 0 s.
     pub fn duration(&self) -> f64 {
         self.pieces.last().map_or(0.0, |p| p.start + p.length)
     }
 
-    /// Returns the state at `t` seconds from the start. Before the start and after the end the arm rests exactly at the
-    /// first and the last waypoint. Without a jerk limit the acceleration may jump at `t`; the value after the jump is
-    /// returned.
+    /// Returns the state at `t` seconds after the start. Before the start and after the end the arm rests exactly at
+    /// the first and the last waypoint. Without a jerk limit, the acceleration may jump at `t`. In this case returns
+    /// the value after the jump.
     pub fn at(&self, t: f64) -> State {
         match self.piece(t) {
             None => self.end,
@@ -119,7 +120,7 @@ impl Motion {
         }
     }
 
-    /// Returns the jerk at `t` seconds from the start, rad/s³; 0 while the arm rests.
+    /// Returns the jerk at `t` seconds after the start, rad/s³; 0 while the arm is at rest.
     pub fn jerk_at(&self, t: f64) -> JointVec {
         if t < 0.0 {
             return [0.0; JOINTS];
@@ -127,18 +128,19 @@ impl Motion {
         self.piece(t).map_or([0.0; JOINTS], |piece| piece.jerk(t - piece.start))
     }
 
-    /// Returns the binding limits in chronological order. In an interval in which no limit is reached, this is the
-    /// limit closest to being reached, or the limit that required slowing down the whole motion.
+    /// Returns the binding limits in chronological order. If no limit is reached in an interval, its binding limit is
+    /// the one that is nearest to being reached. It may also be the limit because of which the whole motion was slowed
+    /// down.
     pub fn binding(&self) -> &[Binding] {
         &self.binding
     }
 
-    /// Returns the time at which the motion is nearest to each waypoint, s from the start.
+    /// Returns the time at which the motion is nearest to each waypoint, in seconds after the start.
     pub fn waypoint_times(&self) -> &[f64] {
         &self.waypoint_times
     }
 
-    /// Returns the piece at `t`. Before the start this is the first piece; from the end on, returns `None`.
+    /// Returns the piece at `t`. Before the start, returns the first piece. At and after the end, returns `None`.
     fn piece(&self, t: f64) -> Option<&Piece> {
         if t.is_nan() || t >= self.duration() {
             return None;
@@ -147,7 +149,7 @@ impl Motion {
         self.pieces.get(after.saturating_sub(1))
     }
 
-    /// Returns the motion on the same path, taking `factor` times as long.
+    /// Returns the motion on an identical path, with `factor` times the duration.
     pub(crate) fn stretched(&self, factor: f64) -> Self {
         Self {
             pieces: self.pieces.iter().map(|p| p.stretched(factor)).collect(),
@@ -159,7 +161,7 @@ impl Motion {
     }
 
     /// Inserts a rest of `length` seconds at the waypoint with this index, if the motion is at rest there. Later
-    /// waypoints are delayed by it.
+    /// waypoints are delayed by this rest.
     pub(crate) fn rest_at(&mut self, waypoint: usize, length: f64) {
         let Some(&time) = self.waypoint_times.get(waypoint) else { return };
         let at = self.pieces.partition_point(|p| p.start + 0.5 * p.length < time);

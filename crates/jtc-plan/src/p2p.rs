@@ -6,13 +6,14 @@ use rsruckig::prelude::{
 use crate::motion::{Motion, Piece};
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, reasons, trapezoid, verify};
 
-/// Duration of a motion without movement, s. A trajectory needs two points, and therefore a duration above 0.
+/// Duration of a motion in which the arm does not move, s. A trajectory needs two points, and therefore a duration
+/// above 0.
 const STANDING: f64 = 0.01;
 
-/// Plans the fastest motion from rest to rest within velocity, acceleration and jerk limits; all joints start and stop
-/// together (Ruckig: Berscheid and Kröger 2021). The motion follows a straight line in joint space if that takes no
-/// longer. With an `arm`, the motion is slowed down until the torque is sufficient, and its speed stays within the
-/// friction table.
+/// Plans the fastest motion from rest to rest within velocity, acceleration and jerk limits. All joints start and stop
+/// together (Ruckig, by Berscheid and Kröger 2021). The motion follows a straight line in joint space if this does not
+/// increase the duration. With an `arm`, the motion is slowed down until the torque is sufficient, and its speed is
+/// limited to the range of the friction table.
 ///
 /// If both positions are the same, the motion is a rest of 10 ms.
 ///
@@ -47,7 +48,7 @@ fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, Pl
     ruckig(from, to, limits)
 }
 
-/// Returns a short rest between two equivalent positions, with `waypoints` waypoints.
+/// Returns a short motion without movement between two equal positions, with `waypoints` waypoints.
 pub(crate) fn standing(from: &JointVec, to: &JointVec, waypoints: usize) -> Motion {
     let piece = Piece::between(0.0, STANDING, &State::rest(*from), &State::rest(*to));
     let mut times = vec![0.0; waypoints];
@@ -85,12 +86,13 @@ fn ruckig(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, Pla
     Ok(Motion::new(pieces.collect(), *to, vec![0.0, end]))
 }
 
-/// Returns the part of a trajectory in which the jerk of every joint is constant.
+/// Returns a part of a trajectory in which the jerk of every joint is constant.
 fn constant_jerk(trajectory: &Trajectory<JOINTS>, start: f64, length: f64) -> Piece {
     let zeros = || DataArrayOrVec::Stack([0.0; JOINTS]);
     let (mut p, mut v, mut a, mut jerk) = (zeros(), zeros(), zeros(), zeros());
     trajectory.at_time(start, &mut Some(&mut p), &mut Some(&mut v), &mut Some(&mut a), &mut None, &mut None);
-    // The jerk is read in the middle: at the start it may still be the jerk of the previous part.
+    // The jerk is evaluated in the middle of the part, because at the start it may still be the jerk of the previous
+    // part.
     let middle = start + 0.5 * length;
     trajectory.at_time(middle, &mut None, &mut None, &mut None, &mut Some(&mut jerk), &mut None);
     let coefficients = std::array::from_fn(|j| [p[j], v[j], 0.5 * a[j], jerk[j] / 6.0, 0.0, 0.0]);

@@ -15,24 +15,24 @@ pub struct PathPoint {
 /// A path through joint space: positions as a function of a parameter from 0 to [`end`](Path::end), with two
 /// derivatives.
 ///
-/// The first derivative is continuous except at [`stops`](Path::stops), and the position is three times differentiable
-/// between two [`breaks`](Path::breaks). Any parameter is possible; a parameter proportional to the joint movements
-/// gives the best time laws.
+/// The first derivative is continuous except at [`stops`](Path::stops), and between two [`breaks`](Path::breaks) the
+/// position is three times differentiable. Any parameter is possible. The time laws are best if the parameter is
+/// proportional to the joint movements.
 pub trait Path {
-    /// Returns the last value of the parameter, above 0.
+    /// Returns the last value of the parameter, which is greater than 0.
     fn end(&self) -> f64;
 
-    /// Returns position and derivatives at `s`, which is between 0 and the end. At a break the derivatives may be those
-    /// of either side.
+    /// Returns position and derivatives at `s`, with `s` between 0 and the end. At a break, the derivatives of either
+    /// side are permitted.
     fn at(&self, s: f64) -> PathPoint;
 
-    /// Returns the waypoint for errors at `s`: the last one passed, counted from 1.
+    /// Returns the number (from 1) of the last waypoint at or before `s`, for errors.
     fn waypoint(&self, _s: f64) -> Option<usize> {
         None
     }
 
     /// Parameters in ascending order, between 0 and the end, at which a derivative jumps or the path changes its form.
-    /// Between two of them the path should be one simple curve, because it is sampled at a fixed number of places.
+    /// Between two breaks, the path should be one simple curve, because it is sampled at a fixed number of points.
     fn breaks(&self) -> Vec<f64> {
         Vec::new()
     }
@@ -49,11 +49,11 @@ pub trait Path {
     }
 }
 
-/// Path with access to its waypoints, for motions with given times.
+/// Path with access to its waypoints, for motions with specified waypoint times.
 pub(crate) trait Waypointed: Path {
     /// Returns `true` if the path does not move between the waypoints with these indices.
     fn is_one_place(&self, from: usize, to: usize) -> bool;
 
-    /// Returns `true` if the path rests at the waypoint with this index.
+    /// Returns `true` if the path stops at the waypoint with this index.
     fn stops_at(&self, waypoint: usize) -> bool;
 }

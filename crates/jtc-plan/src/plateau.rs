@@ -1,4 +1,4 @@
-//! Plateaus at the speed maxima. Between speeding up and slowing down, the parameter's acceleration is 0 for one
+//! Plateaus at the maxima of the speed. Between speeding up and slowing down, the parameter's acceleration is 0 for one
 //! window, so that one averaging window never contains both changes of the acceleration.
 use crate::profile::simplified;
 
@@ -17,7 +17,7 @@ pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)>
     simplified(walk.done)
 }
 
-/// Vertices left and right of the current place.
+/// Vertices to the left and right of the current position.
 struct Walk<'a> {
     done: Vec<(f64, f64)>,
     ahead: &'a [(f64, f64)],
@@ -37,7 +37,7 @@ impl Top {
         if self.level > 0.0 { (self.to - self.from) / self.level.sqrt() } else { f64::INFINITY }
     }
 
-    /// Returns the plateau lowered to `level`; its sides end at `left` and `right`.
+    /// Returns the plateau lowered to `level`. The sides of the plateau end at `left` and `right`.
     fn at(&self, level: f64, left: (f64, f64), right: (f64, f64)) -> Self {
         let side = |x: f64, foot: (f64, f64)| {
             let height = self.level - foot.1;

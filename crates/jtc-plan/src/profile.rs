@@ -1,8 +1,8 @@
-//! The fastest time law under limits of the parameter's speed and acceleration only. The limits are constant in each
+//! The fastest time law under limits of the parameter's speed and acceleration only. Each limit is constant in each
 //! cell of the path.
 //!
-//! The law may be averaged over a window afterwards. To keep a cell's limits then, it must keep them half a window
-//! before and after the cell too. Cells are therefore extended beyond their ends.
+//! The law may be averaged over a window afterwards. To keep the limits of a cell after averaging, the law must also
+//! keep these limits half a window before and after the cell. Cells are therefore extended at both ends.
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -15,20 +15,21 @@ pub(crate) struct Bounds {
     pub cap: f64,
     /// Highest acceleration of the parameter.
     pub up: f64,
-    /// Highest deceleration of the parameter, above 0.
+    /// Highest deceleration of the parameter, greater than 0.
     pub down: f64,
 }
 
 impl Bounds {
-    /// Returns the bounds extended at both ends by the distance covered in half a window at their highest speed.
+    /// Returns the bounds extended at both ends by the distance covered in half a window at the highest speed of these
+    /// bounds.
     fn widened(&self, window: f64, end: f64) -> Self {
         let reach = 0.5 * window * self.cap.sqrt();
         Self { from: (self.from - reach).max(0.0), to: (self.to + reach).min(end), ..*self }
     }
 }
 
-/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest. Between them the squared speed
-/// is linear; each speed maximum lasts for `window` seconds.
+/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest. Between two vertices, the
+/// squared speed is linear. Each maximum of the speed lasts for `window` seconds.
 pub(crate) fn fastest(cells: &[Bounds], window: f64) -> Vec<(f64, f64)> {
     let end = cells.last().map_or(0.0, |c| c.to);
     let widened: Vec<Bounds> = cells.iter().map(|c| c.widened(window, end)).collect();
@@ -38,7 +39,7 @@ pub(crate) fn fastest(cells: &[Bounds], window: f64) -> Vec<(f64, f64)> {
     if window > 0.0 { crate::plateau::flattened(&vertices, window) } else { vertices }
 }
 
-/// The bits of non-negative numbers have the same order as the numbers.
+/// Non-negative floating-point numbers can be sorted by their bits.
 fn key(x: f64) -> u64 {
     x.max(0.0).to_bits()
 }
@@ -91,7 +92,8 @@ fn speeds(parts: &[Bounds]) -> Vec<f64> {
     nodes
 }
 
-/// Returns the vertices of all parts: acceleration, constant speed if the cap is reached, and deceleration.
+/// Returns the vertices of all parts. Each part consists of acceleration, constant speed if the cap is reached, and
+/// deceleration.
 fn vertices(parts: &[Bounds], nodes: &[f64]) -> Vec<(f64, f64)> {
     let mut vertices = vec![(0.0, 0.0)];
     for (part, pair) in parts.iter().zip(nodes.windows(2)) {

@@ -9,7 +9,7 @@ const ROWS: usize = 4 * JOINTS;
 /// Largest share of a limit that may be neglected.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// Limits at one place, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
+/// Limits at one point of the path. Each row is by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
 struct Rows {
     by_speed: [f64; ROWS],
     by_acceleration: [f64; ROWS],
@@ -19,7 +19,8 @@ struct Rows {
 /// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest along the cells. Squared speeds
 /// are at most `caps`; accelerations and torques are at most `shares` of their limits.
 ///
-/// The parameter's acceleration s̈ is constant from each place to the next one, so ṡ² is linear between them.
+/// The parameter's acceleration s̈ is constant from each point to the next point, so ṡ² is linear between the two
+/// points.
 pub(crate) fn fastest(
     cells: &[Cell],
     caps: &[f64],
@@ -29,7 +30,7 @@ pub(crate) fn fastest(
 ) -> Result<Vec<(f64, f64)>, String> {
     let places: Vec<f64> = cells.iter().map(|c| c.from).chain(cells.last().map(|c| c.to)).collect();
     let count = places.len();
-    // Lower of the caps on both sides of a point.
+    // Lower of the two caps on both sides of a point.
     let cap = |i: usize| {
         let (left, right) = (caps[i.saturating_sub(1)], caps[i.min(count - 2)]);
         left.min(right).clamp(1e-18, 1e18)
@@ -48,13 +49,13 @@ pub(crate) fn fastest(
 
 /// Returns the largest squared speeds at the ends of the steps, from rest to rest.
 fn along_the_steps(steps: &[Step]) -> Vec<f64> {
-    // Backward: the largest squared speed at each place from which the rest of the path can be followed. Each smaller one is possible,
-    // too, because rest is possible everywhere and the limits are linear in ṡ² and s̈.
+    // The backward pass computes the largest squared speed at each point from which the remainder of the path is possible. Each
+    // smaller squared speed is also possible, because rest is possible everywhere and the limits are linear in ṡ² and s̈.
     let mut highest = vec![0.0; steps.len() + 1];
     for (i, step) in steps.iter().enumerate().rev() {
         highest[i] = step.highest(highest[i + 1]);
     }
-    // Forward: the largest acceleration at each place.
+    // The forward pass uses the largest acceleration at each point.
     let mut squares = vec![0.0; steps.len() + 1];
     for (i, step) in steps.iter().enumerate() {
         let next = squares[i] + 2.0 * step.length * step.fastest(squares[i]);
@@ -63,18 +64,18 @@ fn along_the_steps(steps: &[Step]) -> Vec<f64> {
     squares
 }
 
-/// Bound of s̈ that is linear in ṡ²: at + by·ṡ².
+/// Bound of s̈ that is linear in ṡ², with the value at + by·ṡ².
 #[derive(Clone, Copy)]
 struct Line {
     at: f64,
     by: f64,
 }
 
-/// Limits of ṡ² and s̈ on the way from a place to the next one.
+/// Limits of ṡ² and s̈ from one point of the path to the next point.
 struct Step {
     /// Length of the step, in the unit of the parameter.
     length: f64,
-    /// Largest ṡ² at the place.
+    /// Largest ṡ² at the first point.
     cap: f64,
     /// Upper bounds of s̈.
     upper: Vec<Line>,
@@ -83,7 +84,7 @@ struct Step {
 }
 
 impl Step {
-    /// Makes the step between two places with these rows and caps. At the second place ṡ² is larger by 2·length·s̈.
+    /// Creates the step between two points with these rows and caps. At the second point, ṡ² is larger by 2·length·s̈.
     fn new(rows: [Rows; 2], caps: [f64; 2], length: f64) -> Self {
         // |s̈| is at most highest/(2·length).
         let (mut cap, highest) = (caps[0], caps[0].max(caps[1]));
@@ -133,17 +134,17 @@ impl Step {
             .fold(none, |a, b| if b.0 > a.0 { b } else { a })
     }
 
-    /// Returns the largest possible s̈ at this ṡ². If rounding has made it smaller than the smallest one, the bound that rounding changes
-    /// less has priority: the one that depends less on ṡ².
+    /// Returns the largest possible s̈ at this ṡ². If rounding has made it smaller than the smallest s̈, the bound with less rounding
+    /// error has priority. This is the bound that depends less on ṡ².
     fn fastest(&self, square: f64) -> f64 {
         let (most, least) = (self.most(square), self.least(square));
         if most.0 < least.0 && least.1.by.abs() < most.1.by.abs() { least.0 } else { most.0 }
     }
 
-    /// Returns the largest ṡ² from which a possible s̈ leads to at most `next` and at least 0 at the next place.
+    /// Returns the largest ṡ² from which a possible s̈ results in a squared speed between 0 and `next` at the next point.
     ///
-    /// The difference of the largest and the smallest s̈ is a concave function of ṡ², and not negative at 0. So Newton's method from the cap
-    /// downwards ends at its zero after at most one iteration per bound.
+    /// The difference of the largest and the smallest s̈ is a concave function of ṡ², and not negative at 0. So Newton's method, which
+    /// starts at the cap, finds the zero of this function after at most one iteration per bound.
     fn highest(&self, next: f64) -> f64 {
         if self.length <= 0.0 {
             return self.cap.min(next);
@@ -161,7 +162,7 @@ impl Step {
             }
             let crossing = (most.1.at - least.1.at) / (least.1.by - most.1.by);
             if crossing >= square {
-                // Rounding is larger than the remaining difference.
+                // The rounding error is larger than the remaining difference.
                 break;
             }
             square = crossing.max(0.0);
@@ -203,7 +204,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns rows (coefficient of ṡ², coefficient of s̈, limit); the others have no limit.
+    /// Returns rows (coefficient of ṡ², coefficient of s̈, limit). The remaining rows have no limit.
     fn rows(given: &[(f64, f64, f64)]) -> Rows {
         let mut rows =
             Rows { by_speed: [0.0; ROWS], by_acceleration: [0.0; ROWS], limit: [f64::INFINITY; ROWS] };
@@ -258,7 +259,8 @@ mod tests {
         assert_eq!((step.highest(1.0), step.highest(9.0)), (1.0, 4.0));
     }
 
-    /// Largest x of a program in two variables, from all its corners: rows a·x + b·u ≤ c.
+    /// Returns the largest x of a linear program in two variables with the rows a·x + b·u ≤ c, from all corners of the
+    /// feasible area.
     fn largest_of_the_corners(rows: &[(f64, f64, f64)]) -> f64 {
         let mut largest: f64 = 0.0;
         for (i, (a, b, c)) in rows.iter().enumerate() {
@@ -289,7 +291,7 @@ mod tests {
                 list.iter().map(|(a, b, up, c)| (*a, if *up { *b } else { -b }, *c)).collect()
             };
             let (start, end) = (signed(&start), signed(&end));
-            // This kind of row has a lower cap on purpose.
+            // For this kind of row, the implementation intentionally uses a lower cap.
             prop_assume!(start.iter().all(|(a, b, _)| !(*b > 0.0 && *b <= 2.0 * length * a)));
             let step = Step::new([rows(&start), rows(&end)], [cap; 2], length);
             let mut all = start;

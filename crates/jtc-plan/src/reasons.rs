@@ -1,4 +1,4 @@
-//! Reasons why a motion is not faster, at each moment.
+//! Reasons why a motion is not faster, for each point in time.
 use jtc_wire::Joint;
 
 use crate::binding::{Binding, LimitKind};
@@ -10,24 +10,23 @@ const BINDS: f64 = 0.985;
 /// Time between samples, s, and maximum number of samples.
 const STEP: f64 = 0.002;
 const SAMPLES_MAX: f64 = 4000.0;
-/// Maximum time between a moment and its binding limit, s. Ramps of the acceleration last that long, and before a
-/// corner the motion is slow because of the limit ahead.
+/// Maximum time between a point in time and the place of its binding limit, s. Acceleration ramps can last this long.
+/// Before a corner, the motion is slow because of a limit that is reached later.
 const NEAR: f64 = 0.05;
-/// Below this share of the torque limit, the torque is considered to be holding torque, which does not depend on the
-/// speed.
+/// Share of the torque limit below which the torque counts as holding torque, which does not depend on the speed.
 const TORQUE: f64 = 0.9;
-/// Intervals shorter than this, s, are merged into the previous interval.
+/// Minimum duration of an interval, s. Shorter intervals are merged into the previous interval.
 const SHORT: f64 = 0.004;
 
-/// A limit and its use: the share of the speed at which the limit would be reached.
+/// A limit and its use. The use is the speed as a share of the speed at which the limit would be reached.
 type Use = (f64, Joint, LimitKind);
 
 /// Binding limits of a motion.
 pub(crate) struct Reasons {
-    /// Limits that are reached.
+    /// Limits that the motion reaches.
     pub used_up: Vec<Binding>,
-    /// Reason in the remaining time: the limit that required slowing down the whole motion, or else the limit closest
-    /// to being reached around that time.
+    /// Reason in the remaining time. This is the limit because of which the whole motion was slowed down, or else the
+    /// limit that is nearest to being reached around that time.
     otherwise: Vec<Binding>,
 }
 
@@ -56,7 +55,7 @@ pub(crate) fn find(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) 
     Reasons { used_up: runs(used_up, step), otherwise }
 }
 
-/// Returns the limit with the highest use at `time`, and the limit that is reached, if any.
+/// Returns the limit with the highest use at `time`, and the limit that the motion reaches, if there is one.
 fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> (Use, Option<Use>) {
     let state = motion.at(time);
     // The holding torque is computed only if the torque is near the usable limit.
@@ -94,7 +93,7 @@ fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) 
 
 /// Returns the highest use within `reach` samples of each sample.
 fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
-    // Indices with descending uses; the first one is the highest within reach.
+    // Indices in descending order of the use. The first index has the highest use within reach.
     let mut falling: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
     let mut next = 0;
     let at = |i: usize| {
@@ -130,8 +129,8 @@ fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) ->
 }
 
 impl Reasons {
-    /// Returns one list for a motion that takes `duration` s: the limits that are reached, and between them the other
-    /// binding limits.
+    /// Returns one list for a motion of `duration` s. The list contains the limits that are reached, and the other
+    /// binding limits between these.
     pub(crate) fn joined(&self, duration: f64) -> Vec<Binding> {
         let mut all: Vec<Binding> = Vec::new();
         let mut take = |next: Binding| match all.last_mut() {

@@ -1,16 +1,16 @@
-//! Thinning of waypoints on the same path.
+//! Removal of waypoints that are not needed for the path.
 use crate::JointVec;
 use crate::distance::distance;
 
-/// Maximum distance of consecutive dropped waypoints, as a share of the blend. A line between two of them is then
-/// always within the blend of one of them.
+/// Maximum distance between consecutive dropped waypoints, as a share of the blend. With this distance, a line between
+/// two dropped waypoints is always within the blend of one of the two.
 const GAP_SHARE: f64 = 0.9;
 /// Maximum number of consecutive dropped waypoints.
 const ROW_MAX: usize = 256;
 
-/// Returns the indices of the positions that are kept, in ascending order: both ends, the positions that must stay
-/// (`stays`), and as many others as needed. Every dropped position is within `share` of the blend from the straight
-/// line between its kept neighbours, and the dropped positions are in order along this line.
+/// Returns the indices of the kept positions in ascending order. Both ends and the positions that must stay (`stays`)
+/// are kept, and as many further positions as needed. Every dropped position is within `share` of the blend from the
+/// straight line between its kept neighbours, and the dropped positions are in order along this line.
 pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f64) -> Vec<usize> {
     let last = positions.len() - 1;
     let dense = |i: usize| distance(&positions[i - 1], &positions[i]) <= GAP_SHARE * blend;
@@ -33,8 +33,8 @@ pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f6
     kept
 }
 
-/// Returns `true` if all positions between the two are at most `most` from the line between them, and in order along
-/// it.
+/// Returns `true` if all positions between two positions are at most `most` from the line between the two, and in order
+/// along it.
 fn follows(positions: &[JointVec], from: usize, to: usize, most: f64) -> bool {
     let (a, b) = (&positions[from], &positions[to]);
     let mut before = 0.0;
@@ -47,7 +47,7 @@ fn follows(positions: &[JointVec], from: usize, to: usize, most: f64) -> bool {
     })
 }
 
-/// Returns the fraction of the line from `a` (0) to `b` (1) at which it is nearest to `q`.
+/// Returns the fraction of the line from `a` (0) to `b` (1) at which the line is nearest to `q`.
 pub(crate) fn along(a: &JointVec, b: &JointVec, q: &JointVec) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
     for ((a, b), q) in a.iter().zip(b).zip(q) {

@@ -1,4 +1,4 @@
-//! Motions through waypoints, with given times.
+//! Motions through waypoints, with specified times.
 use jtc_wire::Joint;
 
 use crate::along::{Choices, along_at};
@@ -9,21 +9,21 @@ use crate::{
     ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, choose, p2p, reasons, verify, warp,
 };
 
-/// Maximum deviation from a given time of a waypoint, s: half a tick of the controller.
+/// Maximum deviation from the specified time of a waypoint, s. The value is half a tick of the controller.
 const ON_TIME: f64 = 5e-4;
-/// Maximum number of corrections of the speeds between given times.
+/// Maximum number of corrections of the speeds between specified times.
 const CORRECTIONS: usize = 60;
-/// Aimed share of the wanted time when the speed is lowered. The remaining time is reached by slowing the part down
-/// uniformly.
+/// Target duration, as a share of the requested time, when the speed is reduced. Slowing the part down uniformly adds
+/// the remaining time.
 const AIM: f64 = 0.98;
-/// Factor for the shortest time in an error, if the given time was refused only because the adjacent legs leave no
-/// margin. With this factor the time is certainly possible.
+/// Factor for the shortest time in an error, if only the adjacent legs prevent the specified time. With this factor,
+/// the time is always possible.
 const SURE: f64 = 1.05;
-/// Speed factor for parts without a given time: the factor for each failed attempt, and the lowest value.
+/// Speed factor for parts without a specified time: the factor for each failed attempt, and the lowest value.
 const ROOM: f64 = 0.97;
 const ROOM_MIN: f64 = 0.8;
-/// Largest number of consecutive attempts in which a part may take too long at full speed, while the speeds of its
-/// neighbours are corrected.
+/// Maximum number of consecutive attempts in which a part takes too long at full speed. The speeds of the adjacent
+/// parts are corrected in these attempts.
 const LATE_MAX: usize = 4;
 /// Lowest speed factor.
 const SLOWEST: f64 = 1e-4;
@@ -33,7 +33,7 @@ const SLOWEST: f64 = 1e-4;
 pub struct Waypoint {
     /// Position, rad.
     pub position: JointVec,
-    /// Time at which the motion is nearest to the waypoint, s from the start; `None`: as soon as possible.
+    /// Time at which the motion is nearest to the waypoint, in seconds after the start; `None` for as soon as possible.
     pub time: Option<f64>,
 }
 
@@ -44,13 +44,14 @@ impl From<JointVec> for Waypoint {
 }
 
 /// Plans a motion from the first waypoint to the last, as fast as the limits permit, on straight legs. Corners are
-/// rounded within `blend` rad (see [`BlendedPath`]); with 0 the arm stops at each waypoint. If it is faster, the arm
-/// stops at a corner. Also if it is faster, waypoints closer to each other than the blend are passed on a straighter
-/// line, within the blend of each of them. If all waypoints are the same, the motion is a rest of 10 ms.
+/// rounded within `blend` rad (see [`BlendedPath`]). If `blend` is 0, the arm stops at each waypoint. If a stop at a
+/// corner is faster than rounding it, the arm stops. If it is faster, the arm passes waypoints that are closer to each
+/// other than the blend on a straighter line. This line is within the blend of each waypoint. If all waypoints are the
+/// same, the motion is a rest of 10 ms.
 ///
-/// A waypoint with a time is passed at that time, to half a millisecond. If it could be passed earlier, the motion
-/// since the previous waypoint with a time is slowed down. If both waypoints are at the same place, the arm rests
-/// between them. Legs after the last given time are as fast as possible.
+/// The motion passes a waypoint with a time at this time, within half a millisecond. If an earlier time is possible,
+/// the motion since the previous waypoint with a time is slowed down. If these two waypoints are at the same position,
+/// the arm stays at rest between the two times. Legs after the last specified time are as fast as possible.
 ///
 /// # Errors
 ///
@@ -86,7 +87,7 @@ pub fn through(
         return Ok(reasons::explained(chosen.motion, limits, arm));
     }
     match on_time(&path, &given, limits, arm) {
-        // Another path may be faster.
+        // A different path may be faster.
         Err(PlanError::TooEarly { .. }) if blend > 0.0 => {
             let chosen = choose::fastest(path, blend, &keep, limits, arm)?;
             on_time(&chosen.path, &given, limits, arm)
@@ -95,8 +96,8 @@ pub fn through(
     }
 }
 
-/// Plans a motion from the first waypoint of a route to its last, as fast as the limits permit. `times` contains the
-/// times of its waypoints, with the same meaning as in [`Waypoint`] and [`through`].
+/// Plans a motion from the first waypoint of a route to the last waypoint, as fast as the limits permit. `times`
+/// contains the times of the waypoints, as in [`Waypoint`] and [`through`].
 ///
 /// # Errors
 ///
@@ -119,7 +120,7 @@ pub fn on_route(
     if given.len() < 2 { along(route, limits, arm) } else { on_time(route, &given, limits, arm) }
 }
 
-/// Returns a rest at equal waypoints that ends at the last given time.
+/// Returns a motion without movement for equal waypoints, which ends at the last specified time.
 fn rest(positions: &[JointVec], given: &[(usize, f64)]) -> Motion {
     let mut rest = p2p::standing(&positions[0], &positions[positions.len() - 1], positions.len());
     let last = given[given.len() - 1];
@@ -131,7 +132,7 @@ fn rest(positions: &[JointVec], given: &[(usize, f64)]) -> Motion {
     rest
 }
 
-/// Returns index and time of the waypoints with a time. The first waypoint always has the time 0.
+/// Returns the index and the time of each waypoint that has a time. The first waypoint always has the time 0.
 fn given_times(waypoints: &[Waypoint]) -> Result<Vec<(usize, f64)>, PlanError> {
     let mut given: Vec<(usize, f64)> = vec![(0, 0.0)];
     for (i, waypoint) in waypoints.iter().enumerate() {
@@ -150,7 +151,7 @@ fn given_times(waypoints: &[Waypoint]) -> Result<Vec<(usize, f64)>, PlanError> {
 
 /// A part of a motion between two waypoints with times.
 struct Stretch {
-    /// Indices of the waypoints.
+    /// Indices of these two waypoints.
     from: usize,
     to: usize,
     /// Wanted time, s.
@@ -167,7 +168,7 @@ impl Stretch {
     }
 }
 
-/// Corrects the speeds between consecutive given times until all times are kept.
+/// Corrects the speeds between consecutive specified times until the motion keeps all times.
 fn on_time(
     path: &impl Waypointed,
     given: &[(usize, f64)],
@@ -181,7 +182,7 @@ fn on_time(
         share: 1.0,
         late: 0,
     };
-    // Between waypoints at one position the arm rests.
+    // Between waypoints at one position, the arm is at rest.
     let (rests, mut stretches): (Vec<Stretch>, Vec<Stretch>) =
         given.windows(2).map(between).partition(|s| path.is_one_place(s.from, s.to));
     let motion = moving_on_time(path, &mut stretches, limits, arm)?;
@@ -195,8 +196,8 @@ fn on_time(
     Ok(motion)
 }
 
-/// Keeps the times of stretches in which the arm moves. Lowers the speed of each stretch until its duration is nearly
-/// the wanted one, then corrects the remainder by a change of rate.
+/// Corrects the times of stretches in which the arm moves. Reduces the speed of each stretch until its duration is
+/// close to the requested duration. Then corrects the remaining difference by a change of rate.
 fn moving_on_time(
     path: &impl Waypointed,
     stretches: &mut [Stretch],
@@ -204,7 +205,8 @@ fn moving_on_time(
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let mut choices = Choices::default();
-    // Speed factor for parts without a given time, lowered if the changes of rate leave no margin.
+    // Speed factor for parts without a specified time. The factor is reduced if no margin remains for the changes of
+    // rate.
     let mut room = 1.0f64;
     for attempt in 0..CORRECTIONS {
         let share_of = |waypoint: usize| {
@@ -216,7 +218,7 @@ fn moving_on_time(
             let is_late = s.share >= 1.0 && s.takes(&motion) > s.wanted + ON_TIME;
             s.late = if is_late { s.late + 1 } else { 0 };
         }
-        // The neighbours may still become faster, except in the first attempt, which is the fastest motion.
+        // The adjacent stretches may still become faster, except in the first attempt, which is the fastest motion.
         let most = if attempt == 0 { 0 } else { LATE_MAX };
         if let Some(late) = stretches.iter().find(|s| s.late > most) {
             return Err(too_early(late, motion, limits, arm));
@@ -243,7 +245,7 @@ fn moving_on_time(
             s.share = (s.share * damped).clamp(SLOWEST, 1.0);
         }
     }
-    // A stretch at full speed leaves no margin for changing from one rate to the next.
+    // In a stretch at full speed, no margin remains for a change from one rate to the next.
     let motion = along_at(path, limits, arm, &|_| 1.0, &mut choices)?;
     let tightness = |s: &&Stretch| s.takes(&motion) / s.wanted;
     match stretches.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b))) {
@@ -252,7 +254,7 @@ fn moving_on_time(
     }
 }
 
-/// Returns the stretches as parts of a motion, and the parts without a given time between them.
+/// Returns the stretches, and the parts without a specified time between two stretches, as parts of a motion.
 fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     let times = &motion.waypoint_times;
     let mut parts = Vec::with_capacity(stretches.len() + 1);
@@ -270,7 +272,7 @@ fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     parts
 }
 
-/// Returns the error for a stretch that takes longer than permitted, with the limit that binds it.
+/// Returns the error for a stretch that takes longer than permitted, with the limit that determines its duration.
 fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> PlanError {
     let motion = reasons::explained(motion, limits, arm);
     let (from, to) = (motion.waypoint_times[late.from], motion.waypoint_times[late.to]);
@@ -293,7 +295,7 @@ fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDy
     }
 }
 
-/// Where no limit is reached, adds the given times as the binding limit.
+/// If no limit is reached in an interval, adds the specified times as its binding limit.
 fn with_given_times(binding: &mut Vec<Binding>, motion: &Motion, stretches: &[Stretch]) {
     let mut all: Vec<Binding> = Vec::new();
     for s in stretches {

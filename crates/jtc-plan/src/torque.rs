@@ -1,15 +1,15 @@
-//! Torque of a motion, as the controller will command it.
+//! Torque of a motion, as the controller commands it.
 use jtc_core::{Config, Friction, friction};
 use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Share of a joint's torque limit that holding the joint may use, without friction. At 98 %, joints have been observed
-/// to fall.
+/// Maximum holding torque of a joint without friction, as a share of the torque limit. At a share of 98 %, joints fell
+/// in tests.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Share of the torque available above holding that a motion may use with every margin, and its minimum as a share of
-/// the limit.
+/// Share of the torque above the holding torque that a motion may use with any margin, and the minimum of this torque
+/// as a share of the limit.
 const MOTION_SHARE: f64 = 0.25;
 const MOTION_LEAST: f64 = 0.02;
 
@@ -20,7 +20,7 @@ pub struct ArmDynamics<'a> {
     dynamics: Dynamics,
     rotor: JointVec,
     friction: Option<&'a Friction>,
-    /// Bearing temperatures, °C. The temperature that gives the higher torque is used.
+    /// Bearing temperatures, °C. The model uses the temperature with the higher torque.
     temperatures: [f64; 2],
     sign_width: f64,
     ranges: FrictionRanges,
@@ -38,8 +38,8 @@ struct FrictionRanges {
 }
 
 impl<'a> ArmDynamics<'a> {
-    /// Creates the model from the arm `model`, the payload, gravity and rotors of `config`, and `friction` if the
-    /// controller compensates for it, at a bearing temperature of 30 °C.
+    /// Creates the model for a bearing temperature of 30 °C from the arm `model`, and from the payload, gravity and
+    /// rotors of `config`. `friction` is set if the controller compensates for friction.
     pub fn new(config: &Config, model: &ArmModel, friction: Option<&'a Friction>) -> Self {
         let step = config.joints.each_ref().map(|j| j.velocity_max / STEPS as f64);
         let arm = Self {
@@ -58,8 +58,8 @@ impl<'a> ArmDynamics<'a> {
         self.at_temperatures([temperature; 2])
     }
 
-    /// Returns the model at two bearing temperatures, °C. In every state the temperature with the higher torque is
-    /// used: cold bearings need more torque to speed up, warm bearings more to slow down.
+    /// Returns the model at two bearing temperatures, °C. In every state, the temperature with the higher torque is
+    /// used. Cold bearings need more torque to accelerate, and warm bearings need more torque to decelerate.
     pub fn at_temperatures(self, temperatures: [f64; 2]) -> Self {
         Self { temperatures, ..self }.with_ranges()
     }
@@ -99,13 +99,13 @@ impl<'a> ArmDynamics<'a> {
         if step <= STEPS {
             return (low, high);
         }
-        // Above the highest speed of the arm.
+        // This speed is above the highest speed of the arm.
         let friction = self.frictions(j, fastest);
         (low.min(friction.0), high.max(friction.1))
     }
 
-    /// Returns the lowest and highest friction up to a speed, interpolated linearly between two steps so that they are
-    /// continuous, and the slopes of both with respect to the speed.
+    /// Returns the lowest and highest friction up to a speed, and the slopes of both with respect to the speed. The
+    /// values are interpolated linearly between two steps, so that they are continuous.
     pub(crate) fn friction_line(&self, j: usize, fastest: f64) -> (f64, f64, f64, f64) {
         if self.friction.is_none() {
             return (0.0, 0.0, 0.0, 0.0);
@@ -117,7 +117,7 @@ impl<'a> ArmDynamics<'a> {
         let (u, (low, high), (low_after, high_after)) = if at < STEPS {
             (steps + 1.0 - at as f64, ranges[at], ranges[at + 1])
         } else {
-            // Above the highest speed of the arm.
+            // This speed is above the highest speed of the arm.
             let (u, step) = (steps.fract(), self.ranges.step[j].copysign(fastest));
             let with = |speed: f64| {
                 let (friction, (low, high)) = (self.frictions(j, speed), ranges[STEPS]);
@@ -129,7 +129,7 @@ impl<'a> ArmDynamics<'a> {
         (low + u * low_by, high + u * high_by, low_by * by, high_by * by)
     }
 
-    /// Returns the joint torques that the controller commands at `state` if the arm follows exactly, N·m.
+    /// Returns the joint torques that the controller commands at `state` if the arm follows the motion exactly, N·m.
     pub fn torque(&self, state: &State) -> JointVec {
         let mut torque = self.rigid(&state.position, &state.velocity, &state.acceleration);
         for (j, torque) in torque.iter_mut().enumerate() {
@@ -138,10 +138,10 @@ impl<'a> ArmDynamics<'a> {
         torque
     }
 
-    /// Returns the torque that a motion may use of the joint with index `j` if holding the arm takes `hold`, N·m: the
-    /// limit minus the margin. If gravity and breakaway friction leave less, it is their sum plus a quarter of the
-    /// remaining limit, or plus 2 % of the limit if that is more. The arm can then always enter and leave a pose that
-    /// it can hold.
+    /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`. This
+    /// is the limit minus the margin. If gravity and breakaway friction need almost this torque, the result is their
+    /// sum plus a quarter of the remaining torque, but at least plus 2 % of the limit. Therefore the arm can always
+    /// move to and from a pose that it can hold.
     pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
         let (whole, margin) = (limits.torque[j], limits.margin[j]);
         if margin == 0.0 {
@@ -166,9 +166,9 @@ impl<'a> ArmDynamics<'a> {
         self.dynamics.inverse(position, &[0.0; JOINTS], &[0.0; JOINTS])
     }
 
-    /// Returns the torque that compensates for the friction of the joint with index `j` at `velocity` (rad/s), N·m, at
-    /// the temperature with the larger total of friction and `rigid`. A velocity outside the table uses the nearest
-    /// value in it.
+    /// Returns the torque (N·m) that compensates for the friction of the joint with index `j` at `velocity` (rad/s). Of
+    /// the two temperatures, uses the one with the larger sum of friction and `rigid`. For a velocity outside the
+    /// friction table, the nearest value in the table is used.
     pub(crate) fn friction(&self, j: usize, velocity: f64, rigid: f64) -> f64 {
         let (low, high) = self.frictions(j, velocity);
         if (rigid + high).abs() >= (rigid + low).abs() { high } else { low }

@@ -1,13 +1,13 @@
-//! Motions without a jerk limit: trapezoidal speed profiles.
+//! Motions without a jerk limit, which have trapezoidal speed profiles.
 use crate::motion::{Motion, Piece};
 use crate::{JOINTS, JointVec, Limits};
 
 /// A trapezoidal speed profile from rest to rest.
 #[derive(Clone, Copy, Debug)]
 struct Trapezoid {
-    /// Acceleration, with the sign of the movement.
+    /// Acceleration, with the sign of the motion.
     acceleration: f64,
-    /// Time to reach the highest speed, and to stop from it, s.
+    /// Time to accelerate to the highest speed, which is also the time to stop from it, s.
     ramp: f64,
     /// Time at the highest speed, s.
     cruise: f64,
@@ -29,7 +29,7 @@ impl Trapezoid {
         2.0 * self.ramp + self.cruise
     }
 
-    /// Returns the same motion, taking `factor` times as long.
+    /// Returns the motion with `factor` times the duration.
     fn stretched(&self, factor: f64) -> Self {
         Self {
             acceleration: self.acceleration / (factor * factor),
@@ -53,8 +53,8 @@ impl Trapezoid {
     }
 }
 
-/// Plans from rest to rest: on a straight line if that takes no longer, else each joint separately in the time of the
-/// slowest joint.
+/// Plans a motion from rest to rest. The path is a straight line if this does not increase the duration. If it does,
+/// each joint moves separately, in the time of the slowest joint.
 pub(crate) fn straight_or_joined(from: &JointVec, to: &JointVec, limits: &Limits) -> Motion {
     let way: JointVec = std::array::from_fn(|j| to[j] - from[j]);
     let mut parts: [Trapezoid; JOINTS] =

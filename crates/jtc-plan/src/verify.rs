@@ -1,20 +1,20 @@
-//! Checks which share of its limits a motion uses, including between samples, and slows the motion down until the
-//! limits hold.
+//! Verification of the share of its limits that a motion uses, including between samples. A motion that exceeds a limit
+//! is slowed down.
 use jtc_wire::Joint;
 
 use crate::motion::{Motion, Piece};
 use crate::torque::HOLD_SHARE;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Share of a limit that rounding may add to it.
+/// Tolerance of a limit for rounding, as a share of the limit.
 const ROUNDING: f64 = 1e-9;
 /// Time between torque samples, s.
 const TORQUE_STEP: f64 = 0.004;
-/// Share of its limit that the torque may reach at the samples. Between samples it may be higher.
+/// Share of the torque limit that the torque may reach at the samples. Between samples, the torque may be higher.
 const TORQUE_SHARE: f64 = 0.9985;
 /// Time factor above which the limit that required the slowdown is considered binding.
 const MUCH: f64 = 1.01;
-/// Maximum number of torque samples. In a longer motion they are further apart.
+/// Maximum number of torque samples. In a longer motion, the samples are further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
 /// Maximum time factor of a motion that is slowed down because of its torque.
 const SLOWEST: f64 = 64.0;
@@ -23,14 +23,14 @@ const SLOWEST: f64 = 64.0;
 pub(crate) fn with_table(limits: &Limits, arm: Option<&ArmDynamics>) -> Limits {
     let mut limits = limits.clone();
     for (j, velocity) in limits.velocity.iter_mut().enumerate() {
-        // Slightly below the last row of the table, so that rounding does not lead beyond it.
+        // The limit is slightly below the last row of the table, so that rounding cannot exceed this row.
         let table = arm.map_or(f64::INFINITY, |arm| arm.velocity_max(j) * (1.0 - 1e-4));
         *velocity = velocity.min(table);
     }
     limits
 }
 
-/// Slows a motion down until all limits hold.
+/// Slows a motion down until it keeps all limits.
 pub(crate) fn finished(
     motion: Motion,
     limits: &Limits,
@@ -44,7 +44,7 @@ pub(crate) fn finished(
     }
 }
 
-/// Slows a motion down until the velocity, acceleration and jerk limits hold.
+/// Slows a motion down until it keeps the velocity, acceleration and jerk limits.
 pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motion, PlanError> {
     let stretch = motion.pieces.iter().map(|p| kinematic_stretch(p, limits)).fold(1.0, f64::max);
     if !stretch.is_finite() {
@@ -53,19 +53,20 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// Returns the time factor that a piece needs to keep the velocity, acceleration and jerk limits; below 1 if they hold
-/// already.
+/// Returns the time factor that a piece needs to keep the velocity, acceleration and jerk limits; below 1 if the piece
+/// already keeps these limits.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
         let h = piece.length;
-        // Time is measured in lengths of the piece.
+        // Time is measured in durations of the piece.
         let [_, c1, c2, c3, c4, c5] = piece.coefficients[j];
         let velocity = [c1, 2.0 * c2 * h, 3.0 * c3 * h * h, 4.0 * c4 * h.powi(3), 5.0 * c5 * h.powi(4)];
         let acceleration = [2.0 * c2, 6.0 * c3 * h, 12.0 * c4 * h * h, 20.0 * c5 * h.powi(3)];
         let jerk = [6.0 * c3, 24.0 * c4 * h, 60.0 * c5 * h * h];
         let of = |p: &[f64], limit: f64| largest(p, limit) / limit;
-        // Values within their limit need no root. Most values are within it, and roots take time.
+        // For values within their limit, the function computes no root. Most values are within their limit, and
+        // computing roots takes time.
         let root = |share: f64, root: fn(f64) -> f64| if share > 1.0 { root(share) } else { share };
         most = most.max(of(&velocity, limits.velocity[j]));
         most = most.max(root(of(&acceleration, limits.acceleration[j]), f64::sqrt));
@@ -79,12 +80,13 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     most
 }
 
-/// Returns the time factor that a piece needs for sufficient torque at a few samples. Only the part of the torque that
-/// depends on the speed can be reduced. Returns 1 if the torque is sufficient, or if it is too small at every speed.
+/// Returns the time factor that a piece needs so that the torque is sufficient at a few samples. Only the part of the
+/// torque that depends on the speed can be reduced. Returns 1 if the torque is sufficient, or if it is too small at
+/// every speed.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
     let mut most = 1.0f64;
-    // With a jerk limit, no acceleration jumps between pieces, and the start was already checked as the end of the
-    // previous piece.
+    // With a jerk limit, the acceleration does not jump between pieces. The start of a piece was already checked as the
+    // end of the previous piece.
     let same = usize::from(limits.has_jerk());
     for t in moments(piece, TORQUE_STEP.max(piece.length / 8.0), limits, arm).into_iter().skip(same) {
         let state = piece.at(t);
@@ -109,13 +111,13 @@ pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) 
     most
 }
 
-/// Returns an upper bound of a polynomial's magnitude on 0..1, exact to a thousandth if it is above `limit`. Uses the
-/// Bernstein coefficients, whose range always contains the polynomial (Farouki 2012).
+/// Returns an upper bound of a polynomial's magnitude on 0..1, accurate to a thousandth if it is above `limit`. Uses
+/// the Bernstein coefficients, whose range always contains the polynomial (Farouki 2012).
 fn largest(polynomial: &[f64], limit: f64) -> f64 {
     hull(&bernstein(polynomial)[..polynomial.len()], limit, 6)
 }
 
-/// Returns the Bernstein coefficients on 0..1.
+/// Returns the Bernstein coefficients of the polynomial on 0..1.
 fn bernstein(polynomial: &[f64]) -> [f64; 5] {
     let degree = polynomial.len() - 1;
     let mut bernstein = [0.0; 5];
@@ -140,7 +142,7 @@ fn hull(b: &[f64], limit: f64, depth: u8) -> f64 {
     if depth == 0 || bound <= limit || bound <= reached * (1.0 + 1e-6) {
         return bound;
     }
-    // Halves the interval (de Casteljau).
+    // The interval is divided into two halves (de Casteljau).
     let (mut work, mut left, mut right) = ([0.0; 5], [0.0; 5], [0.0; 5]);
     work[..=n].copy_from_slice(b);
     for i in 0..=n {
@@ -153,7 +155,7 @@ fn hull(b: &[f64], limit: f64, depth: u8) -> f64 {
     hull(&left[..=n], limit, depth - 1).max(hull(&right[..=n], limit, depth - 1))
 }
 
-/// Parts of the torque at a place of the motion, N·m, and the time of the place.
+/// Parts of the torque at one point of the motion, N·m, and the time of this point.
 struct Load {
     time: f64,
     hold: JointVec,
@@ -161,7 +163,7 @@ struct Load {
     velocity: JointVec,
 }
 
-/// Slows a motion down until the torque suffices.
+/// Slows a motion down until the torque is sufficient.
 fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<Motion, PlanError> {
     holds_where_it_rests(&motion, limits, arm)?;
     let loads = loads(&motion, limits, arm);
@@ -177,7 +179,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     };
     let mut factor = 1.0;
     let mut slowed = None;
-    // Loads that exceeded the limit so far. Most loads have enough torque at every speed.
+    // Loads that have exceeded the limit so far. Most loads have enough torque at every speed.
     let mut some: Vec<&Load> = Vec::new();
     loop {
         let before = some.len();
@@ -196,11 +198,11 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     Ok(Motion { slowed, ..motion.stretched(factor) })
 }
 
-/// Time, joint, torque and torque limit at a place with too little torque.
+/// Time, joint, torque and torque limit at a point at which the torque is not sufficient.
 type Over = (f64, Joint, f64, f64);
 
-/// Returns the smallest time factor above `least` for a motion without a place that is `over`, and the last joint that
-/// was over; `whole` are the torque limits.
+/// Returns the smallest time factor above `least` with which no point of the motion is `over`, and the last joint that
+/// was over. `whole` contains the torque limits.
 fn factor_for(
     motion: &Motion,
     whole: &JointVec,
@@ -228,7 +230,7 @@ fn factor_for(
     Ok((slow, joint))
 }
 
-/// Returns the last waypoint passed at `time`, counted from 1.
+/// Returns the number (from 1) of the last waypoint that the motion has passed at `time`.
 fn waypoint_at(motion: &Motion, time: f64) -> usize {
     motion.waypoint_times.partition_point(|t| *t <= time).max(1)
 }
@@ -243,7 +245,8 @@ fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> 
     Ok(())
 }
 
-/// Checks that the arm, if there is one, can be held at a place. The error contains `waypoint`, counted from 1.
+/// Checks that the arm can be held at a position, if the dynamics of the arm are known. The error contains `waypoint`,
+/// counted from 1.
 pub(crate) fn holds(
     position: &JointVec,
     waypoint: usize,
@@ -262,10 +265,10 @@ pub(crate) fn holds(
     Ok(())
 }
 
-/// Returns the moments of a piece at which its torque is sampled, s from its start: both ends, because the acceleration
-/// may jump there; moments between them at most `step` apart; and the moments at which the speed of a joint is so high
-/// that the sign of its friction reaches ±1. A piece with higher accelerations inside than at its ends has more
-/// moments.
+/// Returns the times at which the torque of a piece is sampled, in seconds after its start. These are both ends,
+/// because the acceleration may jump there, and times between the ends that are at most `step` apart. The times at
+/// which the sign of the friction of a joint reaches ±1 are also included. A piece with higher accelerations inside
+/// than at its ends has more sample times.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };
     let count = (piece.length / step).ceil().max(least) as usize;
@@ -298,7 +301,7 @@ fn loads(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Vec<Load> {
     let step = TORQUE_STEP.max(motion.duration() / SAMPLES_MAX);
     let mut loads = Vec::new();
     for (i, piece) in motion.pieces.iter().enumerate() {
-        // With a jerk limit, no acceleration jumps between pieces.
+        // With a jerk limit, the acceleration does not jump between pieces.
         let same = usize::from(i > 0 && limits.has_jerk());
         for t in moments(piece, step, limits, arm).into_iter().skip(same) {
             let s = piece.at(t);

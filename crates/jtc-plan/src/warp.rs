@@ -1,18 +1,18 @@
-//! Runs a motion on the same path at other times: each part runs at its own rate, with smooth transitions between the
-//! rates.
+//! Change of the timing of a motion without a change of its path. Each part has its own rate, with smooth transitions
+//! between the rates.
 use crate::Limits;
 use crate::compose::Section;
 use crate::law::{Law, Phase};
 use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 
-/// Maximum duration of a change of rate: in s, and as a share of the shorter part.
+/// Maximum duration of a change of rate, in s and as a share of the shorter adjacent part.
 const CHANGE: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.4;
 /// Speed below which a motion is considered at rest, rad/s.
 const RESTS: f64 = 1e-9;
 
-/// Part of a motion, from the end of the previous part to `end` (s), with its wanted duration, s.
+/// Part of a motion, from the end of the previous part to `end` (s), with its requested duration, s.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Part {
     pub end: f64,
@@ -33,8 +33,8 @@ impl Path for InTime<'_> {
     }
 }
 
-/// Returns the motion in which each part has its wanted duration, up to rounding. The caller must check the limits
-/// again.
+/// Returns the motion in which each part has its requested duration, except for rounding. The caller must check the
+/// limits again.
 pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion {
     let parts: Vec<Part> = parts.iter().copied().filter(|p| p.wanted > 0.0).collect();
     let changes = changes(motion, &parts);
@@ -56,9 +56,9 @@ pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion
     warped
 }
 
-/// Stretches each part separately, because all parts begin and end at rest.
+/// Each part is stretched separately, because all parts begin and end at rest.
 fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
-    // For each part: previous end, start before and after stretching, factor.
+    // Values for each part: end of the previous part, start before and after stretching, and time factor.
     let (mut before, mut after) = (0.0, 0.0);
     let mut scales = Vec::with_capacity(parts.len());
     for part in parts {
@@ -88,7 +88,7 @@ fn changes(motion: &Motion, parts: &[Part]) -> Vec<f64> {
     parts.windows(2).map(change).collect()
 }
 
-/// Returns the old motion's time as a function of the new motion's time.
+/// Returns the time in the old motion as a function of the time in the new motion.
 fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     let begins = std::iter::once(0.0).chain(parts.iter().map(|p| p.end));
     let lengths: Vec<f64> = parts.iter().zip(begins).map(|(p, begin)| p.end - begin).collect();
@@ -115,11 +115,11 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// Returns the rates that give each part its wanted duration. Half of each change of rate happens in the part before
-/// it, and half in the part after it.
+/// Returns the rates with which each part has its requested duration. Half of each change of rate is in the part before
+/// the change, and half is in the part after it.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
-    // A twelfth of the duration of the change: the effect of half a change on the distance.
+    // The factor is a twelfth of the duration of the change, which is the effect of half a change on the distance.
     for _ in 0..60 {
         for i in 0..parts.len() {
             let mut way = lengths[i];

@@ -1,4 +1,4 @@
-//! Paths of any form, invalid input, long paths, and binding limits.
+//! Tests of paths of any form, invalid input, long paths, and binding limits.
 use std::f64::consts::TAU;
 
 use jtc_core::{Config, Parameters, Payload};
@@ -47,7 +47,7 @@ fn a_curve_is_followed_within_all_limits() {
             let path = Lissajous { turns: 2.0, size };
             let motion = along(&path, &limits, Some(&arm)).unwrap();
             let count = (motion.duration() / H) as usize;
-            // The places of the curve must be next to the motion, in order.
+            // The points of the curve must be close to the motion, in order.
             let mut s = 0.0;
             for k in 0..=count {
                 let p: [JointVec; 4] = std::array::from_fn(|i| motion.at((k + i) as f64 * H).position);
@@ -166,19 +166,19 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
         assert!(holding && waypoint == 2 && joint.number() == 2 && torque > limit, "{error}");
         assert!(error.to_string().contains("holding the arm there"), "{error}");
     }
-    // If the position occurs at two consecutive waypoints, the error contains the first of them.
+    // If the position occurs at two consecutive waypoints, the error contains the first of the two.
     for blend in [0.0, 0.05] {
         let waypoints = [[0.0; 6], stretched, stretched, [0.0; 6]].map(Waypoint::from);
         let error = through(&waypoints, blend, &limits, Some(&arm)).unwrap_err();
         assert_eq!(error.waypoint(), Some(2), "{error}");
     }
-    // Without the payload the arm can be held.
+    // Without the payload, the controller can hold the arm.
     config.payload = Payload::NONE;
     let arm = ArmDynamics::new(&config, &parameters.model, None);
     assert!(point_to_point(&[0.0; 6], &stretched, &limits, Some(&arm)).is_ok());
 }
 
-/// J-36: with any limits, velocities stay inside the friction table.
+/// J-36: with any limits, velocities stay within the range of the friction table.
 #[test]
 fn j36_velocities_stay_inside_the_friction_table() {
     let (config, parameters) = (Config::avena(), Parameters::avena());
@@ -212,7 +212,7 @@ fn a_long_move_is_bound_by_the_speed_of_the_joint_that_goes_farthest() {
     assert_eq!((first.from, first.limit), (0.0, LimitKind::Jerk));
 }
 
-/// At half of the speed a motion takes twice the time.
+/// At half of the speed, the duration of a motion is twice as long.
 #[test]
 fn a_share_of_the_speed_stretches_the_motion() {
     let limits = Limits::of(&Config::avena());

@@ -18,7 +18,7 @@ fn moves(case: &Case) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// A stop is always within the blend, so permission to round corners never costs time.
+    /// A stop is always within the blend, so a motion that may round corners is never slower.
     #[test]
     fn a_blend_is_never_slower_than_stops(seed in any::<u64>(), small in 1e-9..0.05f64) {
         let case = Case::random(seed);
@@ -31,7 +31,7 @@ proptest! {
         }
     }
 
-    /// Each part of a motion has a limit that explains its duration.
+    /// For each part of a motion, a limit explains the duration.
     #[test]
     fn what_binds_is_named_for_all_of_a_motion(seed in any::<u64>()) {
         let case = Case::random(seed);
@@ -43,8 +43,8 @@ proptest! {
         prop_assert!(rising && named >= 0.95 * motion.duration(), "seed {}: {} of {} s", seed, named, motion.duration());
     }
 
-    /// Many waypoints close together on a smooth curve take hardly longer than a few of them, and each is passed within
-    /// the blend.
+    /// A motion through many close waypoints on a smooth curve takes little longer than a motion through a few of
+    /// these. It passes each waypoint within the blend.
     #[test]
     fn more_waypoints_on_a_curve_cost_little_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
         let rng = &mut fastrand::Rng::with_seed(seed);
@@ -67,7 +67,7 @@ proptest! {
 }
 
 /// If the limits reported as binding are doubled, a motion is faster in nearly all cases. Exceptions exist because a
-/// jerk-limited law is the best of several attempts, and other limits lead to other attempts.
+/// jerk-limited law is the best of several attempts, and with other limits the attempts differ.
 #[test]
 fn what_is_named_is_what_binds() {
     let (mut faster, mut all) = (0, 0);
@@ -100,7 +100,8 @@ fn relaxed(limits: &Limits, motion: &Motion) -> Limits {
     relaxed
 }
 
-/// Checks that each waypoint is passed within the blend, and that every place is within the blend of a waypoint.
+/// Checks that the motion passes each waypoint within the blend, and that every point of the motion is within the blend
+/// of a waypoint.
 fn passes_all(motion: &Motion, positions: &[JointVec], blend: f64, seed: u64) -> Result<(), TestCaseError> {
     let distance = |a: &JointVec, b: &JointVec| (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max);
     let places: Vec<JointVec> =

@@ -1,4 +1,4 @@
-//! Flange lines that the arm cannot follow: the error and its place.
+//! Flange lines that the arm cannot follow, with the error and its location.
 use crate::{lines, robots};
 
 use std::f64::consts::PI;
@@ -12,8 +12,8 @@ fn line(model: &ArmModel, q: &JointVec, to: &Pose) -> PoseError {
     FlangePath::new(&Kinematics::new(model, &WIDE), q, &[Leg::Line { to: *to }], 0.0).unwrap_err()
 }
 
-/// A spherical wrist turns about axis 5 through 0. The error occurs on the line, at the angle that is considered near
-/// the singular pose.
+/// A spherical wrist rotates about axis 5 and passes the position 0. The error occurs on the line, at the angle that
+/// counts as near the singular pose.
 #[test]
 fn a_line_through_a_wrist_singularity_ends_there() {
     let with = |q5: f64| [0.3, -0.8, 0.9, 0.5, q5, 0.4];
@@ -31,8 +31,8 @@ fn a_line_through_a_wrist_singularity_ends_there() {
         let PoseError::Singular(singular) = source else { panic!("{source}") };
         assert_eq!((leg, singular.kind), (1, SingularKind::Wrist));
         assert!(singular.smallest < SINGULAR);
-        // A turn of 1 rad has the length 0.25 m. The wrist axes are aligned after 0.4 rad of 1 rad, to within less than
-        // 2°.
+        // A rotation of 1 rad counts as a length of 0.25 m. After 0.4 rad of 1 rad, the wrist axes are aligned to less
+        // than 2°.
         let turned = distance / 0.25;
         let chord = difference(&robots::pose(&model, &from), &to).0;
         if chord < 1e-9 {
@@ -52,7 +52,7 @@ fn three_parallel_axes_have_the_same_wrist() {
     assert!(joints.contains(&4) && joints.contains(&6) && !joints.contains(&1), "{joints:?}");
 }
 
-/// A line leads to a pose in which the arm is stretched to within half a degree.
+/// A line ends in a pose in which the arm is stretched, except for half a degree.
 #[test]
 fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     for (model, stretched) in [(robots::ur5(), 0.01), (robots::kr5(), PI / 2.0 - 0.12f64.atan2(0.62) - 0.01)]
@@ -83,8 +83,8 @@ fn a_line_over_the_base_ends_at_the_shoulder() {
     assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
 }
 
-/// Both ends are within reach, but the positions between them are not: they are in the column around the axis of joint
-/// 1 that a PUMA 560 cannot enter.
+/// Both ends are within reach, but the positions between the ends are not. These are in the column around the axis of
+/// joint 1 that a PUMA 560 cannot enter.
 #[test]
 fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let model = robots::puma560();
@@ -95,7 +95,7 @@ fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let (leg, distance, source) = on_leg(line(&model, &q, &to));
     let PoseError::OutOfReach { missing, .. } = source else { panic!("{source}") };
     assert!(leg == 1 && missing > 0.0, "{missing}");
-    // The column has the radius of the shoulder's offset.
+    // The radius of the column is the offset of the shoulder.
     let inside = begin - distance;
     assert!((-0.15005..0.15005).contains(&inside), "{inside}");
     assert!((missing - (0.15005 - inside.abs())).abs() < 1e-6, "{missing} {inside}");

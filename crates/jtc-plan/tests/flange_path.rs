@@ -14,7 +14,7 @@ fn arms() -> [(&'static str, ArmModel); 4] {
     [("avena", robots::avena()), ("UR5", robots::ur5()), ("KR 5", robots::kr5()), ("Jaco 2", robots::jaco2())]
 }
 
-/// A start position away from singular poses, for each arm.
+/// A start position that is not near a singular pose, for each arm.
 fn start() -> impl Strategy<Value = JointVec> {
     (-3.0..3.0f64, -1.2..-0.4f64, 0.6..1.6f64, -1.0..1.0f64, 0.5..1.5f64, -2.0..2.0f64)
         .prop_map(|(a, b, c, d, e, f)| [a, b, c, d, e, f])
@@ -24,7 +24,7 @@ fn small(size: f64) -> impl Strategy<Value = Vec3> {
     prop::array::uniform3(-size..size)
 }
 
-/// Returns the path, or `None` if a line leads past a singular pose or out of reach.
+/// Returns the path, or `None` if a line passes near a singular pose or is out of reach.
 fn path(model: &ArmModel, q: &JointVec, legs: &[Leg], blend: f64) -> Option<FlangePath> {
     match FlangePath::new(&Kinematics::new(model, &WIDE), q, legs, blend) {
         Ok(path) => Some(path),
@@ -47,8 +47,8 @@ fn deviation(path: &FlangePath, s: f64) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
 
-    /// Each position is on the straight line between the ends, in even steps. Each orientation is turned in proportion,
-    /// about one axis.
+    /// Each position is on the straight line between the ends, at equal distances. Each orientation is rotated in
+    /// proportion to the distance, about one axis.
     #[test]
     fn lines_are_straight(q in start(), shift in small(0.3), turn in small(0.6)) {
         for (name, model) in arms() {
@@ -58,8 +58,8 @@ proptest! {
             prop_assert_eq!(path.waypoints(), vec![0.0, path.end()]);
             let (whole_shift, whole_turn) = difference(&from, &to);
             prop_assert!((path.end() - whole_shift.max(0.25 * whole_turn)).abs() < 1e-9);
-            // Between two breaks the joints turn only a little, because the planner treats this interval as one simple
-            // curve.
+            // Between two breaks, the joints must rotate only a little, because the planner treats this interval as one
+            // simple curve.
             let ends: Vec<f64> = [0.0].into_iter().chain(path.breaks()).chain([path.end()]).collect();
             prop_assert!(ends.windows(2).all(|pair| pair[0] < pair[1]), "{name}: {ends:?}");
             for pair in ends.windows(2) {
@@ -73,7 +73,8 @@ proptest! {
                 let here = robots::pose(&model, &at);
                 let ideal = std::array::from_fn(|i| from.position[i] + share * (to.position[i] - from.position[i]));
                 prop_assert!(norm(sub(here.position, ideal)) < 1e-9, "{name}: {}", norm(sub(here.position, ideal)));
-                // The angles to both ends add up only on the shortest rotation from one orientation to the other.
+                // The sum of the angles to both ends is the total angle only on the shortest rotation between the two
+                // orientations.
                 let (a, b) = (difference(&from, &here).1, difference(&here, &to).1);
                 prop_assert!((a - share * whole_turn).abs() < 1e-7 && (b - (1.0 - share) * whole_turn).abs() < 1e-7);
                 prop_assert!((0..JOINTS).all(|j| (at[j] - last[j]).abs() < 0.3), "{name}: {last:?} {at:?}");
@@ -99,7 +100,7 @@ proptest! {
             if !at_break {
                 prop_assert!(deviation(&path, s) < 2e-3, "{name}: {} at {s}", deviation(&path, s));
             }
-            // A blended corner must cause no jump in either derivative.
+            // A blended corner must not cause a jump in either derivative.
             if path.stops().is_empty() {
                 for corner in path.breaks() {
                     let (before, after) = (path.at(corner - 1e-7), path.at(corner + 1e-7));
@@ -113,7 +114,7 @@ proptest! {
         }
     }
 
-    /// The flange stays on the circle through the points.
+    /// The flange stays on the circle through the three points.
     #[test]
     fn arcs_are_round(
         q in start(), radius in 0.03..0.2f64, plane in small(3.0), angles in (0.3..3.0f64, 0.3..2.5f64), turn in small(0.4)
@@ -144,7 +145,7 @@ proptest! {
         }
     }
 
-    /// The flange leaves the legs only within the radius of the corner, and stays inside its triangle.
+    /// The flange leaves the legs only within the radius of the corner, and stays inside the triangle of the corner.
     #[test]
     fn corners_are_cut_within_their_radius(
         q in start(), shifts in prop::array::uniform2(small(0.2)), blend in 0.0..0.05f64
@@ -203,7 +204,7 @@ proptest! {
                 prop_assert!(with(top + 1e-6).is_ok(), "{:?}", with(top + 1e-6));
                 let refused = match with(top - 1e-6) {
                     Ok(other) => {
-                        // Near a singular pose the joints may have another path, which stays inside the limits.
+                        // Near a singular pose, the joints may follow a different path, which stays inside the limits.
                         let at = |k: u32| sign * other.at(other.end() * f64::from(k) / 1000.0).position[joint];
                         prop_assert!((0..=1000).all(|k| at(k) < top));
                         continue;
@@ -220,7 +221,8 @@ proptest! {
         }
     }
 
-    /// Reduces one joint's range. The error is at the place at which the unlimited path leaves that range.
+    /// The test reduces the position range of one joint. The error is at the point at which the unlimited path leaves
+    /// that range.
     #[test]
     fn a_limit_on_the_way_is_found_where_it_is(
         q in start(), shift in small(0.3), turn in small(0.5), joint in 0..JOINTS,
@@ -232,7 +234,7 @@ proptest! {
         let at = |s: f64| free.at(s).position[joint];
         let all: Vec<f64> = (0..=1000).map(|k| at(free.end() * f64::from(k) / 1000.0)).collect();
         let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // The position must rise noticeably above its values at both ends.
+        // The position must be clearly higher than its values at both ends.
         prop_assume!(highest - q[joint] > 0.01);
         let mut limits = WIDE;
         limits[joint].1 = q[joint] + share * (highest - q[joint]);
@@ -243,11 +245,11 @@ proptest! {
                 prop_assert_eq!((named.index(), high), (joint, limits[joint].1));
                 prop_assert!((length - free.end()).abs() < 1e-12);
                 prop_assert!((at(distance) - value).abs() < 1e-9 && value > high && value < high + 0.03);
-                // No earlier place exceeds the limit.
+                // At no earlier point is the limit exceeded.
                 let before = all.iter().enumerate().take_while(|(k, _)| *k as f64 * free.end() / 1000.0 < distance - 0.011);
                 prop_assert!(before.into_iter().all(|(_, q)| *q <= high + 1e-9), "{distance}");
             }
-            // The pose at the end is outside the limits in every solution.
+            // In every solution for the pose at the end, a joint is outside its limits.
             PoseError::Waypoint { waypoint: 2, source } => {
                 prop_assert!(matches!(*source, PoseError::OutsideLimits { .. }), "{source}");
             }
@@ -256,7 +258,8 @@ proptest! {
     }
 }
 
-/// A motion along a path keeps the flange on its line at all times, not only at the places that the planner checks.
+/// A motion along a path keeps the flange on its line at all times. This includes the times between the points that the
+/// planner checks.
 #[test]
 fn motions_along_lines_and_arcs_stay_on_them() {
     let (config, parameters, model) = (Config::avena(), Parameters::avena(), robots::avena());

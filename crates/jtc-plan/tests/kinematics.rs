@@ -1,4 +1,4 @@
-//! Inverse kinematics, checked with forward kinematics that share no code with it.
+//! Inverse kinematics, checked with forward kinematics that share no code with the inverse kinematics.
 use crate::robots;
 
 use std::f64::consts::{PI, TAU};
@@ -13,7 +13,7 @@ use robots::difference;
 
 /// A whole turn for each joint.
 const TURN: [(f64, f64); JOINTS] = [(-PI, PI); JOINTS];
-/// A pose with a smallest singular value above this is considered away from singular poses.
+/// Smallest singular value above which a pose does not count as near a singular pose.
 const AWAY: f64 = 0.01;
 
 fn positions() -> impl Strategy<Value = JointVec> {
@@ -73,7 +73,7 @@ proptest! {
         }
     }
 
-    /// Extreme poses of the closed forms: right angles and stretched arms.
+    /// Extreme poses for the closed forms, with right angles and stretched arms.
     #[test]
     fn poses_at_and_near_singular_ones_are_reached(
         quarters in prop::array::uniform6(-2..=2i32), off in prop::array::uniform6(prop_oneof![
@@ -121,7 +121,7 @@ proptest! {
             let pose = robots::pose(&model, &q);
             let found = kin.solve(&pose, &near).unwrap();
             let nearest = kin.all(&pose).iter().map(|q| length(q, &near)).fold(f64::INFINITY, f64::min);
-            // `all` contains at most one turn more or less, and `near` is within one turn.
+            // `all` contains positions with at most one turn more or less, and `near` is within one turn.
             prop_assert!((length(&found, &near) - nearest).abs() < 1e-6);
             prop_assert!(found.iter().all(|a| a.abs() <= width));
         }
@@ -150,8 +150,7 @@ proptest! {
         }
     }
 
-    /// An arm with calibration errors of a milliradian and a millimetre from the ideal geometry, which has a closed
-    /// form.
+    /// An arm whose calibration differs by a milliradian and a millimetre from an ideal geometry with a closed form.
     #[test]
     fn an_arm_off_its_ideal_geometry_is_solved_too(
         q in positions(), off in prop::array::uniform6(prop::array::uniform6(-1e-3..1e-3f64))
@@ -173,8 +172,8 @@ fn at(position: [f64; 3]) -> Pose {
     Orientation::Rpy([0.0; 3]).at(position).unwrap()
 }
 
-/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1, and at most as high as both links together
-/// reach.
+/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1, and its height is at most the length of
+/// both links together.
 #[test]
 fn out_of_reach_says_how_far() {
     let kin = Kinematics::new(&robots::puma560(), &TURN);
@@ -194,21 +193,21 @@ fn out_of_reach_says_how_far() {
     assert!((missing - 0.10005).abs() < 1e-6, "{error}");
 }
 
-/// At the limit of the UR5's reach the flange can point outwards or sideways, but not back.
+/// At the limit of the reach of the UR5, the flange can point outwards or sideways, but not back to the base.
 #[test]
 fn an_orientation_out_of_reach_is_told_from_a_position_out_of_reach() {
     let model = robots::ur5();
     let kin = Kinematics::new(&model, &TURN);
     let q = [0.3, -1.0, 0.1, -1.5, 0.4, 0.0];
     let mut pose = robots::pose(&model, &q);
-    // A reachable place with the orientation turned by half a turn about the flange's x axis.
+    // A reachable pose, rotated by half a turn about the x axis of the flange.
     pose.rotation = pose.rotation.map(|[x, y, z]| [x, -y, -z]);
     let error = kin.solve(&pose, &q).unwrap_err();
     let PoseError::Orientation { distance, missing } = error else { panic!("{error}") };
     assert!((distance - pose.position.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < 1e-12);
     assert!(missing > 0.01 && missing < PI, "{error}");
-    // Turned back by slightly more than the missing angle, such an orientation is within reach. Turned by less, it is
-    // not, about any axis near the right one.
+    // If such an orientation is rotated back by slightly more than the missing angle, it is within reach. If it is
+    // rotated by a smaller angle, about any axis near the correct axis, it is out of reach.
     let turned = |angle: f64| {
         let (s, c) = angle.sin_cos();
         let rotation = pose.rotation.map(|[x, y, z]| [x, c * y + s * z, c * z - s * y]);
@@ -225,7 +224,7 @@ fn a_joint_outside_its_limits_is_named_with_value_and_limits() {
     let all = Kinematics::new(&model, &TURN).all(&pose);
     for joint in 0..JOINTS {
         let mut limits = TURN;
-        // No solution has the joint at that position while the other joints are unlimited.
+        // With the other joints unlimited, no solution has the joint at this position.
         let (low, high) = (0..60)
             .map(|k| (-3.0 + 0.1 * f64::from(k), -2.99 + 0.1 * f64::from(k)))
             .find(|(low, high)| all.iter().all(|q| q[joint] < low - 0.02 || q[joint] > high + 0.02))
@@ -264,7 +263,7 @@ fn what_is_no_pose_has_no_solution_and_an_error_that_says_so() {
     assert!(kin.solve(&at([1e300, 0.0, 0.0]), &[0.0; 6]).is_err());
 }
 
-/// Numbers of all kinds; most of them are invalid.
+/// Numbers of all kinds, of which most are invalid.
 fn any_number() -> impl Strategy<Value = f64> {
     let special =
         vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e300, 1e-300, 1e9];
@@ -274,7 +273,8 @@ fn any_number() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
 
-    /// An invalid pose, start or limit gives an error or no solution. The search never panics, and it always ends.
+    /// An invalid pose, start or limit results in an error or in no solution. The search never panics, and it always
+    /// ends.
     #[test]
     fn no_number_does_any_harm(
         position in prop::array::uniform3(any_number()), quaternion in prop::array::uniform4(any_number()),
@@ -319,7 +319,7 @@ fn singular_poses_have_their_names() {
         (robots::ur5(), "UR5", with(2, 0.0), Elbow, &[2, 3, 4]),
         (robots::puma560(), "PUMA 560", with(4, 0.0), Wrist, &[4, 6]),
         (robots::puma560(), "PUMA 560", with(2, -PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2, 3]),
-        // Folded arm: both links have the same length, and the wrist is next to the axis of joint 2.
+        // Folded arm whose two links have equal length, with the wrist close to the axis of joint 2.
         (robots::puma560(), "PUMA 560", with(2, PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2]),
         (robots::kr5(), "KR 5", with(4, PI), Wrist, &[4, 6]),
         (robots::kr5(), "KR 5", over_the_base(), Shoulder, &[1]),
@@ -335,7 +335,7 @@ fn singular_poses_have_their_names() {
     assert!(far.smallest > 0.05, "{far}");
 }
 
-/// A KR 5 whose wrist is over the axis of joint 1; the position is found by bisection.
+/// A KR 5 with the wrist over the axis of joint 1. The test finds this position by bisection.
 fn over_the_base() -> JointVec {
     let with = |q2: f64| [0.3, q2, 0.3, 0.4, 0.8, 0.2];
     let radius = |q2: f64| {
@@ -386,7 +386,7 @@ fn targets_are_resolved_one_after_the_other_and_errors_name_the_waypoint() {
     assert!(matches!(error, PoseError::Waypoint { waypoint: 1, .. }), "{error}");
 }
 
-/// Compares with central differences of independent forward kinematics: the velocity of the flange and the rate of its rotation.
+/// Compares the velocity of the flange and the rate of its rotation with central differences of independent forward kinematics.
 #[test]
 fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
     let q = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];
@@ -400,7 +400,8 @@ fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
                 robots::pose(&model, &moved)
             };
             let (before, here, after) = (at(-h), at(0.0), at(h));
-            // The rate of the rotation matrix times its transpose is the angular velocity as a skew-symmetric matrix.
+            // The rate of the rotation matrix, times the transposed matrix, is the angular velocity as a skew-symmetric
+            // matrix.
             let spin = |i: usize, k: usize| {
                 let rate = |m: usize| (after.rotation[i][m] - before.rotation[i][m]) / (2.0 * h);
                 (0..3).map(|m| rate(m) * here.rotation[k][m]).sum::<f64>()

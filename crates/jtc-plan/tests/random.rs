@@ -1,6 +1,6 @@
-//! Random motions on random arms, checked by samples of their positions: no limit is exceeded, no corner is cut by more
-//! than the blend, and both ends are exact and at rest. `cargo run --profile dist -p jtc-plan --example campaign`
-//! checks any number of motions.
+//! Random motions of random arms, checked by samples of their positions. No limit is exceeded, no corner is cut by more
+//! than the blend, and the motion begins and ends exactly and at rest. `cargo run --profile dist -p jtc-plan --example
+//! campaign` checks any number of motions.
 use jtc_plan::{PlanError, point_to_point, through};
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::judge;
 
 use judge::Case;
 
-/// Permitted errors: the arm cannot be held somewhere, or its payload is too heavy.
+/// Two errors are permitted: the arm cannot be held at a position, or its payload is too heavy.
 fn is_legal(error: &PlanError) -> bool {
     matches!(error, PlanError::Torque { .. })
 }

@@ -32,8 +32,8 @@ fn route(points: &[RoutePoint], blends: (f64, f64)) -> Result<Route, PlanError> 
     Route::new(&kinematics().0, points, &[0.0; JOINTS], blends)
 }
 
-/// A path in joint space, two lines, an arc of half a circle whose centre is in the middle of a vertical line, and a
-/// path in joint space.
+/// The route consists of a path in joint space, two lines, an arc and a path in joint space. The arc is half a circle
+/// whose centre is in the middle of a vertical line.
 struct Mixed {
     points: Vec<RoutePoint>,
     corners: [Pose; 3],
@@ -96,7 +96,7 @@ fn each_leg_is_of_its_kind_and_the_arm_rests_where_they_change() {
         for n in [1, 2, 6, 7] {
             assert!(speed(n) < 1e-6, "waypoint {n}: {}", speed(n));
         }
-        // The arc passes its via point without a stop; blended corners are passed without a stop too.
+        // The motion passes the via point of the arc and the blended corners without a stop.
         assert!(speed(5) > 0.1);
         assert_eq!(speed(3) > 0.05, blend_m > 0.0);
         let line = |state: &State, k: usize| off_line(state, &corners[k], &corners[k + 1]);
@@ -128,7 +128,7 @@ fn each_leg_is_of_its_kind_and_the_arm_rests_where_they_change() {
                 assert!((state.position[j] - a[j] - share * (b[j] - a[j])).abs() < 1e-7);
             }
         }
-        // The motion has no jump at any place.
+        // The motion has no jump at any point.
         let mut before = motion.at(0.0);
         for k in 1..=20_000 {
             let state = motion.at(motion.duration() * f64::from(k) / 20_000.0);
@@ -170,8 +170,8 @@ fn times_of_waypoints_on_lines_are_kept() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(32) })]
 
-    /// A line to joint positions ends at them if they are in the configuration at its start. Otherwise the error
-    /// contains the joint.
+    /// A line to joint positions ends at these positions, if their configuration is the same as at the start of the
+    /// line. If the configuration differs, the error contains the joint.
     #[test]
     fn joint_positions_at_the_end_of_a_line_are_of_its_configuration(shift in prop::array::uniform3(-0.15..0.15f64)) {
         prop_assume!(norm(shift) > 1e-3);
@@ -237,7 +237,7 @@ fn errors_name_the_waypoints_of_the_route() {
     assert_eq!(route(&points, (0.0, -1.0)).unwrap_err(), PoseError::Blend { radius: -1.0 }.into());
 }
 
-/// A leg without motion still has its own waypoint, passed at the same time.
+/// A leg without motion still has its own waypoint. The motion passes it at the time of the previous waypoint.
 #[test]
 fn waypoints_at_one_place_are_passed_at_one_time() {
     let there = moved(&at(&Q), [-0.1, 0.0, 0.0], [0.0; 3]);

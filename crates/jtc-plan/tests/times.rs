@@ -1,4 +1,4 @@
-//! Given times are kept if the limits permit, and refused otherwise.
+//! The planner keeps the specified times if the limits permit, and rejects these times otherwise.
 use jtc_core::Config;
 use jtc_plan::{LimitKind, Limits, PlanError, Waypoint, through};
 use proptest::prelude::*;
@@ -10,8 +10,9 @@ use judge::Case;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Some waypoints get later times than in the fastest motion. These times and all limits are kept. Only with
-    /// rounded corners may a time be too early, because slower neighbours slow the waypoint down.
+    /// Some waypoints have later times than in the fastest motion. The planned motion keeps these times and all limits.
+    /// A time may be too early only with rounded corners, because slower adjacent legs slow down the motion at the
+    /// waypoint.
     #[test]
     fn given_times_are_kept(
         seed in any::<u64>(),
@@ -60,7 +61,7 @@ fn a_time_that_is_too_early_is_refused_with_joint_limit_and_shortest_time() {
     let PlanError::TooEarly { from, waypoint, joint, given, shortest, .. } = error else { panic!("{error}") };
     assert_eq!((from, waypoint, joint.number()), (2, 3, 3));
     assert!((given - 0.4).abs() < 1e-9 && shortest > 0.7 && shortest < 1.0, "{given} {shortest}");
-    // The shortest time in the error is possible.
+    // The planner accepts the shortest time that the error contains.
     waypoints[2].time = Some(2.0 + shortest + 0.001);
     let motion = through(&waypoints, 0.0, &limits, None).unwrap();
     assert!((motion.duration() - 2.0 - shortest - 0.001).abs() < 5e-4);

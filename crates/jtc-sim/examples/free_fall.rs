@@ -1,10 +1,10 @@
-//! Lets arms fall freely for a second and prints their positions. Each line on stdin is an arm; for each, a line of six
-//! positions is written to stdout.
+//! Lets arms fall freely for one second and prints their positions. Each line on stdin describes an arm. For each arm,
+//! the example writes a line of six positions to stdout.
 //!
-//! A line has 154 numbers: x y z roll pitch yaw for each of 7 joints; x y z roll pitch yaw Ixx Ixy Ixz Iyy Iyz Izz mass
-//! for each of 7 links; gravity (3); rotor inertia, position and velocity for each of 6 joints. The arms have no
-//! friction, end stops and drives. The integration is RK4 in steps of 1 ms, or of the number of ms in the first
-//! argument.
+//! Each input line contains 154 numbers: x y z roll pitch yaw for each of 7 joints; x y z roll pitch yaw Ixx Ixy Ixz
+//! Iyy Iyz Izz mass for each of 7 links; gravity (3); rotor inertia, position and velocity for each of 6 joints. The
+//! arms have no friction, end stops and drives. The integration is RK4 in steps of 1 ms, or in steps of the duration
+//! (ms) in the first argument.
 use std::io::{BufRead, Write};
 
 use jtc_sim::{Arm, SimArm, SimFriction};

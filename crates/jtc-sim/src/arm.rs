@@ -1,6 +1,7 @@
-//! The true arm: rigid bodies, rotors with gears, friction, end stops and walls, integrated with Runge-Kutta in steps of at most 1 ms.
+//! Model of the true arm: rigid bodies, rotors with gears, friction, end stops and walls. The equations are integrated with the
+//! Runge-Kutta method in steps of at most 1 ms.
 //!
-//! The true arm deliberately differs from the controller's model of it: see [`ModelError`](crate::ModelError).
+//! The true arm intentionally differs from the model in the controller; see [`ModelError`](crate::ModelError).
 use jtc_core::{Config, Friction, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, LinkInertias, Payload};
 
@@ -24,17 +25,20 @@ const BRAKE_DECELERATION: f64 = 40.0;
 const BRAKED: f64 = 1e9;
 /// Smallest inertia of a rotor, kg·m². A lighter rotor would cross its whole range within a few steps.
 const LIGHTEST: f64 = 0.02;
-/// Largest turn of a joint in a sub-step, rad. A joint at 100 rad/s or more needs several sub-steps per millisecond.
+/// Largest rotation of a joint in a sub-step, rad. A joint with a speed of 100 rad/s or more needs several sub-steps
+/// per millisecond.
 const LARGEST_TURN: f64 = 0.1;
-/// Largest number of sub-steps per step because of high speed.
+/// Maximum number of sub-steps per step that a high speed requires.
 const MOST_SUBSTEPS: f64 = 32.0;
-/// Largest phase angle per sub-step of a vibration on a wall or on gears, rad. The next constant is its largest decay
-/// per sub-step.
+/// Largest phase angle of a vibration at a wall or gear in one sub-step, rad. The next constant is the largest decay of
+/// the vibration in one sub-step.
 const LARGEST_PHASE: f64 = 0.5;
 const LARGEST_DECAY: f64 = 1.0;
-/// Largest number of sub-steps per step because of walls and gears. If walls would need more, their damping is reduced.
+/// Maximum number of sub-steps per step that walls and gears require. If walls require more sub-steps, the damping of
+/// the walls is reduced.
 const MOST_STIFF_SUBSTEPS: f64 = 64.0;
-/// Decay per sub-step above which damping is reduced. Runge-Kutta is unstable from 2.7 on.
+/// Decay in one sub-step above which the damping is reduced. The Runge-Kutta method is unstable for a decay of 2.7 or
+/// more.
 const UNSTABLE_DECAY: f64 = 2.0;
 /// Time between two updates of the temperatures, s.
 const WARMING: f64 = 0.05;
@@ -43,7 +47,7 @@ const HEAT_CAPACITY: f64 = 900.0;
 /// Heat flow from a bearing to the air, W/K.
 const HEAT_FLOW: f64 = 1.2;
 
-/// Properties of an arm, without state.
+/// Properties of an arm, without its state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimArm {
     /// Kinematics and masses.
@@ -56,16 +60,17 @@ pub struct SimArm {
     pub rotor_inertia: JointVec,
     /// Friction per joint.
     pub friction: [SimFriction; JOINTS],
-    /// Speed up to which friction polynomials are valid, rad/s. Above it, friction continues as a straight line that
-    /// does not fall.
+    /// Speed up to which friction polynomials are valid, rad/s. Above this speed, friction continues as a straight line
+    /// that does not decrease.
     pub polynomial_speed: JointVec,
     /// Friction around standstill.
     pub friction_model: FrictionModel,
     /// End stops per joint, rad.
     pub stops: [(f64, f64); JOINTS],
-    /// Elasticity of the gears; rigid by default. An elastic gear moves 0.01 kg·m² of the rotor's inertia to its link.
+    /// Elasticity of the gears, which are rigid by default. An elastic gear transfers 0.01 kg·m² of the rotor's inertia
+    /// to its link.
     pub gears: [Gear; JOINTS],
-    /// Largest torque of the drive, N·m. The drive limits larger requests without reporting it.
+    /// Largest torque of the drive, N·m. The drive limits larger torque commands and does not report this.
     pub torque_ceiling: JointVec,
     /// Temperature of the air and of the bearings at the start, °C.
     pub ambient: f64,
@@ -83,7 +88,7 @@ impl SimArm {
             model: parameters.model,
             payload: config.payload,
             gravity: config.gravity,
-            // A real drive always has a rotor, even if the arm file has no inertia for it.
+            // A real drive always has a rotor, even if the arm file contains no inertia for this rotor.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
             // Friction was measured only within the velocity limits of the arm.
@@ -103,11 +108,11 @@ impl Default for SimArm {
     }
 }
 
-/// An arm with its state of motion.
+/// An arm with its current state of motion.
 #[derive(Clone, Debug)]
 pub struct Arm {
     dynamics: Dynamics,
-    /// Inertias without carried payloads. The next field includes these payloads.
+    /// Inertias without carried payloads. The next field includes the carried payloads.
     bare: LinkInertias,
     carried: Vec<Payload>,
     contacts: Vec<Contact>,
@@ -115,7 +120,7 @@ pub struct Arm {
     parts: SimArm,
     friction_scale: JointVec,
     friction: FrictionTorques,
-    /// Deflection of the bristles in the friction model, rad.
+    /// Deflection of the bristles in the friction model for each joint, rad.
     bristles: JointVec,
     /// Friction heat since the last update of the temperatures, J. The next field is the time since that update, s.
     heat: JointVec,
@@ -124,25 +129,25 @@ pub struct Arm {
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
-    /// Position of the motors at the joints, through the gears, rad. Equal to the position of the links if gears are
-    /// rigid.
+    /// Position of the motors, converted to the joint side of the gears, rad. If the gears are rigid, this is the
+    /// position of the links.
     pub motor: JointVec,
-    /// Velocity of the motors at the joints, through the gears, rad/s.
+    /// Velocity of the motors, converted to the joint side of the gears, rad/s.
     pub motor_speed: JointVec,
     /// Bearing temperature, °C.
     pub temperature: JointVec,
     /// `true` for joints with a closed brake.
     pub braked: [bool; JOINTS],
-    /// Factor of a fault on the friction; normally 1.
+    /// Factor by which a fault multiplies the friction; normally 1.
     pub friction_fault: JointVec,
 }
 
 impl Arm {
-    /// Creates an arm at rest at `q`. Its friction is the friction of `parts` times `friction_scale`.
+    /// Creates an arm at rest at `q`. The friction of the arm is the friction of `parts` times `friction_scale`.
     pub fn new(parts: SimArm, friction_scale: JointVec, q: JointVec) -> Self {
         let dynamics = Dynamics::with_payload(&parts.model, parts.gravity, &parts.payload);
         let elastic = parts.gears.iter().any(Gear::is_elastic);
-        // The springs already carry their loads, so that the links are at rest.
+        // The springs of the gears already carry their loads, so that the links are at rest.
         let load = dynamics.gravity_torque(&q);
         let motor = core::array::from_fn(|j| {
             let gear = &parts.gears[j];
@@ -267,7 +272,8 @@ impl Arm {
         contacts.iter_mut().for_each(|contact| contact.follow(dynamics, q));
     }
 
-    /// Sets the payloads that the arm carries in addition to its own payload; replaces earlier ones.
+    /// Sets the payloads that the arm carries in addition to its own payload. Replaces the payloads that were set
+    /// earlier.
     pub fn set_carried(&mut self, payloads: &[Payload]) {
         if self.carried == payloads {
             return;
@@ -292,7 +298,7 @@ impl Arm {
 
     /// Returns the inertia of the rotors for a step of `dt`, kg·m². The inertia is increased if a light rotor, with
     /// steep friction or at an end stop, would have a time constant below `dt`. Fourth-order Runge-Kutta is unstable if
-    /// `dt` is 2.7 time constants or more.
+    /// `dt` is at least 2.7 time constants.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -309,7 +315,7 @@ impl Arm {
         if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
-    /// Updates temperatures and friction, which change too slowly to need an update in every millisecond.
+    /// Updates temperatures and friction, which change so slowly that an update in every millisecond is not necessary.
     fn warm(&mut self) {
         for j in 0..JOINTS {
             let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;
@@ -321,7 +327,7 @@ impl Arm {
     }
 
     /// Integrates with the classical fourth-order Runge-Kutta method. The bristles of the friction model are too stiff
-    /// for it: [`FrictionTorques::bend`] moves them with the velocities of the stages.
+    /// for this method. [`FrictionTorques::bend`] moves the bristles with the velocities of the stages.
     fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, damped: f64, dt: f64) {
         let (q0, v0, z0) = (self.q, self.qd, self.bristles);
         let half = 0.5 * dt;
@@ -371,7 +377,7 @@ impl Arm {
         self.dynamics.forward(q, qd, &sum, rotor)
     }
 
-    /// Returns the torque of the end stop; an end stop never pulls.
+    /// Returns the torque of the end stop, which can push but not pull.
     fn stop_torque(&self, j: usize, q: f64, qd: f64) -> f64 {
         let (low, high) = self.parts.stops[j];
         if q < low {
@@ -397,7 +403,7 @@ impl Arm {
 }
 
 /// Returns the speed of a joint after its brake has acted for `dt` seconds, rad/s. An external torque (N·m) against the
-/// motion adds to the braking.
+/// motion increases the braking effect.
 fn braked(speed: f64, torque: f64, inertia: f64, dt: f64) -> f64 {
     let help = if torque * speed < 0.0 { torque.abs() / inertia } else { 0.0 };
     let change = (BRAKE_DECELERATION + help) * dt;

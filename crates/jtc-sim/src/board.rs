@@ -1,4 +1,5 @@
-//! The controller's board: the controller, the receive buffers of the host link and the watchdog, connected as in the firmware.
+//! Board of the controller. The controller, the receive buffers of the host link and the watchdog are connected as in the
+//! firmware.
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;
@@ -11,13 +12,13 @@ use jtc_wire::{
     Receiver, SIMULATOR, STATUS_LEN, StoreState, UrgentWatch,
 };
 
-/// Number of the host's line; the simulation has only one line.
+/// Number of the serial line of the host. The simulation has only one serial line.
 const LINE: usize = 0;
-/// Largest number of bytes waiting for the parser, equal to the size of the ring that the board's DMA fills.
+/// Maximum number of bytes that wait for the parser. It is the size of the ring buffer that the DMA of the board fills.
 const RING: usize = 32 * 1024;
 /// Length of a tick, µs.
 const TICK_US: u32 = 1000;
-/// Largest number of bytes passed to the parser at once.
+/// Maximum number of bytes that are passed to the parser at once.
 const CHUNK: usize = 4096;
 
 /// Number of ticks for storing an arm, equal to the erase time of a flash sector.

@@ -1,5 +1,5 @@
-//! Random arms and waypoints, and a check of motions that is independent of the planner: it samples positions and
-//! computes differences.
+//! Random arms and waypoints, and a check of motions that is independent of the planner. The check samples positions
+//! and computes differences.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use jtc_plan::{ArmDynamics, JOINTS, JointVec, Limits, Motion, Waypoint};
 
 /// Time between samples, s.
 const H: f64 = 5e-4;
-/// Tolerance of limits that are checked by differences, because positions are rounded.
+/// Tolerance for limits that are checked with differences, because positions are rounded.
 const ROUNDING: f64 = 1e-6;
 
 /// An arm with limits, and waypoints.
@@ -77,7 +77,7 @@ impl Case {
         self.waypoints.iter().copied().map(Waypoint::from).collect()
     }
 
-    /// Joint torques for these differences, without and with friction.
+    /// Joint torques for these differences, first without and then with friction.
     pub(crate) fn torque(&self, dynamics: &Dynamics, q: &JointVec, v: &JointVec, a: &JointVec) -> JointVec {
         let mut torque = dynamics.inverse(q, v, a);
         for j in 0..JOINTS {
@@ -88,7 +88,7 @@ impl Case {
     }
 
     /// Returns all errors of a motion through the waypoints, and the highest used shares of the velocity, acceleration,
-    /// jerk and torque limits. With `on_legs`, also checks that the motion stays on the legs.
+    /// jerk and torque limits. If `on_legs` is set, also checks that the motion stays on the legs.
     pub(crate) fn judge(&self, motion: &Motion, on_legs: bool) -> (String, [f64; 4]) {
         let mut wrong = String::new();
         self.ends(motion, &mut wrong);
@@ -122,7 +122,7 @@ impl Case {
     fn differences(&self, motion: &Motion, wrong: &mut String) -> [f64; 4] {
         let dynamics = Dynamics::with_payload(&self.model, self.config.gravity, &self.config.payload);
         let breakaway = self.breakaway();
-        // The samples include the rest before and after the motion.
+        // The samples include the standstill before and after the motion.
         let count = (motion.duration() / H).ceil() as i64 + 4;
         // In long motions only some stretches are sampled.
         let stride = if count > 400_000 { count / 4_000 } else { 0 };
@@ -152,11 +152,11 @@ impl Case {
                 };
                 take(0, "velocity", v[j], self.limits.velocity[j], 1e-11);
                 take(1, "acceleration", a[j], self.limits.acceleration[j], 1e-8);
-                // Positions and times are rounded.
+                // The tolerance covers the rounding of positions and times.
                 let rounding = 4e-15 + 4.0 * f64::EPSILON * time * v[j].abs();
                 take(2, "jerk", jerk[j], self.limits.jerk[j], rounding / (H * H * H));
                 if let (Some(torque), Some(usable)) = (torque, usable) {
-                    // Tolerance for rounding of positions, divided by the square of that time.
+                    // Tolerance for the rounding of positions, divided by the square of the time between samples.
                     take(3, "torque", torque[j], usable[j], 1e-4);
                 }
                 if !(low - 1e-9..=high + 1e-9).contains(&p[1][j]) && wrong.len() < 2000 {
@@ -177,8 +177,8 @@ impl Case {
         })
     }
 
-    /// Torque that a motion may use: the limit minus its margin, but at least the holding torque plus a small part of
-    /// the remaining torque.
+    /// Torque that a motion may use. This is the limit minus its margin, but at least the holding torque plus a small
+    /// part of the remaining torque.
     fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
         let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
         std::array::from_fn(|j| {
@@ -198,7 +198,7 @@ impl Case {
         }
     }
 
-    /// Torque from differences over a time so short that acceleration and friction hardly change.
+    /// Torque from differences over a very short time, in which acceleration and friction hardly change.
     fn torque_at(&self, dynamics: &Dynamics, motion: &Motion, time: f64) -> JointVec {
         const H: f64 = 1e-5;
         let [a, b, c] = [time - H, time, time + H].map(|t| motion.at(t).position);
@@ -207,7 +207,8 @@ impl Case {
         self.torque(dynamics, &b, &velocity, &acceleration)
     }
 
-    /// Checks that every place is on a leg, or within the blend of a corner and inside the box of its legs.
+    /// Checks that every point is on a leg, or within the blend of a corner and inside the bounding box of the legs at
+    /// this corner.
     fn on_the_legs(&self, motion: &Motion, wrong: &mut String) {
         let count = (motion.duration() / 2e-3).ceil().min(50_000.0) as usize;
         for i in 0..=count {
@@ -235,8 +236,8 @@ impl Case {
         distance(q, &std::array::from_fn(|j| a[j] + u * way[j]))
     }
 
-    /// Returns `true` if the place is within the blend of one of several close waypoints around a leg, and in the
-    /// bounding box of all of them.
+    /// Returns `true` if the point is within the blend of one of several close waypoints around a leg, and in the
+    /// bounding box of all these waypoints.
     fn is_in_row(&self, leg: usize, q: &JointVec) -> bool {
         [leg, leg + 1].into_iter().any(|at| {
             let row = &self.waypoints[row(&self.waypoints, at, self.blend)];
@@ -260,7 +261,7 @@ impl Case {
     }
 }
 
-/// Range of waypoints closer to each other than the blend; some of them may be left out.
+/// Range of waypoints that are closer to each other than the blend. The planner may omit some of these.
 fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusive<usize> {
     let dense = |i: usize| distance(&waypoints[i], &waypoints[i + 1]) <= blend;
     let (mut from, mut to) = (at, at);
@@ -273,7 +274,8 @@ fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusiv
     from.saturating_sub(1)..=(to + 1).min(waypoints.len() - 1)
 }
 
-/// A random walk inside the position limits. Some waypoints repeat, continue straight on, or go back.
+/// A random walk inside the position limits. Some waypoints are repeated, continue in a straight line, or return to an
+/// earlier position.
 fn waypoints(rng: &mut fastrand::Rng, count: usize, limits: &Limits) -> Vec<JointVec> {
     let size = *rng.choice(&[0.002, 0.05, 0.3, 1.0]).unwrap_or(&0.3);
     let inside = |q: JointVec| -> JointVec {

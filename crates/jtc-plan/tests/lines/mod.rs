@@ -23,7 +23,7 @@ pub(crate) fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// `pose` moved by `shift` (m) and turned about its own z, y and x by `turn` (rad).
+/// Returns `pose` moved by `shift` (m) and rotated about its own z, y and x axes by `turn` (rad).
 pub(crate) fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
     let by = Orientation::Rpy(turn).at([0.0; 3]).unwrap().rotation;
     let product = |i: usize, k: usize| (0..3).map(|j| pose.rotation[i][j] * by[j][k]).sum::<f64>();
@@ -31,7 +31,7 @@ pub(crate) fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
     Pose { rotation, position: std::array::from_fn(|i| pose.position[i] + shift[i]) }
 }
 
-/// A range of two turns for each joint.
+/// Position range of two turns for each joint.
 pub(crate) const WIDE: [(f64, f64); JOINTS] = [(-2.0 * PI, 2.0 * PI); JOINTS];
 
 /// Returns the leg, the distance along it, and the error on the leg.

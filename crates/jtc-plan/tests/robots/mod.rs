@@ -1,10 +1,10 @@
-//! Arms for the tests: the default arm, and others from published Denavit-Hartenberg parameters.
+//! Arms for the tests: the default arm, and arms from published Denavit-Hartenberg parameters.
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin, Pose};
 
-/// The default arm: three parallel axes.
+/// Default arm, which has three parallel axes.
 pub(super) fn avena() -> ArmModel {
     Parameters::avena().model
 }
@@ -24,7 +24,7 @@ pub(super) fn by_dh(parameters: [[f64; 3]; JOINTS]) -> ArmModel {
     model
 }
 
-/// Universal Robots UR5: three parallel axes.
+/// Universal Robots UR5, which has three parallel axes.
 pub(super) fn ur5() -> ArmModel {
     by_dh([
         [0.089159, 0.0, FRAC_PI_2],
@@ -36,7 +36,7 @@ pub(super) fn ur5() -> ArmModel {
     ])
 }
 
-/// Unimation PUMA 560 (Corke and Armstrong-Hélouvry 1994): spherical wrist, axes 1 and 2 meet.
+/// Unimation PUMA 560 (Corke and Armstrong-Hélouvry 1994): with a spherical wrist and axes 1 and 2 that meet.
 pub(super) fn puma560() -> ArmModel {
     by_dh([
         [0.0, 0.0, FRAC_PI_2],
@@ -48,7 +48,7 @@ pub(super) fn puma560() -> ArmModel {
     ])
 }
 
-/// KUKA KR 5 arc: spherical wrist, axes 1 and 2 do not meet.
+/// KUKA KR 5 arc, with a spherical wrist and axes 1 and 2 that do not meet.
 pub(super) fn kr5() -> ArmModel {
     by_dh([
         [0.4, 0.18, -FRAC_PI_2],
@@ -62,8 +62,8 @@ pub(super) fn kr5() -> ArmModel {
 
 /// Kinova Jaco 2 with six joints and a curved wrist (j2s6s200), which has no closed form.
 pub(super) fn jaco2() -> ArmModel {
-    // The curved link offsets both of its axes by sin(a)/sin(2a) = 1/√3 of a link; a = 30° is half of the angle between
-    // them.
+    // The curved link moves each of its two axes by sin(a)/sin(2a) = 1/√3 of a link. The angle a = 30° is half of the
+    // angle between the two axes.
     let part = 0.0741 / 3f64.sqrt();
     by_dh([
         [0.2755, 0.0, FRAC_PI_2],
@@ -89,8 +89,8 @@ pub(super) fn crooked() -> ArmModel {
     ArmModel { joints: joints.map(|(xyz, rpy)| Origin { xyz, rpy }), ..ArmModel::default() }
 }
 
-/// Arms for the geometries that the other arms do not have: a spherical wrist after axes 2 and 3 that meet, or after
-/// axes 1 and 2 that are parallel. The parameters are invented.
+/// Arms for geometries that the arms above do not cover: a spherical wrist with axes 2 and 3 that meet, or with axes 1
+/// and 2 that are parallel. The parameters are invented.
 pub(super) fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
     let half = FRAC_PI_2;
     let wrist = [[0.4, 0.0, -half], [0.0, 0.0, half], [0.1, 0.0, 0.0]];
@@ -124,7 +124,7 @@ fn product(a: &Mat3, b: &Mat3) -> Mat3 {
     std::array::from_fn(|i| std::array::from_fn(|k| (0..3).map(|j| a[i][j] * b[j][k]).sum()))
 }
 
-/// Returns the distance of two poses, m and rad.
+/// Returns the distance between two poses, in m and rad.
 pub(super) fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let shift = (0..3).map(|i| (a.position[i] - b.position[i]).powi(2)).sum::<f64>().sqrt();
     // The chord between two rotations is 2·√2·sin of half the angle.

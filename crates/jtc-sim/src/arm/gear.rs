@@ -1,4 +1,4 @@
-//! Elastic gears: a spring with damping between a motor and its link.
+//! Elastic gears. An elastic gear is a spring with damping between a motor and its link.
 //!
 //! Friction, the brake, the drive's torque and most of the rotor's inertia act on the motor side. Pushes, hands, walls
 //! and end stops act on the link. Positions and speeds of the motor are divided by the gear ratio, so that they refer
@@ -7,8 +7,8 @@ use jtc_dynamics::{JOINTS, JointVec};
 
 use super::{Arm, BRAKED, LIGHTEST, along, braked};
 
-/// Part of the rotor's inertia that turns with the link, such as the gear's output, kg·m². Without it a light last link
-/// would vibrate too fast for the integration steps. A rotor has at least twice this inertia.
+/// Part of the rotor's inertia that turns with the link, such as the gear's output, kg·m². Without this part, a light
+/// last link would vibrate too fast for the integration steps. The inertia of a rotor is at least twice this value.
 pub(super) const OUTPUT: f64 = 0.01;
 /// Damping divided by stiffness, s, for a gear with known stiffness and unknown damping.
 const DAMPING_TIME: f64 = 5e-4;
@@ -16,9 +16,9 @@ const DAMPING_TIME: f64 = 5e-4;
 /// Elasticity of a gear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gear {
-    /// Torque per angle between motor and link, N·m/rad; infinite for a rigid gear.
+    /// Stiffness: torque per angle between motor and link, N·m/rad. It is infinite for a rigid gear.
     pub stiffness: f64,
-    /// Torque per speed between motor and link, N·m·s/rad.
+    /// Damping: torque per speed difference between motor and link, N·m·s/rad.
     pub damping: f64,
 }
 
@@ -28,8 +28,8 @@ impl Gear {
     /// Smallest and largest stiffness that the simulator's options accept, N·m/rad.
     pub const STIFFNESS: (f64, f64) = (100.0, 1e6);
 
-    /// Creates a gear with this stiffness (N·m/rad) and a damping of 0.0005 s times the stiffness. A vibration of 30 Hz
-    /// on it then has 5 % of the critical damping.
+    /// Creates a gear with this stiffness (N·m/rad) and a damping of 0.0005 s times the stiffness. With this damping, a
+    /// vibration of 30 Hz at the gear has 5 % of the critical damping.
     pub fn new(stiffness: f64) -> Self {
         Self { stiffness, damping: if stiffness.is_finite() { DAMPING_TIME * stiffness } else { 0.0 } }
     }
@@ -72,14 +72,14 @@ struct Drives<'a> {
     torque: &'a JointVec,
     /// Torques on the links, N·m.
     outside: &'a JointVec,
-    /// Inertias that turn with the motors and with the links, kg·m². With a rigid gear the whole inertia turns with the
-    /// link.
+    /// Inertias on the motor side and on the link side, kg·m². With a rigid gear, the whole inertia belongs to
+    /// the link.
     motor: &'a JointVec,
     link: &'a JointVec,
 }
 
 impl Arm {
-    /// Simulates a sub-step with separate motors and links. Brakes act on the motors.
+    /// Simulates a sub-step with separate motors and links. Brakes act on the motor side.
     pub(super) fn elastic_substep(
         &mut self,
         tau: &JointVec,

@@ -1,13 +1,14 @@
-//! Walls that the arm can touch: a plane at the flange, or an angle of one joint.
+//! Walls that the arm can touch. A wall is a plane at the flange, or an angle of one joint.
 use jtc_bus::Joint;
 use jtc_dynamics::{Dynamics, JOINTS, JointVec};
 
 use super::{Arm, SimArm};
 
-/// A wall closer than this may be touched, and is included when the number of sub-steps is chosen, m or rad.
+/// Distance below which the arm may touch a wall, m or rad. Such a wall is included when the number of sub-steps is
+/// chosen.
 const NEAR: f64 = 0.01;
 
-/// Side of an angle that a wall fills.
+/// Side of an angle that a wall occupies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Angles greater than the angle of the wall.
@@ -22,15 +23,15 @@ impl core::fmt::Display for Side {
     }
 }
 
-/// A flat or angular obstacle. A wall only pushes: its force is stiffness times depth plus damping times the inward
-/// speed, but never negative.
+/// A flat or angular obstacle. A wall can only push. Its force is stiffness times depth plus damping times the inward
+/// speed, and never negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wall {
     /// A plane that touches the origin of the flange.
     Plane {
         /// Point of the surface in the base frame, m.
         position: [f64; 3],
-        /// Direction out of the wall in the base frame; its length must not be 0.
+        /// Direction out of the wall, as a vector in the base frame whose length must not be 0.
         normal: [f64; 3],
         /// Stiffness, N/m.
         stiffness: f64,
@@ -43,7 +44,7 @@ pub enum Wall {
         joint: Joint,
         /// Angle at which the wall begins, rad.
         angle: f64,
-        /// Side of the angle that the wall fills.
+        /// Side of the angle that the wall occupies.
         side: Side,
         /// Stiffness, N·m/rad.
         stiffness: f64,
@@ -59,8 +60,8 @@ enum Surface {
         normal: [f64; 3],
         /// Position of the surface along the normal, m.
         offset: f64,
-        /// Dynamics with a gravity of 1 m/s² into the wall, used to compute the joint torques of a force along the
-        /// normal at the flange.
+        /// Dynamics with a gravity of 1 m/s² into the wall. They are used to compute the joint torques of a force along
+        /// the normal at the flange.
         pulled: Box<Dynamics>,
     },
     Joint {
@@ -71,7 +72,7 @@ enum Surface {
     },
 }
 
-/// A wall with its state. The arm may or may not touch it.
+/// A wall with its state. The arm may touch this wall or be away from it.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     wall: Wall,
@@ -96,9 +97,9 @@ impl Touch {
 }
 
 impl Contact {
-    /// Creates the state of a wall; `dynamics` computes the flange of the arm at `q`. If the wall would begin inside
-    /// the arm, it begins at the surface of the arm instead, and moves to its configured position as the arm leaves.
-    /// This way a new wall cannot throw the arm.
+    /// Creates the state of a wall. `dynamics` computes the flange of the arm at `q`. If the configured wall would
+    /// overlap the arm, its surface begins at the arm instead. The surface moves to its configured position when the
+    /// arm moves away. Therefore a new wall cannot push the arm away suddenly.
     pub(super) fn new(wall: Wall, parts: &SimArm, dynamics: &Dynamics, q: &JointVec) -> Self {
         let (surface, stiffness, damping) = match wall {
             Wall::Plane { position, normal, stiffness, damping } => {
@@ -137,7 +138,8 @@ impl Contact {
         Touch { depth: depth - self.recess, torques }
     }
 
-    /// Adds the torques of the wall's force (N·m) to `sum`; `damped` is the share of the damping that is applied.
+    /// Adds the joint torques (N·m) that the force of the wall causes to `sum`. `damped` is the share of the damping
+    /// that is applied.
     pub(super) fn push(
         &self,
         dynamics: &Dynamics,
@@ -156,8 +158,8 @@ impl Contact {
     }
 
     /// Returns the contributions of the wall to the squared highest natural frequency (1/s²) and to the fastest decay
-    /// (1/s), if the arm may touch the wall within `dt`; otherwise 0. `mobility` returns the joint accelerations caused
-    /// by torques.
+    /// (1/s). They are 0 if the arm cannot touch the wall within `dt`. `mobility` returns the joint accelerations
+    /// caused by torques.
     pub(super) fn rates(
         &self,
         dynamics: &Dynamics,
@@ -175,7 +177,7 @@ impl Contact {
         (self.stiffness * inverse_mass, self.damping * inverse_mass)
     }
 
-    /// Moves a surface that is not at its configured position along with the arm.
+    /// Moves the surface of a wall with the arm, if the surface is not at its configured position.
     pub(super) fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
         if self.recess > 0.0 {
             self.recess = (self.recess + self.touch(dynamics, q).depth).clamp(0.0, self.recess);
@@ -184,7 +186,7 @@ impl Contact {
 }
 
 impl Arm {
-    /// Adds the torques of all walls' forces at `q`, `qd` (N·m) to `sum`.
+    /// Adds the joint torques (N·m) that the forces of all walls cause at `q` and `qd` to `sum`.
     pub(super) fn push_of_walls(&self, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
         for contact in &self.contacts {
             contact.push(&self.dynamics, q, qd, damped, sum);
@@ -198,7 +200,7 @@ impl Arm {
         sum
     }
 
-    /// Sets the walls. Walls that already exist keep their state; walls that are not in the list are removed.
+    /// Sets the walls. Walls that already exist keep their state. Walls that are not in the list are removed.
     pub fn set_walls(&mut self, walls: &[Wall]) {
         let mut known = core::mem::take(&mut self.contacts);
         for &wall in walls {

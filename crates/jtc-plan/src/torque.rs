@@ -139,9 +139,9 @@ impl<'a> ArmDynamics<'a> {
     }
 
     /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`. This
-    /// is the limit minus the margin. If gravity and breakaway friction need almost this torque, the result is their
-    /// sum plus a quarter of the remaining torque, but at least plus 2 % of the limit. Therefore the arm can always
-    /// move to and from a pose that it can hold.
+    /// is the limit minus the margin. The result is at least the sum of holding torque and breakaway friction plus a
+    /// quarter of the remaining torque, or plus 2 % of the limit if that is more. Therefore the arm can always move to
+    /// and from a pose that it can hold.
     pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
         let (whole, margin) = (limits.torque[j], limits.margin[j]);
         if margin == 0.0 {

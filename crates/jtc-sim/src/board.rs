@@ -24,17 +24,17 @@ const CHUNK: usize = 4096;
 /// Number of ticks for storing an arm, equal to the erase time of a flash sector.
 const STORE_MS: u32 = 2_000;
 
-/// Number of polls of the parser between two ticks, which represents a processor with spare time.
+/// Number of polls of the parser between two ticks, which represents a processor with free time.
 const POLLS: usize = 64;
 
 /// A host frame that the controller executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worked {
-    /// A valid frame, with its type byte.
+    /// A valid frame, with the type byte of the frame.
     Frame(u8),
-    /// A valid Execute, Pause or Stop, with its command byte.
+    /// A valid Execute, Pause or Stop, with the command byte.
     Exec(u8),
-    /// Bytes that are not a valid frame.
+    /// Bytes that are not a valid frame, with the status of the error.
     Bad(FrameStatus),
 }
 
@@ -63,12 +63,12 @@ pub struct Pins<'a> {
     pub status_free: bool,
 }
 
-/// Memory that keeps an arm over a reset (J-54).
+/// Memory that keeps an arm during a reset (J-54).
 #[derive(Clone, Debug, Default)]
 struct Memory {
     arm: Option<Vec<u8>>,
     sequence: u32,
-    /// Image that is being written, and the number of ticks until it is stored.
+    /// Image that is being written, and the number of ticks until the image is stored.
     writing: Option<(Vec<u8>, u32)>,
 }
 
@@ -107,7 +107,7 @@ fn recorder_memory() -> [Vec<Block>; 3] {
 }
 
 impl Board {
-    /// Creates a board that was just switched on. Its non-volatile memory contains this arm.
+    /// Creates a board that was just switched on. The non-volatile memory of the board contains this arm.
     pub fn new(config: Config, arm: Option<Vec<u8>>, inter_byte_timeout_us: u32, watchdog_ms: u32) -> Self {
         let mut board = Self {
             controller: Controller::new(config.clone(), vec![RawPoint::default(); POINTS_MAX]),
@@ -130,7 +130,7 @@ impl Board {
         board
     }
 
-    /// Starts the controller: everything that the board does before the first tick.
+    /// Starts the controller, and executes everything that the board does before the first tick.
     fn boot(&mut self) {
         let boot_cause = if self.watchdog_resets > 0 { BootCause::Watchdog } else { BootCause::PowerOn };
         self.controller.set_identity(Identity {
@@ -158,7 +158,7 @@ impl Board {
             core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));
         *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
         (self.watchdog_resets, self.memory) = (resets, memory);
-        // The recorder's memory keeps its contents. A reset by the watchdog is reported to it as a failure.
+        // The recorder's memory keeps its contents. The recorder is informed of a reset by the watchdog as a failure.
         self.recorder = Recorder::new(recorder.into_memory(), resets > 0);
         self.boot();
     }
@@ -173,7 +173,7 @@ impl Board {
         self.memory.arm.as_deref().map(|arm| (arm, self.memory.sequence))
     }
 
-    /// Returns the last tick's answer to an extension request, if its outputs had `answer_line` set.
+    /// Returns the last tick's answer to an extension request, if the outputs of that tick had `answer_line` set.
     pub fn answer_frame(&self) -> &[u8] {
         self.controller.answer_frame()
     }
@@ -210,7 +210,7 @@ impl Board {
         &self.controller
     }
 
-    /// Returns the status of the last tick, if its outputs had `status` set.
+    /// Returns the status of the last tick, if the outputs of that tick had `status` set.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         self.controller.status_frame()
     }
@@ -220,19 +220,19 @@ impl Board {
         &self.telemetry
     }
 
-    /// Handles bytes that have arrived by `now_us`, between ticks: searches them for urgent commands and passes them to
-    /// the parser.
+    /// Handles bytes that have arrived by `now_us`, between ticks. Searches the bytes for urgent commands and passes
+    /// them to the parser.
     pub fn receive(&mut self, now_us: u64, bytes: &[u8]) {
         self.watch.scan(LINE, now_us, bytes);
         self.ring.extend(bytes);
         if self.ring.len() > RING {
-            // The host has sent more bytes than the controller can execute for too long. The waiting bytes are lost,
-            // but a Stop among them is not.
+            // For too long, the host has sent more bytes than the controller can execute. The waiting bytes are lost,
+            // but a Stop in these bytes is still executed.
             self.lost_bytes += self.ring.len() as u64;
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // The parser accepts bytes while a frame is executed, as on the real board. If the bytes waited, the
+        // The parser accepts bytes while a frame is executed, as on the real board. If the bytes had to wait, the
         // parser would detect a gap.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {
@@ -248,7 +248,7 @@ impl Board {
         }
     }
 
-    /// Passes the parser's event to the controller. Returns `false` if the controller cannot accept it.
+    /// Passes the parser's event to the controller. Returns `false` if the controller cannot accept the event.
     fn hand_over(&mut self) -> bool {
         let moved = self.receiver.received(LINE).is_some_and(|received| self.batch.push(&received));
         if moved {
@@ -257,7 +257,7 @@ impl Board {
         moved
     }
 
-    /// Skips a tick. Returns `true` if the watchdog resets the board because of it.
+    /// Skips a tick. Returns `true` if the watchdog resets the board because of this event.
     pub fn miss(&mut self) -> bool {
         self.worked.clear();
         self.missed += 1;

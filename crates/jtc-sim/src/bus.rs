@@ -1,4 +1,5 @@
-//! The joint bus: one broadcast and its answers per millisecond, with frame times, arbitration, errors and bus-off.
+//! Simulation of the joint bus, with one broadcast and its answers per millisecond. It includes frame times,
+//! arbitration, errors and bus-off.
 
 mod nodes;
 
@@ -16,7 +17,7 @@ use crate::request::NodeRequest;
 const TICK_US: u32 = 1000;
 /// Duration of an error frame and the pause before the frame is repeated, µs.
 const ERROR_FRAME_US: u32 = 23;
-/// A controller whose transmit error counter exceeds this goes bus-off (ISO 11898-1).
+/// Transmit error counter above which a controller goes bus-off (ISO 11898-1).
 const BUS_OFF: u16 = 255;
 /// Recovery time of a controller from bus-off, 128 times 11 recessive bits, µs.
 const RECOVERY_US: u32 = 1408;
@@ -36,7 +37,7 @@ pub const fn frame_us(len: usize) -> u32 {
         let mut len = 0;
         while len <= LEN_MAX {
             // 31 bits are sent at the nominal rate. ESI, DLC and data are sent at five times this rate, with one stuff
-            // bit per ten bits. Stuff count and CRC follow.
+            // bit per ten bits. The stuff count and the CRC follow the data.
             let crc = if len > 16 { 31 } else { 27 };
             let tenths = (5 + 8 * len as u32) * 11 + crc * 10;
             times[len] = 31 + (tenths + 25) / 50;
@@ -50,13 +51,14 @@ pub const fn frame_us(len: usize) -> u32 {
 /// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusFault {
-    /// Share of receptions that fail, 0..1; drawn separately for each receiver.
+    /// Share of receptions that fail, 0..1. Failures are drawn separately for each receiver.
     pub lost: f64,
     /// Share of frames that are destroyed on the bus and repeated, 0..1.
     pub corrupted: f64,
     /// Share of answers that reach the controller with changed contents, 0..1.
     pub garbled: f64,
-    /// `true` if the controller's bus line is cut: it receives no frames, and its own frames reach no node.
+    /// `true` if the bus cable of the controller is cut. In this case the controller receives no frames, and no node
+    /// receives its frames.
     pub cut: bool,
     /// `true` if the controller is forced to stay bus-off.
     pub bus_off: bool,
@@ -73,7 +75,7 @@ pub struct BusStatistics {
     pub lost: u64,
     /// Number of frames that were repeated after an error.
     pub repeated: u64,
-    /// Number of answers garbled by a fault.
+    /// Number of answers that a fault has corrupted.
     pub garbled: u64,
     /// Number of requests that no node acknowledged.
     pub unacknowledged: u64,
@@ -84,7 +86,7 @@ pub struct BusStatistics {
 /// A frame and the time at which it ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedFrame {
-    /// End of the frame after the start of the tick, µs.
+    /// Time from the start of the tick to the end of the frame, µs.
     pub end_us: u32,
     /// The frame.
     pub frame: Frame,
@@ -96,7 +98,7 @@ struct Pending {
     frame: Frame,
 }
 
-/// The bus, including the controller's CAN interface.
+/// Joint bus, including the CAN interface of the controller.
 #[derive(Clone, Debug)]
 pub struct Bus {
     scales: [Scale; JOINTS],
@@ -119,7 +121,7 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Creates a bus for drives with these scales.
+    /// Creates a bus for drives with these scales of values.
     pub fn new(scales: [Scale; JOINTS], seed: u64) -> Self {
         Self {
             scales,
@@ -141,8 +143,9 @@ impl Bus {
         &self.log
     }
 
-    /// Simulates a millisecond: sends `out` to the nodes and adds the answers that are complete by its end to
-    /// `received`. The answers stay in the list until the controller takes them, even if its tick is late.
+    /// Simulates one millisecond. Sends `out` to the nodes, and adds the answers that are complete at the end of the
+    /// millisecond to `received`. The answers stay in the list until the controller reads them, even if the
+    /// controller's tick is late.
     pub fn tick(
         &mut self,
         now_us: u64,
@@ -182,7 +185,7 @@ impl Bus {
         BusState { acknowledged, bus_off: self.off_us.is_some() }
     }
 
-    /// Counts down the bus-off time; returns `true` while it lasts.
+    /// Counts down the bus-off time. Returns `true` while the controller is bus-off.
     fn recovering(&mut self) -> bool {
         if self.fault.bus_off {
             if self.off_us.is_none() {
@@ -201,11 +204,11 @@ impl Bus {
         false
     }
 
-    /// Sends the controller's request; returns `true` if a node acknowledged it.
+    /// Sends the request of the controller. Returns `true` if a node acknowledged the request.
     fn send(&mut self, now_us: u64, frame: &Frame, nodes: &mut Nodes, time: &mut u32) -> bool {
         if self.fault.cut || !(self.monitored || nodes.any_on_bus()) {
-            // The request is repeated until the next tick replaces it. A missing acknowledgement alone does not lead to
-            // bus-off.
+            // The controller repeats the request until the next tick replaces it. A missing acknowledgement alone does
+            // not cause bus-off.
             self.statistics.unacknowledged += 1;
             self.statistics.busy_us += u64::from(TICK_US);
             self.pending.clear();
@@ -235,7 +238,7 @@ impl Bus {
         }
     }
 
-    /// Transmits a frame, and repeats it after each error. Returns `false` if the time was too short.
+    /// Transmits a frame, and repeats it after each error. Returns `false` if the time was too short for the frame.
     fn carry(&mut self, frame: &Frame, time: &mut u32, from_controller: bool) -> bool {
         let length = frame_us(frame.data().len());
         while self.fault.corrupted > 0.0 && self.rng.f64() < self.fault.corrupted {
@@ -268,8 +271,8 @@ impl Bus {
         true
     }
 
-    /// Transmits the answers in the order of arbitration: when the bus is free, the lowest identifier among the ready
-    /// answers is next.
+    /// Transmits the answers in the order of arbitration. When the bus is free, the ready answer with the lowest
+    /// identifier is transmitted next.
     fn answers(&mut self, time: &mut u32, received: &mut Vec<Frame>) {
         while !self.pending.is_empty() && *time < TICK_US {
             let ready = |p: &Pending| p.ready_us <= *time;
@@ -297,8 +300,8 @@ impl Bus {
         }
     }
 
-    /// Transmits as many frames of outside nodes as fit into the tick. Answers go to the controller, all other frames
-    /// to the nodes.
+    /// Transmits as many frames of nodes outside the simulation as the time in the tick permits. Answers go to the
+    /// controller, all other frames to the nodes.
     fn carry_foreign(&mut self, now_us: u64, nodes: &mut Nodes, time: &mut u32, received: &mut Vec<Frame>) {
         while let Some(frame) = self.foreign.front().copied() {
             if !self.carry(&frame, time, false) {
@@ -313,7 +316,7 @@ impl Bus {
         }
     }
 
-    /// Queues a frame from a node outside this simulation. Returns `false` if too many frames are waiting already.
+    /// Queues a frame from a node outside this simulation. Returns `false` if too many frames are already waiting.
     pub fn put(&mut self, frame: Frame) -> bool {
         let room = self.foreign.len() < FOREIGN_MAX;
         if room {

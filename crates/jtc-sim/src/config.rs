@@ -6,8 +6,8 @@ use crate::arm::SimArm;
 use crate::drive::DriveConfig;
 use crate::faults::FaultPlan;
 
-/// Over-speed limit of a drive divided by the velocity limit of its joint. For the default arm this gives the limit of
-/// real drives.
+/// Over-speed limit of a drive divided by the velocity limit of its joint. For the default arm, the result is the limit
+/// of real drives.
 const OVER_SPEED: f64 = 1.2;
 
 /// Distance of the start position from the nearest limit, rad, for a joint that cannot reach 0.
@@ -16,19 +16,20 @@ const END_DISTANCE: f64 = 0.2;
 /// Deviation of the true arm from its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelError {
-    /// Random error of each link's mass and inertia: their factor is between 1 − `mass` and 1 + `mass`, drawn from the
-    /// seed.
+    /// Random error of the mass and inertia of each link. The factor is drawn from the seed, between 1 − `mass` and 1 +
+    /// `mass`.
     pub mass: f64,
-    /// Random error of each joint's friction: the factor is between 1 − `friction` and 1 + `friction`, drawn from the seed.
+    /// Random error of the friction of each joint. The factor is drawn from the seed, between 1 − `friction` and 1 +
+    /// `friction`.
     pub friction: f64,
-    /// Factors of the link masses; they replace the random factors.
+    /// Factors of the link masses, which replace the random factors.
     pub mass_factors: Option<[f64; 7]>,
-    /// Factors of the joint frictions; they replace the random factors.
+    /// Factors of the joint frictions, which replace the random factors.
     pub friction_factors: Option<JointVec>,
 }
 
 impl ModelError {
-    /// No error: the controller's model is exact.
+    /// No deviation, so that the model in the controller is exact.
     pub const NONE: Self = Self { mass: 0.0, friction: 0.0, mass_factors: None, friction_factors: None };
 }
 
@@ -58,19 +59,19 @@ impl ModelError {
 /// Support of the arm while its drives are not enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {
-    /// No support: a joint without torque falls.
+    /// No support, so that a joint without torque falls.
     None,
-    /// The arm is on a stand until all joints are enabled for the first time; afterwards it has no support.
+    /// Stand that supports the arm until all joints are enabled for the first time. After that, the arm has no support.
     Stand,
-    /// Holding brakes, which are open only while their drive is enabled. Real drives have no brakes. With brakes the
-    /// simulated arm keeps a usable pose after an error.
+    /// Holding brakes; each is open only while the drive of its joint is enabled. Real drives have no brakes. With
+    /// brakes, the simulated arm is in a usable pose after an error.
     Brakes,
 }
 
 /// Configuration of a simulation.
 #[derive(Clone, Debug)]
 pub struct SimConfig {
-    /// The arm before model errors are applied.
+    /// Arm model before model errors are applied.
     pub arm: SimArm,
     /// Settings of the controller.
     pub controller: Config,
@@ -78,7 +79,7 @@ pub struct SimConfig {
     pub stored_arm: Option<Vec<u8>>,
     /// Deviation of the true arm from `arm`.
     pub model_error: ModelError,
-    /// Pose at the start, rad. By default each joint is at 0, or near its limit if it cannot reach 0.
+    /// Pose at the start, rad. By default each joint is at 0, or near its limit if the joint cannot reach 0.
     pub start: JointVec,
     /// Support of the arm while drives are not enabled.
     pub support: Support,
@@ -88,12 +89,14 @@ pub struct SimConfig {
     pub gripper: bool,
     /// Joints (bit n = joint n) whose drive is not simulated, because it is on another bus: see [`BusTap`](crate::BusTap).
     pub absent_drives: u8,
-    /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node does.
+    /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node acknowledges
+    /// them.
     pub bus_monitored: bool,
     /// Largest delay between the end of an answer on the bus and its arrival at the controller, ticks. For each
-    /// millisecond a delay is drawn from the seed. Answers stay in order. With 0, answers arrive in the next tick.
+    /// millisecond, the simulation draws a delay from the seed. The order of the answers does not change. If the value
+    /// is 0, answers arrive in the next tick.
     pub answer_jitter_ms: u8,
-    /// Rate of the serial line, bit/s; with `None` transmission takes no time.
+    /// Bit rate of the serial line, bit/s. If it is `None`, transmission takes no time.
     pub baud: Option<u32>,
     /// Inter-byte timeout, µs: a frame ends after this silence on the line (J-03).
     pub inter_byte_timeout_us: u32,
@@ -103,9 +106,9 @@ pub struct SimConfig {
     pub safety_wired: bool,
     /// Seed of all random values.
     pub seed: u64,
-    /// Faults with their times.
+    /// Faults and the times at which they occur.
     pub faults: FaultPlan,
-    /// Capacity of the event log. Only the newest entries are kept; the older ones are counted.
+    /// Capacity of the event log. The log keeps only the newest entries and counts the removed entries.
     pub log_entries: usize,
 }
 

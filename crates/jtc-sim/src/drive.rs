@@ -1,5 +1,5 @@
-//! A joint's drive with the properties of real drives: slow first enable, coarse encoder, delayed speed, and no timeout
-//! of the torque.
+//! Drive of a joint with the properties of real drives. These are a slow first enable, a coarse encoder, a delayed
+//! speed, and no timeout of the torque.
 use jtc_bus::{NodeState, config as config_bit, error as error_bit};
 
 use crate::inbox::Inbox;
@@ -13,7 +13,7 @@ pub use config::{DriveConfig, DriveFault, EncoderPlace};
 use encoders::Encoders;
 use states::States;
 
-/// The drive of a joint.
+/// Drive of a joint.
 #[derive(Clone, Debug)]
 pub struct Drive {
     node: u8,
@@ -32,7 +32,7 @@ pub struct Drive {
     errors: u8,
     mc_current: u8,
     mc_occurred: u8,
-    /// Position (rad) and speed (rad/s) as read in the last tick.
+    /// Position (rad) and speed (rad/s) that were measured in the last tick.
     position: f64,
     velocity: f64,
     temperature: f64,
@@ -89,7 +89,7 @@ impl Drive {
         self.inbox = Inbox::new(self.config.one_message_per_interrupt);
     }
 
-    /// Enters the fault state without an error bit, as after a request of 254.
+    /// Enters the fault state without an error bit, as after a request for state 254.
     pub fn force_fault(&mut self) {
         if self.state() != NodeState::START {
             self.states.enter(NodeState::FAULT, &self.config);
@@ -119,8 +119,8 @@ impl Drive {
         self.bits & config_bit::WORKING_AREA != 0 && self.position.abs() > self.config.working_area
     }
 
-    /// Simulates a millisecond of the drive: reads the sensors, makes the checks, accepts a request and acts. `motor`
-    /// and `link` are the true positions of the two sides of the gear, at the joint, rad.
+    /// Simulates one millisecond of the drive. Reads the sensors, executes the checks, and processes a request. `motor`
+    /// and `link` are the true positions of the two sides of the gear, converted to the joint side, rad.
     pub fn tick(&mut self, motor: f64, link: f64, temperature: f64) {
         self.read_encoders(motor, link);
         if self.booting > 0 {
@@ -168,7 +168,7 @@ impl Drive {
             self.errors |= error_bit::HARDWARE;
         }
         if self.errors != 0 && !self.states.reacting() {
-            // The rest of the fault reaction follows in the next ticks.
+            // The remainder of the fault reaction is executed in the next ticks.
             self.states.enter(NodeState::FAULT_REACTION, &self.config);
         }
     }

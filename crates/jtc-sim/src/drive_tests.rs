@@ -1,4 +1,4 @@
-//! Tests of the drives, one for each property.
+//! Tests of the drives, with one test for each property.
 use jtc_bus::{Answer, JointReport, Request, warning};
 
 use super::*;

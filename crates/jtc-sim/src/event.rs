@@ -34,7 +34,7 @@ pub enum Event {
     },
     /// A node changed its state.
     Node {
-        /// Node: 0..5 are joints, 6 is the gripper.
+        /// Number of the node: 0 to 5 for the joints, 6 for the gripper.
         node: u8,
         /// Previous state.
         from: NodeState,
@@ -46,7 +46,7 @@ pub enum Event {
         /// Type byte.
         frame_type: u8,
     },
-    /// Bytes arrived that are not a valid frame.
+    /// Bytes that are not a valid frame arrived.
     BadFrame {
         /// Reason.
         status: FrameStatus,
@@ -102,7 +102,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// Creates a log that keeps the last `most` entries and counts the removed ones.
+    /// Creates a log that keeps the last `most` entries and counts the removed entries.
     pub fn new(most: usize) -> Self {
         Self { entries: VecDeque::new(), most, dropped: 0 }
     }
@@ -120,7 +120,7 @@ impl Log {
         self.entries.iter()
     }
 
-    /// Returns the number of entries that were removed to make space.
+    /// Returns the number of entries that were removed because the log was full.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

@@ -23,7 +23,7 @@ const STATES: [(&str, ControllerState); 6] = [
     ("error", ControllerState::Error),
 ];
 
-/// Key that exists in every format.
+/// Key that occurs in every file format.
 #[derive(Deserialize)]
 struct Head {
     format: Option<f64>,
@@ -71,7 +71,7 @@ struct Entry {
 /// Description of fault files for users (Markdown).
 pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 
-/// Format of the accepted files. Since format 2, joints are counted from 1.
+/// Format number of the accepted files. Since format 2, joints are counted from 1.
 const FORMAT: f64 = 2.0;
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
@@ -80,25 +80,25 @@ const PLACE_MAX: f64 = 10.0;
 const COM_MAX: f64 = 2.0;
 /// Largest mass of a load, kg.
 const MASS_MAX: f64 = 100.0;
-/// Stiffness and damping of walls: N/m and N·s/m at the flange, N·m/rad and N·m·s/rad at a joint.
+/// Range of the stiffness, and largest damping, of walls, in N/m and N·s/m at the flange, or in N·m/rad and N·m·s/rad at a joint.
 const STIFFNESS: (f64, f64) = (1.0, 1e6);
 const DAMPING_MAX: f64 = 1e4;
 const JOINT_STIFFNESS: (f64, f64) = (1.0, 1e5);
 const JOINT_DAMPING_MAX: f64 = 1e3;
 
 impl FaultPlan {
-    /// Reads a fault file without trajectories of hands. [`FAULT_FILE_HELP`] describes the format.
+    /// Reads a fault file that does not use trajectory files for hands. [`FAULT_FILE_HELP`] describes the format.
     pub fn from_toml(text: &str) -> Result<Self, FaultFileError> {
         Self::from_toml_with(text, |file| Err(format!("{file}: files cannot be read here")))
     }
 
-    /// Reads a fault file. `load` reads the trajectory files of hands, and returns the reason if it cannot.
+    /// Reads a fault file. `load` reads the trajectory files of hands, and returns the reason if it cannot read a file.
     pub fn from_toml_with(
         text: &str,
         mut load: impl FnMut(&str) -> Result<HandPath, String>,
     ) -> Result<Self, FaultFileError> {
         let syntax = |e: toml::de::Error| FaultFileError::Syntax(e.to_string());
-        // Checked first, because other formats may have other keys.
+        // The format is checked first, because other formats may have other keys.
         let Head { format } = toml::from_str(text).map_err(syntax)?;
         if format != Some(FORMAT) {
             return Err(FaultFileError::Format { found: format });
@@ -129,7 +129,7 @@ impl Reader<'_> {
         let trigger = self.trigger()?;
         let duration_ms = match self.entry.for_s.take() {
             Some(s) => Some(ms(self.in_range("for_s", s, 0.0, YEAR_S)?)),
-            // A push must have an end.
+            // A push must have a duration.
             None if matches!(kind, FaultKind::Push { .. }) => return Err(self.missing("for_s")),
             None => None,
         };
@@ -303,7 +303,7 @@ impl Reader<'_> {
     }
 
     fn in_range(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<f64, FaultFileError> {
-        // This condition is also false for NaN.
+        // The condition is also false for NaN.
         if value >= low && value <= high {
             Ok(value)
         } else {
@@ -311,7 +311,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reports keys that were not used, because they are mistakes in the file.
+    /// Reports keys that were not used. Such keys are mistakes in the file.
     fn nothing_left(&self) -> Result<(), FaultFileError> {
         let e = &self.entry;
         let keys = [

@@ -7,7 +7,7 @@ use jtc_core::ControllerState;
 use crate::arm::{Side, Wall};
 use crate::hand::HandPath;
 
-/// Declares the kinds of faults. For each kind: meaning, variant name, name in fault files and tables, and fields.
+/// Declares the kinds of faults. Each kind has a meaning, a variant name, a name in fault files and tables, and fields.
 macro_rules! fault_kinds {
     ($($(#[$doc:meta])* $kind:ident $name:literal $({ $($(#[$field_doc:meta])* $field:ident: $type:ty,)+ })?;)+) => {
         /// Kind of fault.
@@ -17,10 +17,10 @@ macro_rules! fault_kinds {
         }
 
         impl FaultKind {
-            /// Names of all kinds, as used in fault files.
+            /// Names of all kinds, as written in fault files.
             pub const NAMES: [&str; [$($name),+].len()] = [$($name),+];
 
-            /// Returns the name in fault files and tables.
+            /// Returns the name of the kind in fault files and tables.
             pub fn name(&self) -> &'static str {
                 match self {
                     $(Self::$kind { .. } => $name,)+
@@ -31,14 +31,14 @@ macro_rules! fault_kinds {
 }
 
 fault_kinds! {
-    /// A node is off the bus; the motor of a joint continues with its last torque.
+    /// A node is disconnected from the bus. The motor of a joint continues with its last torque.
     NodeSilent "node-silent" {
-        /// Node: 0..5 are joints, 6 is the gripper.
+        /// Number of the node: 0 to 5 for the joints, 6 for the gripper.
         node: u8,
     };
     /// A node's processor restarts once.
     NodeReboot "node-reboot" {
-        /// Node: 0..5 are joints, 6 is the gripper.
+        /// Number of the node: 0 to 5 for the joints, 6 for the gripper.
         node: u8,
     };
     /// The motor control reports faults.
@@ -82,7 +82,7 @@ fault_kinds! {
         /// Factor of the true friction.
         factor: f64,
     };
-    /// A bearing has this temperature.
+    /// The bearing of a joint has this temperature.
     Temperature "temperature" {
         /// Joint.
         joint: Joint,
@@ -91,33 +91,33 @@ fault_kinds! {
     };
     /// Receptions fail.
     FramesLost "frames-lost" {
-        /// Probability per reception, 0..1.
+        /// Probability of a failure for each reception, 0..1.
         probability: f64,
     };
     /// Frames are destroyed on the bus and repeated.
     FramesCorrupted "frames-corrupted" {
-        /// Probability per frame, 0..1.
+        /// Probability for each frame, 0..1.
         probability: f64,
     };
     /// Answers reach the controller with changed contents.
     FramesGarbled "frames-garbled" {
-        /// Probability per answer, 0..1.
+        /// Probability for each answer, 0..1.
         probability: f64,
     };
     /// The controller is forced to stay bus-off.
     BusOff "bus-off";
-    /// The controller's bus line is cut.
+    /// The bus cable of the controller is cut.
     NoAcknowledge "no-acknowledge";
     /// The controller's safety input is low.
     SafetyInput "safety-input";
-    /// The safety line of a drive has the level for danger.
+    /// The safety line of a drive has the level that means danger.
     SafetyLine "safety-line" {
-        /// Node: 0..5 are joints, 6 is the gripper.
+        /// Number of the node: 0 to 5 for the joints, 6 for the gripper.
         node: u8,
     };
     /// Bytes from the host are lost.
     SerialLost "serial-lost" {
-        /// Probability per byte, 0..1.
+        /// Probability for each byte, 0..1.
         probability: f64,
     };
     /// Bits of bytes from the host are flipped.
@@ -140,7 +140,7 @@ fault_kinds! {
     Wall "wall" {
         /// Point of the surface in the base frame, m.
         position: [f64; 3],
-        /// Direction out of the wall in the base frame; its length must not be 0.
+        /// Direction out of the wall, as a vector in the base frame whose length must not be 0.
         normal: [f64; 3],
         /// Stiffness, N/m.
         stiffness: f64,
@@ -153,7 +153,7 @@ fault_kinds! {
         joint: Joint,
         /// Angle at which the wall begins, rad.
         rad: f64,
-        /// Side of the angle that the wall fills.
+        /// Side of the angle that the wall occupies.
         side: Side,
         /// Stiffness, N·m/rad.
         stiffness: f64,
@@ -172,7 +172,7 @@ fault_kinds! {
         /// Joint.
         joint: Joint,
     };
-    /// A hand leads the arm while it is taught.
+    /// A hand guides the arm in Teaching.
     Hand "hand" {
         /// Index in [`FaultPlan::hands`].
         path: usize,
@@ -241,22 +241,23 @@ impl FaultKind {
 /// Condition that starts a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
-    /// At this time after the start, ms.
+    /// The fault starts at this time after the start of the simulation, ms.
     At(u64),
-    /// This time after the controller first enters a state, ms.
+    /// The fault starts at this time after the controller first enters a state, ms.
     InState(ControllerState, u64),
-    /// As soon as the trajectory's point index reaches this value in Operate.
+    /// The fault starts when the point index of the trajectory reaches this value in Operate.
     AtPoint(u32),
 }
 
-/// A fault and the time at which it occurs.
+/// A fault with its start condition and duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
     /// Kind of the fault.
     pub kind: FaultKind,
     /// Condition that starts the fault.
     pub trigger: Trigger,
-    /// Duration, ms; 0 is treated as 1, because faults begin and end only with a millisecond. `None`: the fault never ends.
+    /// Duration, ms; 0 is treated as 1, because faults begin and end only at whole milliseconds. If it is `None`, the
+    /// fault never ends.
     pub duration_ms: Option<u64>,
 }
 
@@ -273,7 +274,7 @@ pub struct FaultPlan {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Waiting,
-    /// The state was entered, and the fault begins at this time, ms.
+    /// The controller has entered the state, and the fault begins at this time, ms.
     Armed(u64),
     /// The fault is active and ends at this time, ms.
     Active(u64),

@@ -1,17 +1,17 @@
-//! Friction of the simulated joints: its dependence on speed and temperature, and its behaviour around standstill.
+//! Friction of the simulated joints, as a function of speed and temperature, and around standstill.
 //!
-//! At speed both models follow the same measured curve (polynomial or table). The models differ around zero:
-//! [`FrictionModel::LuGre`] sticks, breaks away and slips like real gears. In [`FrictionModel::Smooth`] friction
-//! changes its sign over a small range of speed, so the model can neither stick nor hunt.
+//! In motion, both friction models follow one measured curve (polynomial or table). Around zero speed, the models
+//! differ. [`FrictionModel::LuGre`] sticks, breaks away and slips like real gears. In [`FrictionModel::Smooth`]
+//! friction changes its sign over a small range of speed, so the model can neither stick nor hunt.
 //!
-//! Above its range of speeds a curve continues as a straight line that does not fall. An extrapolated cubic would drive
-//! the joint (c3 < 0), or become too steep for the integration steps.
+//! Above its range of speeds, a curve continues as a straight line that does not decrease. An extrapolated cubic would
+//! drive the joint (c3 < 0), or become too steep for the integration steps.
 use jtc_core::TableOf;
 use jtc_dynamics::{JOINTS, JointVec};
 
-/// Largest natural frequency of a rotor on its bristles, rad/s, that steps of 1 ms still integrate accurately.
+/// Largest natural frequency of a rotor on its friction bristles that steps of 1 ms integrate accurately, rad/s.
 const STIFFEST: f64 = 800.0;
-/// Lower bound of the friction level when it is a divisor, N·m.
+/// Lower bound of the friction level in divisions, N·m.
 const LEAST_LEVEL: f64 = 1e-9;
 
 /// True friction of a joint as a function of speed, without the effects around standstill.
@@ -29,12 +29,13 @@ pub enum SimFriction {
 /// Friction around standstill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FrictionModel {
-    /// The sign of the velocity is v/√(v² + width²): no stiction. With a width below 0.005 rad/s, Runge-Kutta at 1 ms becomes unstable.
+    /// Model without stiction, in which the sign of the velocity is v/√(v² + width²). If the width is below 0.005 rad/s, the
+    /// Runge-Kutta method with steps of 1 ms is unstable.
     Smooth {
         /// Speed around zero within which friction changes its sign, rad/s.
         width: f64,
     },
-    /// Bristles: stiction, presliding, Stribeck curve.
+    /// Bristle model with stiction, presliding and Stribeck curve.
     LuGre(LuGre),
 }
 
@@ -44,8 +45,8 @@ impl Default for FrictionModel {
     }
 }
 
-/// The LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995). The surfaces touch through bristles of mean
-/// deflection z (rad), with
+/// This is the LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995). The surfaces touch through bristles of
+/// mean deflection z (rad), with
 ///
 /// - dz/dt = v − σ0·|v|/g(v)·z,
 /// - friction torque = σ0·z + σ1(v)·dz/dt + viscous part,
@@ -56,13 +57,14 @@ impl Default for FrictionModel {
 /// (Olsson 1996, section 3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LuGre {
-    /// Break-away torque divided by Coulomb torque. The example in the paper uses 1.5; harmonic drives have values
+    /// Break-away torque divided by Coulomb torque. The example in the paper uses 1.5; values of harmonic drives are
     /// between 1.1 and 1.6.
     pub stiction_ratio: f64,
     /// Speed at which half of the excess of stiction over Coulomb friction remains, rad/s.
     pub stribeck_speed: f64,
-    /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one step of the
-    /// joint's encoder. Stiffer bristles are softened until the natural frequency of a rotor on them is below 800 rad/s.
+    /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one count of
+    /// the joint encoder. The stiffness of stiffer bristles is reduced until the natural frequency of the rotor on its bristles is below
+    /// 800 rad/s.
     pub presliding: f64,
     /// Damping ratio of the rotor on its bristles: σ1 = 2·ratio·√(σ0·rotor inertia).
     pub damping_ratio: f64,
@@ -75,14 +77,15 @@ impl Default for LuGre {
 }
 
 /// Friction of all joints at their current temperatures. Each array has one entry per joint, so that the compiler can
-/// process six at once.
+/// process six joints at once.
 #[derive(Clone, Debug)]
 pub(crate) struct FrictionTorques {
     model: FrictionModel,
     curves: [SimFriction; JOINTS],
-    /// Polynomial coefficients, one row per power; zero for joints with a table.
+    /// Polynomial coefficients, with one row per power. They are zero for joints with a table.
     k: [JointVec; 4],
-    /// Speed at which the straight line begins, rad/s; the next field is its slope, N·m·s/rad. Both are zero for joints with a table.
+    /// Speed at which the straight line begins, rad/s. The next field is the slope of this line, N·m·s/rad. For joints with a table,
+    /// the speed and the slope are zero.
     reach: JointVec,
     slope: JointVec,
     /// Velocities and torques of joints with a table.
@@ -92,7 +95,7 @@ pub(crate) struct FrictionTorques {
     table_temperature: JointVec,
     /// σ0, N·m/rad.
     stiffness: JointVec,
-    /// σ1 at standstill, N·m·s/rad.
+    /// Damping σ1 of the bristles at standstill, N·m·s/rad.
     damping: JointVec,
 }
 
@@ -134,7 +137,7 @@ impl FrictionTorques {
         new
     }
 
-    /// Updates the curves to these bearing temperatures (°C), multiplied by `scale`.
+    /// Updates the curves to these bearing temperatures (°C), and multiplies the curves by `scale`.
     pub(crate) fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
         for j in 0..JOINTS {
             let t = temperature[j];
@@ -148,7 +151,8 @@ impl FrictionTorques {
                     self.slope[j] = self.polynomial_slope(j, self.reach[j]).max(0.0);
                 }
                 SimFriction::Table(table) => {
-                    // This is also false for NaN, the value at the start, so the tables are then updated.
+                    // The condition is also false for NaN, which is the value at the start. In this case the tables are
+                    // updated.
                     if (t - self.table_temperature[j]).abs() < 0.02 {
                         continue;
                     }
@@ -164,7 +168,7 @@ impl FrictionTorques {
         }
     }
 
-    /// Makes the next [`warm`](Self::warm) also update the tables, because a scale has changed.
+    /// Causes the next call of [`warm`](Self::warm) to update the tables too, because a scale has changed.
     pub(crate) fn forget_tables(&mut self) {
         self.table_temperature = [f64::NAN; JOINTS];
     }
@@ -188,7 +192,8 @@ impl FrictionTorques {
                 core::array::from_fn(|j| {
                     let (v, load) = (v[j], self.stiffness[j] * z[j]);
                     let (b, level) = lugre.stribeck(v * inverse, k0[j]);
-                    // σ1(v)·dz/dt, computed with one denominator, because divisions take most of this function's time.
+                    // The term σ1(v)·dz/dt is computed with one denominator, because divisions need most of the time of
+                    // this function.
                     let bending = (v * level - v.abs() * load * b) / (b * level);
                     load + self.damping[j] * bending + viscous(j)
                 })
@@ -204,8 +209,8 @@ impl FrictionTorques {
         out
     }
 
-    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, at least 0. The effects around standstill
-    /// are excluded, because their slope has a separate bound.
+    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad; the result is at least 0. The effects
+    /// around standstill are excluded, because a separate bound exists for their slope.
     pub(crate) fn steepness(&self, v: &JointVec) -> JointVec {
         core::array::from_fn(|j| match &self.tables[j] {
             Some(table) => table.slope(v[j]).max(0.0),
@@ -219,11 +224,12 @@ impl FrictionTorques {
         k1[j] + speed * (2.0 * k2[j] + 3.0 * k3[j] * speed)
     }
 
-    /// Returns the bristle deflections `dt` seconds after they were `z`, at velocities `v`.
+    /// Returns the bristle deflections after `dt` seconds at velocities `v`, from the deflections `z`.
     ///
-    /// dz/dt = v − rate·z is far too stiff for Runge-Kutta at 1 ms, because the rate reaches 10⁴/s at speed. For a
-    /// constant velocity the exact solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). Replacing e by
-    /// 1/(1 + x + x²/2) gives second order without an exponential, and converges to the exact end value g/σ0 for any x.
+    /// dz/dt = v − rate·z is too stiff for the Runge-Kutta method with steps of 1 ms, because the rate reaches 10⁴/s at
+    /// high speed. For a constant velocity the exact solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x).
+    /// With 1/(1 + x + x²/2) instead of e, the method is of second order and needs no exponential function. It
+    /// converges to the exact end value g/σ0 for any x.
     #[inline]
     pub(crate) fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {
         let FrictionModel::LuGre(lugre) = self.model else { return *z };
@@ -231,7 +237,7 @@ impl FrictionTorques {
         core::array::from_fn(|j| {
             let v = v[j];
             let (b, level) = lugre.stribeck(v * inverse, self.k[0][j]);
-            // Computed with x = a/level; numerator and denominator are multiplied by level².
+            // The computation uses x = a/level, and numerator and denominator are multiplied by level².
             let a = dt * self.stiffness[j] * v.abs() * b;
             let half = level + 0.5 * a;
             level * (z[j] * level + v * dt * half) / (level * level + a * half)
@@ -241,7 +247,7 @@ impl FrictionTorques {
 
 impl LuGre {
     /// For a velocity `r`, in multiples of the Stribeck speed, and a Coulomb torque (N·m), returns b = 1 + r² and
-    /// b·g(v) in N·m. The inverse of b falls from 1 at standstill to 0 far above the Stribeck speed.
+    /// b·g(v) in N·m. The inverse of b decreases from 1 at standstill to 0 far above the Stribeck speed.
     #[inline]
     fn stribeck(&self, r: f64, coulomb: f64) -> (f64, f64) {
         let b = 1.0 + r * r;
@@ -260,7 +266,7 @@ struct Points {
 
 impl Points {
     /// Returns the velocities and torques of the table at one temperature (°C). A temperature outside the table is
-    /// limited to its range.
+    /// limited to the range of the table.
     fn cut(table: &TableOf<f32>, temperature: f64, scale: f64) -> Self {
         let axis = table.temperature.map(f64::from);
         let t = temperature.clamp(axis[0], axis[19]);
@@ -276,31 +282,31 @@ impl Points {
     /// Interpolates linearly between the points, and extrapolates with the last segments.
     fn at(&self, v: f64) -> f64 {
         let i = self.segment(v);
-        // A segment beyond an end of the table begins at that end.
+        // A segment beyond an end of the table begins at this end of the table.
         let from = i + usize::from(v > self.velocity[19]);
         self.torque[from] + (v - self.velocity[from]) * self.slope(v)
     }
 
-    /// Returns the slope of the line at `v`, N·m·s/rad.
+    /// Returns the slope of the line segment at `v`, N·m·s/rad.
     fn slope(&self, v: f64) -> f64 {
         let (x, y, i) = (&self.velocity, &self.torque, self.segment(v));
         let slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
         if v < x[0] || v > x[19] { slope.max(0.0) } else { slope }
     }
 
-    /// Returns the index of the point at which the line at `v` begins.
+    /// Returns the index of the point at which the line segment at `v` begins.
     fn segment(&self, v: f64) -> usize {
         self.velocity[1..19].iter().filter(|&&start| v >= start).count()
     }
 
-    /// Returns the Coulomb torque, N·m. In each direction, the line through the two slowest points gives a torque at
-    /// standstill; the result is the mean of both.
+    /// Returns the Coulomb torque, N·m. In each direction, the line through the two slowest points is extended to
+    /// standstill. The result is the mean of the two torques at standstill.
     fn coulomb(&self) -> f64 {
         let (x, y) = (&self.velocity, &self.torque);
         let start = |near: usize, far: usize, sign: f64| {
             let slope = (y[far] - y[near]) / (x[far] - x[near]);
-            // Limited to the torque of the slowest point. If the curve falls at first, its Coulomb torque is at that
-            // point.
+            // The result is limited to the torque of the slowest point. If the curve decreases at low speed, its
+            // Coulomb torque is the torque of that point.
             (sign * (y[near] - slope * x[near])).clamp(0.0, (sign * y[near]).max(0.0))
         };
         let above = x.iter().position(|&v| v > 0.0).filter(|&i| i + 1 < x.len());
@@ -311,7 +317,8 @@ impl Points {
         }
     }
 
-    /// Removes the Coulomb torque from the points, so that they contain only the viscous part, and returns it.
+    /// Removes the Coulomb torque from the points, so that they contain only the viscous part, and returns the Coulomb
+    /// torque.
     fn take_coulomb(&mut self) -> f64 {
         let coulomb = self.coulomb();
         for (v, torque) in self.velocity.iter().zip(&mut self.torque) {

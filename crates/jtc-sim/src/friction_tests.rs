@@ -1,4 +1,4 @@
-//! Tests that the LuGre model sticks, breaks away, slips, and follows the measured curve at speed.
+//! Tests that the LuGre model sticks, breaks away, slips, and follows the measured curve in motion.
 use super::*;
 
 const RIGID: f64 = 0.7;
@@ -51,7 +51,7 @@ fn at_speed_both_models_are_the_measured_curve() {
         let smooth = with(FrictionModel::Smooth { width: 0.01 }, curve.clone());
         let lugre = with(FrictionModel::LuGre(LuGre::default()), curve);
         for v in [-0.9, -0.3, -0.15, 0.15, 0.4, 0.8] {
-            // At constant speed the bristles settle within milliseconds.
+            // At constant speed the bristles reach a constant deflection within milliseconds.
             let z = (0..200).fold([0.0; JOINTS], |z, _| lugre.bend(&z, &[v; JOINTS], 1e-3));
             let (a, b) = (smooth.at(&[v; JOINTS], &z)[0], lugre.at(&[v; JOINTS], &z)[0]);
             assert!((a - b).abs() < 0.02 * a.abs(), "{v} rad/s: smooth {a}, LuGre {b} N·m");
@@ -63,8 +63,8 @@ fn at_speed_both_models_are_the_measured_curve() {
 fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
     for curve in [polynomial(), table()] {
         let torques = with(FrictionModel::LuGre(LuGre::default()), curve);
-        // The torque rises to 1.2 times 6 N·m within a second, and is zero afterwards. The deflection is about 1e-4
-        // rad, and its elastic part springs back.
+        // The torque rises to 1.2 times 6 N·m within one second. After that it is zero. The deflection is about 1e-4
+        // rad, and the elastic part of it returns to zero.
         let held = rotor(&torques, 1e-3, 2.0, |t, _| if t < 1.0 { t * 1.2 * 6.0 } else { 0.0 });
         let (loaded, released) = (held[999][0], held[1999][0]);
         assert!((0.8e-4..4e-4).contains(&loaded), "{loaded} rad");
@@ -110,7 +110,7 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
         for speed in [1e-6, 1e-4, 1e-2, 1.0, 30.0] {
             let mut z = [0.0; JOINTS];
             for k in 0..500 {
-                // The rotor moves forth and back.
+                // The rotor moves forward and back.
                 let v = if k / 100 % 2 == 0 { speed } else { -speed };
                 z = torques.bend(&z, &[v; JOINTS], dt);
                 assert!(z[0].abs() <= longest * (1.0 + 1e-9), "{} rad at {speed} rad/s, {dt} s", z[0]);
@@ -121,7 +121,8 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
 
 #[test]
 fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
-    // Cubics that end with a driving torque or with a steep slope; a table whose last segment falls.
+    // The curves are cubics that end with a driving torque or with a steep slope, and a table whose last segment
+    // decreases.
     let motor = SimFriction::Polynomial([2.7, 12.6, -3.7, -0.65, 0.0, 20.0]);
     let wall = SimFriction::Polynomial([6.0, 40.0, -30.0, 12.0, 0.0, 20.0]);
     let SimFriction::Table(mut falling) = table() else { unreachable!("a table") };
@@ -139,7 +140,7 @@ fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
             let mut before = there;
             for v in [1.1 * end, 3.0, 10.0, 300.0] {
                 let torque = at(v);
-                // The tolerance allows for the remaining part of the Stribeck curve.
+                // The tolerance covers the remaining part of the Stribeck curve.
                 assert!(torque > before - 0.01, "{torque} N·m at {v} rad/s after {before}");
                 assert!((at(-v) + torque).abs() < 1e-6, "both ways alike");
                 before = torque;

@@ -1,4 +1,4 @@
-//! The vacuum gripper, node 6: a pump, two vacuum switches and the properties of its firmware.
+//! Vacuum gripper (node 6), with a pump, two vacuum switches and the properties of its firmware.
 use jtc_bus::{Answer, GRIPPER, GripperReport, NodeState, Request, config};
 
 use crate::inbox::Inbox;
@@ -6,7 +6,7 @@ use crate::request::NodeRequest;
 
 /// Number of ticks until the measured pump current follows the command.
 const PUMP_LAG: u32 = 100;
-/// Number of pumping ticks until the first and the second vacuum level are reached.
+/// Number of ticks with the pump on until the first and the second vacuum level are reached.
 const LEVELS: (u32, u32) = (300, 700);
 /// Code of the gripper for the transition from Ready or Enabled to Init.
 const TO_INIT: NodeState = NodeState::new(14);
@@ -29,9 +29,9 @@ pub struct Gripper {
     reacts_to_safety: bool,
     line_before: bool,
     inbox: Inbox,
-    /// `true` if the node is off the bus.
+    /// `true` if the node is disconnected from the bus.
     pub silent: bool,
-    /// `true` if the safety line has the level for danger.
+    /// `true` if the safety line has the level that means danger.
     pub safety_line: bool,
     /// `true` if a part covers the cup, so that the vacuum can build up.
     pub part_present: bool,
@@ -95,7 +95,7 @@ impl Gripper {
                 self.command = pump;
                 Some(Answer::Gripper(self.report()))
             }
-            // `NodeRequest` has a separate variant for it.
+            // `NodeRequest` has a separate variant for this request.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { gripper, .. } => {
                 let accepted = matches!(self.state, NodeState::INIT | NodeState::READY);
@@ -150,7 +150,8 @@ impl Gripper {
             return;
         }
         self.age = self.age.saturating_add(1);
-        // Only the edge has an effect: if the gripper is enabled while the line is already unsafe, it stays enabled.
+        // Only a change of the line has an effect. If the gripper is enabled while the line is already unsafe, it stays
+        // enabled.
         let edge = self.safety_line && !self.line_before;
         self.line_before = self.safety_line;
         if edge && self.reacts_to_safety && self.state == NodeState::ENABLED {
@@ -169,7 +170,7 @@ impl Gripper {
                 self.command = false;
                 self.pin = false;
             }
-            // In other states the pin keeps its level.
+            // In other states, the output pin of the pump keeps its level.
             _ => {}
         }
         self.speed = if self.pin { (self.speed + 1).min(PUMP_LAG) } else { self.speed.saturating_sub(1) };
@@ -221,7 +222,7 @@ mod tests {
         assert!(!pump(&mut gripper, true).pressure1);
         run(&mut gripper, 250);
         assert!(pump(&mut gripper, true).pressure1);
-        // Goes from ENABLED directly to INIT; the pump runs until READY.
+        // The gripper changes from ENABLED directly to INIT. The pump continues until READY.
         assert_eq!(request(&mut gripper, NodeState::INIT), TO_INIT);
         run(&mut gripper, 500);
         assert!(pump(&mut gripper, false).pressure2);

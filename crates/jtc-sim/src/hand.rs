@@ -1,13 +1,14 @@
-//! A hand that leads the arm along a path in Teaching. The hand pulls compliantly, with limited force, on every joint.
+//! A simulated hand that guides the arm along a path in Teaching. The hand pulls on every joint with a compliant and
+//! limited torque.
 use jtc_dynamics::{JOINTS, JointVec};
 
 /// Torque per position difference between a joint and the hand's target, N·m/rad.
 const STIFFNESS: f64 = 1500.0;
-/// Torque per speed difference between them, N·m·s/rad.
+/// Torque per speed difference between a joint and the target of the hand, N·m·s/rad.
 const DAMPING: f64 = 80.0;
-/// Largest torque of the hand on a joint, N·m.
+/// Maximum torque of the hand on a joint, N·m.
 const STRONGEST: f64 = 60.0;
-/// Mean speed of the move to the path's first point, rad/s.
+/// Mean speed of the motion to the first point of the path, rad/s.
 const APPROACH: f64 = 0.2;
 /// Time for which the hand holds the last point, s.
 const HELD: f64 = 0.5;
@@ -22,8 +23,8 @@ pub struct HandPath {
 }
 
 impl HandPath {
-    /// Creates a path; `points` are joint positions, rad, `step_s` seconds apart. Returns `None` without points, with a
-    /// number that is not finite, or with `step_s` ≤ 0.
+    /// Creates a path. `points` contains joint positions (rad) that are `step_s` seconds apart. Returns `None` if there
+    /// are no points, if a number is not finite, or if `step_s` ≤ 0.
     pub fn new(points: Vec<JointVec>, step_s: f64) -> Option<Self> {
         let finite = points.iter().flatten().all(|q| q.is_finite());
         let good = !points.is_empty() && finite && step_s.is_finite() && step_s > 0.0;
@@ -44,15 +45,15 @@ impl HandPath {
     }
 }
 
-/// A hand that leads the arm along a path.
+/// A hand that guides the arm along a path.
 #[derive(Clone, Debug)]
 pub(crate) struct Hand {
     path: HandPath,
     led: Option<Led>,
 }
 
-/// State since Teaching began: pose of the arm at that time, duration of the move to the first point, and elapsed time,
-/// s.
+/// State since Teaching began: pose of the arm at that time, duration of the motion to the first point (s), and elapsed
+/// time (s).
 #[derive(Clone, Copy, Debug)]
 struct Led {
     from: JointVec,
@@ -65,8 +66,8 @@ impl Hand {
         Self { path, led: None }
     }
 
-    /// Returns the hand's torque in this millisecond, N·m, for an arm at `q`, `qd`. The hand waits for Teaching. At the
-    /// end of the path or of Teaching it releases the arm (`None`).
+    /// Returns the hand's torque in this millisecond, N·m, for an arm with the positions `q` and velocities `qd`. The
+    /// hand waits until Teaching begins. At the end of the path or of Teaching it releases the arm (`None`).
     pub(crate) fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
         if !teaching {
             return if self.led.is_some() { None } else { Some([0.0; JOINTS]) };
@@ -88,7 +89,7 @@ impl Hand {
         }))
     }
 
-    /// Returns the hand's target: first a smooth move to the first point, then the path.
+    /// Returns the target of the hand. It first moves smoothly to the first point, and then follows the path.
     fn wanted(&self, led: &Led, t: f64) -> JointVec {
         if t >= led.approach_s {
             return self.path.at(t - led.approach_s);
@@ -116,7 +117,7 @@ mod tests {
     fn a_hand_waits_for_teaching_pulls_with_bounded_force_and_lets_go() {
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]; 11], 0.01).unwrap());
         assert_eq!(hand.torque(false, &[0.0; 6], &[0.0; 6]), Some([0.0; 6]));
-        // If the arm does not move, the pull grows only up to its limit.
+        // If the arm does not move, the torque of the hand rises only to its limit.
         let mut strongest = 0.0f64;
         let mut ms = 0;
         while let Some(torque) = hand.torque(true, &[0.0; 6], &[0.0; 6]) {
@@ -124,7 +125,7 @@ mod tests {
             ms += 1;
         }
         assert_eq!(strongest, STRONGEST);
-        // The time for 3 rad at 0.2 rad/s, the path, and the wait at its end.
+        // The duration is the time for 3 rad at 0.2 rad/s, plus the path, plus the wait at the end of the path.
         assert!((15_590..15_610).contains(&ms), "{ms} ms");
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]], 0.01).unwrap());
         hand.torque(true, &[0.0; 6], &[0.0; 6]);

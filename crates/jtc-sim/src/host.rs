@@ -1,7 +1,7 @@
-//! A small host for tests, soak runs and the fault matrix, which creates frames, receives statuses, and plans simple
+//! Small host for tests, soak runs and the fault matrix. It creates frames, receives statuses, and plans simple
 //! motions.
 //!
-//! The real client library is `jtc-host`. This host makes tests of the simulation independent of it.
+//! The real client library is `jtc-host`. With this small host, tests of the simulation do not depend on `jtc-host`.
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin};
 use jtc_wire::{
     ACCELERATION_SCALE, ExecCommand, FrameType, HEADER, POSITION_SCALE, RawPoint, STATUS_LEN, Status,
@@ -14,14 +14,14 @@ use crate::world::World;
 pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(body.len() + 6);
     bytes.extend([HEADER, frame_type as u8]);
-    // No body of this protocol is longer than a frame permits.
+    // Every body of this protocol fits into a frame.
     bytes.extend(u16::try_from(body.len() + 6).unwrap_or(u16::MAX).to_be_bytes());
     bytes.extend(body);
     bytes.extend(crc16(&bytes).to_be_bytes());
     bytes
 }
 
-/// Returns the three frames that make the controller use its default friction polynomial, gains and arm model.
+/// Returns the three frames that command the controller to use its default friction polynomial, gains and arm model.
 pub fn use_defaults() -> Vec<u8> {
     [FrameType::FrictionPolynomialUseDefault, FrameType::PidParamUseDefault, FrameType::ArmModelUseDefault]
         .into_iter()
@@ -29,7 +29,7 @@ pub fn use_defaults() -> Vec<u8> {
         .collect()
 }
 
-/// Returns the frame of an arm model. The controller receives its numbers rounded to 32-bit floats.
+/// Returns the frame of an arm model. The controller receives the numbers of the model as rounded 32-bit floats.
 pub fn arm_model(model: &ArmModel) -> Vec<u8> {
     let origin = |o: &Origin| o.xyz.into_iter().chain(o.rpy);
     let joints = model.joints.iter().flat_map(origin);
@@ -48,7 +48,7 @@ pub fn clear_all() -> Vec<u8> {
     frame(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0])
 }
 
-/// Returns the trajectory in segments of `per_segment` points, with `step_ms` between two points.
+/// Returns the trajectory in segments of `per_segment` points, with `step_ms` ms between two points.
 pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<Vec<u8>> {
     let segments: Vec<_> = points.chunks(per_segment.max(1)).collect();
     let number = |n: usize| u16::try_from(n).unwrap_or(u16::MAX).to_be_bytes();
@@ -64,8 +64,8 @@ pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<
     segments.iter().enumerate().map(make).collect()
 }
 
-/// Returns a motion from standstill to standstill, with a point every `step_ms`. The motion leads from `from` to `to`
-/// (rad) in `seconds` and back, `times` times, along a quintic with zero acceleration at both ends.
+/// Returns a motion from standstill to standstill, with a point every `step_ms`. The motion goes from `from` to `to`
+/// (rad) in `seconds` and back, `times` times. It follows a quintic with zero acceleration at both ends.
 pub fn there_and_back(
     from: &JointVec,
     to: &JointVec,
@@ -122,8 +122,8 @@ impl Listener {
         }
         while self.bytes.len() >= STATUS_LEN {
             let Some(status) = Status::parse(&self.bytes[..STATUS_LEN]) else {
-                // After a reset of the controller a status may be incomplete. Searches for the beginning of the next
-                // one.
+                // After a reset of the controller, a received status may be incomplete. The host searches for the
+                // beginning of the next status.
                 self.bytes.remove(0);
                 continue;
             };

@@ -1,14 +1,14 @@
-//! Receive buffer of a node, emptied at once or, in older firmware, by one frame per interrupt.
+//! Receive buffer of a node. An interrupt reads all frames from the buffer or, in older firmware, only one frame.
 use std::collections::VecDeque;
 
 use crate::request::NodeRequest;
 
-/// Two requests closer together than this cause a single interrupt, µs.
+/// Time between two requests below which the two cause a single interrupt, µs.
 const BACK_TO_BACK_US: u64 = 250;
 /// Number of requests that the receive buffer can store.
 const DEPTH: usize = 3;
 
-/// The receive buffer of a node.
+/// Receive buffer of a node.
 #[derive(Clone, Debug)]
 pub(crate) struct Inbox {
     one_per_interrupt: bool,
@@ -17,8 +17,8 @@ pub(crate) struct Inbox {
 }
 
 impl Inbox {
-    /// Creates a buffer. With `one_per_interrupt`, the second of two requests back to back stays in the buffer until
-    /// another request arrives.
+    /// Creates a buffer. If `one_per_interrupt` is set, the second of two consecutive requests without a pause stays in
+    /// the buffer until another request arrives.
     pub(crate) fn new(one_per_interrupt: bool) -> Self {
         Self { one_per_interrupt, waiting: VecDeque::new(), last_us: None }
     }

@@ -1,9 +1,9 @@
-//! Delays answers to the controller, which models a controller that reads its receiver at irregular times.
+//! Delay of answers to the controller. It models a controller that reads its receiver at irregular times.
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;
 
-/// Delays the answers of each millisecond by a random number of ticks.
+/// Model that delays the answers of each millisecond by a random number of ticks.
 #[derive(Clone, Debug)]
 pub struct Jitter {
     /// Longest delay, ticks.
@@ -15,21 +15,21 @@ pub struct Jitter {
 }
 
 impl Jitter {
-    /// Creates the state without delay; set [`most_ms`](Self::most_ms) for a delay.
+    /// Creates the state without a delay. A value of [`most_ms`](Self::most_ms) above 0 adds a delay.
     pub fn new(seed: u64) -> Self {
         let rng = fastrand::Rng::with_seed(seed ^ 0x6A69_7474);
         Self { most_ms: 0, rng, now: 0, waiting: VecDeque::new() }
     }
 
-    /// Processes a tick. The frames in `received` from index `first` on have arrived in this millisecond. Replaces them
-    /// by the frames that are due.
+    /// Processes a tick. The frames in `received` with index `first` or higher have arrived in this millisecond.
+    /// Replaces these frames by the frames whose delay has ended.
     pub fn delay(&mut self, received: &mut Vec<Frame>, first: usize) {
         self.now += 1;
         if self.most_ms == 0 && self.waiting.is_empty() {
             return;
         }
         let late = self.rng.u8(0..=self.most_ms);
-        // An answer must not overtake an older one.
+        // An answer must not overtake an older answer.
         let last = self.waiting.back().map_or(0, |(due, _)| *due);
         self.waiting.push_back(((self.now + u64::from(late)).max(last), received.split_off(first)));
         while self.waiting.front().is_some_and(|(due, _)| *due <= self.now) {
@@ -42,7 +42,7 @@ impl Jitter {
 mod tests {
     use super::*;
 
-    /// All answers arrive in order and within the limit, and each delay occurs.
+    /// All answers arrive in order and within the maximum delay, and each possible delay occurs.
     #[test]
     fn answers_are_late_but_none_is_lost_or_overtaken() {
         for most_ms in 0..=3u8 {

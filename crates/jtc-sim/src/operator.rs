@@ -1,4 +1,5 @@
-//! An operator who uses the small host: starts the controller, uploads, executes, and waits in virtual time.
+//! Operator who uses the small host to start the controller, to upload and execute trajectories, and to wait in virtual
+//! time.
 use core::fmt;
 
 use jtc_bus::{JOINTS, NodeState};
@@ -12,7 +13,7 @@ use crate::world::World;
 /// Error of an operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OperatorError {
-    /// A condition was not met in time.
+    /// A condition was not fulfilled in time.
     Late {
         /// Expected condition.
         waited_for: &'static str,
@@ -23,7 +24,7 @@ pub enum OperatorError {
         /// Error word when the wait ended.
         errors: u16,
     },
-    /// A frame was refused.
+    /// The controller rejected a frame.
     Refused(Response),
 }
 
@@ -73,8 +74,8 @@ impl Operator {
         (0..ms).for_each(|_| self.step());
     }
 
-    /// Simulates until `done` returns `true`, at most `ms` milliseconds. The error contains `waited_for` as the
-    /// condition.
+    /// Simulates until `done` returns `true`, but at most `ms` milliseconds. The error contains `waited_for` as the
+    /// description of the condition.
     pub fn wait(
         &mut self,
         waited_for: &'static str,
@@ -135,7 +136,7 @@ impl Operator {
         })
     }
 
-    /// Sends a trajectory. The controller must accept every segment.
+    /// Sends a trajectory. Returns an error if the controller rejects a segment.
     pub fn upload(&mut self, points: &[RawPoint], step_ms: u16) -> Result<(), OperatorError> {
         for segment in host::trajectory(points, step_ms, 113) {
             self.ask(&segment)?;

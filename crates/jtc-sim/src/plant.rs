@@ -1,5 +1,6 @@
 //! Devices on the joint bus: drives, gripper, and the arm that they move. The plant does not depend on a particular
-//! controller: it works with the simulated one of [`World`](crate::World) or any other controller that sends frames.
+//! controller. It works with the simulated controller of [`World`](crate::World), or with any controller that sends
+//! frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
 use jtc_dynamics::{ArmModel, JointVec, Payload};
@@ -15,7 +16,7 @@ use crate::request::NodeRequest;
 /// Duration of a drive's tick and of a step of the arm, s.
 const TICK: f64 = 1e-3;
 
-/// Answer of a node: time from the end of the request until the answer is ready, µs, and the frame.
+/// Answer of a node, with the time from the end of the request until the answer is ready (µs), and the frame.
 pub type ReadyAnswer = (u32, Frame);
 
 /// True state of the arm.
@@ -25,11 +26,12 @@ pub struct Truth {
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
-    /// Position of the motors at the joints, through the gears, rad; equal to `q` if gears are rigid.
+    /// Position of the motors, converted to the joint side of the gears, rad. If the gears are rigid, it is equal to
+    /// `q`.
     pub motor: JointVec,
     /// Torque of the drives, N·m.
     pub torque: JointVec,
-    /// Torque of pushes, a hand and walls, N·m.
+    /// Torque that pushes, a hand and walls cause at the joints, N·m.
     pub outside: JointVec,
     /// Bearing temperature, °C.
     pub temperature: JointVec,
@@ -54,14 +56,14 @@ pub struct Plant {
     pub(crate) nodes: Nodes,
     pub(crate) arm: Arm,
     truth: Truth,
-    /// Torque of pushes on the joints, N·m; the next field is the torque of a hand.
+    /// Torque of pushes on the joints, N·m. The next field is the torque of a hand.
     push: JointVec,
     pub(crate) hand: JointVec,
     model: ArmModel,
     scales: [Scale; JOINTS],
     support: Support,
     stand: bool,
-    /// `true` for joints whose brake a fault keeps closed.
+    /// `true` for joints with a brake that stays closed because of a fault.
     stuck: [bool; JOINTS],
     safety_wired: bool,
 }
@@ -95,8 +97,8 @@ impl Plant {
         plant
     }
 
-    /// Passes a frame that ended on the bus at `now_us` to the nodes, and adds their answers to `answers`. Ignores
-    /// frames that are not requests, including answers of nodes.
+    /// Passes a frame that ended on the bus at `now_us` to the nodes, and adds the answers of the nodes to `answers`.
+    /// Ignores frames that are not requests, including answers of nodes.
     pub fn receive(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
         let Some(request) = NodeRequest::parse(frame) else { return };
         for node in 0..NODES {
@@ -104,8 +106,8 @@ impl Plant {
         }
     }
 
-    /// Simulates a millisecond of a bus with the plant's nodes and one controller: sends `out` to the nodes, and adds
-    /// the answers that are complete by its end to `received`.
+    /// Simulates one millisecond of a bus with the nodes of the plant and one controller. Sends `out` to the nodes, and
+    /// adds the answers that are complete at the end of the millisecond to `received`.
     pub fn exchange(
         &mut self,
         bus: &mut Bus,
@@ -116,21 +118,21 @@ impl Plant {
         bus.tick(now_us, out, &mut self.nodes, received)
     }
 
-    /// Returns `true` if any node is on the bus and acknowledges frames.
+    /// Returns `true` if at least one node is on the bus and acknowledges frames.
     pub fn acknowledges(&self) -> bool {
         self.nodes.any_on_bus()
     }
 
-    /// Simulates a millisecond: drives and gripper execute their tick, and the arm moves. `safety_output` is `true` if
-    /// the controller's safety output has the level for no error.
+    /// Simulates one millisecond, in which drives and gripper execute their tick and the arm moves. `safety_output` is
+    /// `true` if the controller's safety output has the level that means no error.
     pub fn step(&mut self, safety_output: bool) {
         self.step_nodes(safety_output);
         self.step_arm();
     }
 
-    /// Simulates a millisecond of the arm without drives, for a controller without a joint bus. These torques (N·m),
-    /// limited to the torques of the drives, act on its joints. Brakes are open; drives and gripper do nothing. NaN is
-    /// treated as no torque.
+    /// Simulates a millisecond of the arm without drives, for a controller without a joint bus. The torques (N·m) act
+    /// on the joints, and are limited to the maximum torques of the drives. Brakes are open, and drives and gripper do
+    /// nothing. NaN counts as zero torque.
     pub fn step_free(&mut self, torque: &JointVec) {
         let ceiling = self.arm.parts().torque_ceiling;
         self.truth.torque = core::array::from_fn(|j| {
@@ -190,7 +192,7 @@ impl Plant {
         self.truth.temperature = self.arm.temperature;
     }
 
-    /// Applies the immediate effect of a node's fault when it begins; ignores other faults.
+    /// Applies the immediate effect of a node's fault when the fault begins. Ignores other faults.
     pub fn begin(&mut self, kind: FaultKind) {
         match kind {
             FaultKind::NodeReboot { node } => match self.nodes.drives.get_mut(usize::from(node)) {
@@ -206,7 +208,7 @@ impl Plant {
         }
     }
 
-    /// Sets the current faults of the nodes and of the arm to those in `kinds`; ignores other faults.
+    /// Sets the current faults of the nodes and of the arm to the faults in `kinds`. Ignores faults of other devices.
     pub fn set_faults(&mut self, kinds: impl Iterator<Item = FaultKind>) {
         let mut drives = [DriveFault::default(); JOINTS];
         let (mut gripper_silent, mut gripper_line) = (false, false);
@@ -270,7 +272,7 @@ impl Plant {
         self.nodes.states()
     }
 
-    /// Places a part under the gripper, or removes it. At the start a part is present.
+    /// Places a part under the gripper, or removes the part. At the start, a part is under the gripper.
     pub fn set_part_present(&mut self, present: bool) {
         if let Some(gripper) = &mut self.nodes.gripper {
             gripper.part_present = present;

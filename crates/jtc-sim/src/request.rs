@@ -1,5 +1,5 @@
-//! Requests as nodes receive them. A request may contain any state byte, although the controller sends only four of
-//! them.
+//! Requests, in the form in which nodes receive them. A request may contain any state byte, although the controller
+//! sends only four of them.
 use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
 /// A request that has reached a node.
@@ -12,7 +12,7 @@ pub enum NodeRequest {
 }
 
 impl NodeRequest {
-    /// Returns the request in a frame; `None` for answers and for frames without a meaning to nodes.
+    /// Returns the request that a frame contains. `None` for answers and for frames that are not requests to nodes.
     pub fn parse(frame: &Frame) -> Option<Self> {
         if frame.id == id::CHANGE_FSM {
             // Bytes missing in a short frame are read as 0, which requests no change.

@@ -1,13 +1,14 @@
-//! Serial line to the host: both directions at the baud rate, with faults in the direction to the device.
+//! Serial line to the host, with both directions at the baud rate, and faults in the direction to the device.
 use std::collections::VecDeque;
 
-/// Picoseconds per microsecond. With this resolution the duration of a byte at any usual rate is exact enough for days.
+/// Picoseconds per microsecond. With this resolution, the duration of a byte at any usual bit rate is accurate enough
+/// for simulations of several days.
 const PS_PER_US: u64 = 1_000_000;
 
-/// A direction of the line.
+/// One direction of the line.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// Duration of a byte (10 bits), ps; 0 means no delay.
+    /// Duration of a byte (10 bits), ps; 0 if bytes have no delay.
     byte_ps: u64,
     queue: VecDeque<u8>,
     /// Time at which the first byte of the queue has arrived, ps.
@@ -17,16 +18,17 @@ pub struct Line {
 }
 
 impl Line {
-    /// Creates one direction of a line with `baud` bit/s, 8N1. With `None` bytes arrive without delay.
+    /// Creates one direction of a line with `baud` bit/s, 8N1. If `baud` is `None`, bytes arrive without delay.
     pub fn new(baud: Option<u32>) -> Self {
         let byte_ps = baud.map_or(0, |rate| 10_000_000_000_000 / u64::from(rate.max(1)));
         Self { byte_ps, queue: VecDeque::new(), front_ps: 0, carried: 0 }
     }
 
-    /// Puts bytes on the line at `now_us`, after bytes that are already waiting.
+    /// Adds bytes to the line at `now_us`, after the bytes that are already waiting.
     pub fn write(&mut self, now_us: u64, bytes: &[u8]) {
         if self.queue.is_empty() {
-            // The last byte may have ended within the millisecond; the transmitter has been idle since then.
+            // The last byte may have ended within the millisecond. In this case the transmitter has been idle since the
+            // end of that byte.
             self.front_ps = now_us * PS_PER_US + self.byte_ps;
         }
         self.queue.extend(bytes);

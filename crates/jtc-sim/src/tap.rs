@@ -1,5 +1,5 @@
-//! Connects the simulated joint bus to another bus. The nodes on the other bus receive every frame, and their frames
-//! take part in the simulation.
+//! Connection of the simulated joint bus to another bus. The nodes on the other bus receive every frame, and their
+//! frames take part in the simulation.
 use core::time::Duration;
 
 use can_link::{CanBus, CanError, CanFrame, Id};
@@ -17,7 +17,8 @@ pub struct BusTap<B> {
     pub sent: u64,
     /// Number of frames taken from the other bus.
     pub taken: u64,
-    /// Number of frames from the other bus that are not valid on the joint bus, or for which its queue was full.
+    /// Number of frames from the other bus that are not valid on the joint bus, or that arrived while its queue was
+    /// full.
     pub refused: u64,
 }
 
@@ -28,7 +29,7 @@ impl<B: CanBus> BusTap<B> {
     }
 
     /// Sends the frames of the simulated bus, and takes frames of nodes on the other bus, which are transmitted in the
-    /// next millisecond. Must be called after each `World::step`.
+    /// next millisecond. The caller must call this function after each `World::step`.
     pub fn exchange(&mut self, world: &mut World) -> Result<(), CanError> {
         for timed in world.bus_frames() {
             let frame = &timed.frame;

@@ -24,7 +24,7 @@ pub enum TypedEvent {
         /// Duration, s.
         seconds: f64,
     },
-    /// A hand that leads the arm along the joint positions of a trajectory file while the arm is taught.
+    /// A hand that guides the arm along the joint positions of a trajectory file in Teaching.
     Hand {
         /// File name as typed.
         file: String,
@@ -49,7 +49,7 @@ impl fmt::Display for TypedEvent {
 pub enum TypedEventError {
     /// Unknown event.
     Unknown(String),
-    /// A push with the wrong number of words; it must have three after its name.
+    /// A push with the wrong number of words. Three words must follow the name.
     PushWords(usize),
     /// An invalid word of a push, and the permitted range.
     Value {
@@ -89,7 +89,7 @@ impl fmt::Display for TypedEventError {
 impl std::error::Error for TypedEventError {}
 
 impl TypedEvent {
-    /// Returns the event of a line; `None` for an empty line or a comment (`#`).
+    /// Returns the event that a line describes. `None` for an empty line or a comment (`#`).
     pub fn parse(line: &str) -> Result<Option<Self>, TypedEventError> {
         let line = line.trim();
         let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));

@@ -1,4 +1,4 @@
-//! The complete simulation in steps of one millisecond: host line, controller, joint bus, drives, arm.
+//! Complete simulation of host line, controller, joint bus, drives and arm, in steps of one millisecond.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::{BusState, ControllerState};
 use jtc_wire::FrameType;
@@ -31,10 +31,11 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
-    /// Clock for the board's measurement of silence on its line, µs; the next field is the time of the last byte.
+    /// Clock with which the board measures silence on its serial line, µs. The next field is the time of the last byte.
     line_us: u64,
     heard_us: u64,
-    /// Longest silence on the line that the board measures, µs; with `None` it is the silence in virtual time.
+    /// Longest silence on the serial line that the board measures, µs. If it is `None`, the board measures the silence
+    /// in virtual time.
     silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,
@@ -161,10 +162,10 @@ impl World {
         }
     }
 
-    /// Applies the hand's pull of this millisecond.
+    /// Applies the torque of the hand for this millisecond.
     fn lead_by_hand(&mut self) {
         let Some(hand) = &mut self.hand else { return };
-        // Closed brakes do not yield to a hand, so the hand waits until every drive is enabled.
+        // A hand cannot move a joint with a closed brake, so the hand waits until every drive is enabled.
         let free = self.plant.node_states()[..JOINTS] == [NodeState::ENABLED; JOINTS];
         let teaching = free && self.board.telemetry().state == ControllerState::Teaching;
         let truth = self.plant.truth();
@@ -175,7 +176,7 @@ impl World {
         }
     }
 
-    /// Applies exactly the active faults.
+    /// Applies the active faults, and removes the effects of all others.
     fn apply_faults(&mut self) {
         let mut bus = BusFault::default();
         let mut line = LineFault::default();
@@ -221,7 +222,7 @@ impl World {
             self.heard_us = self.line_us;
         }
         if let Some(exchange) = &mut self.exchange {
-            // Without a tick the pin keeps its level.
+            // Without a tick, the safety output pin keeps its level.
             let safety_output = self.safety_output;
             **exchange = Exchange { host: fresh.clone(), safety_output, ..Exchange::default() };
         }
@@ -286,7 +287,7 @@ impl World {
         self.to_host.clear();
     }
 
-    /// Adds changes to the log.
+    /// Adds changes of states to the log.
     fn note(&mut self) {
         let time = self.now_us();
         let telemetry = self.board.telemetry();

@@ -1,4 +1,4 @@
-//! A person pushes the arm and leads it by hand.
+//! Tests in which a person pushes the arm and guides it by hand.
 use jtc_bus::Joint;
 use jtc_core::ControllerState;
 use jtc_sim::{FaultPlan, HandPath, Operator, SimConfig, host};
@@ -12,7 +12,7 @@ fn held(faults: FaultPlan) -> Operator {
     operator
 }
 
-/// Returns a path that moves every joint out by 0.4 rad and back, in 4 s.
+/// Returns a path on which every joint moves by 0.4 rad and back, in 4 s.
 fn path() -> HandPath {
     let at = |i: u32| {
         let s = (core::f64::consts::PI * f64::from(i) / 400.0).sin().powi(2);
@@ -33,7 +33,7 @@ fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
 fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     let mut operator = held(FaultPlan::default());
     operator.run(500);
-    // Less than the push at which the joint would yield.
+    // This push is smaller than the push at which the joint would yield.
     operator.world.push(Joint::ALL[2], 30.0, 200);
     let far = farthest(&mut operator, 2, 300);
     assert!((1e-3..0.05).contains(&far), "{far} rad");

@@ -1,4 +1,4 @@
-//! Equal seeds give equal bytes on both links.
+//! Simulations with equal seeds produce equal bytes on both links.
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use jtc_sim::{Fault, FaultKind, FaultPlan, Operator, SimConfig, Trigger, host};

@@ -1,11 +1,11 @@
-//! Elastic gears, compared with the mechanics of two bodies on a spring.
+//! Tests of elastic gears, compared with the mechanics of two bodies that a spring connects.
 use jtc_core::JOINTS;
 use jtc_dynamics::Dynamics;
 use jtc_sim::{Arm, FrictionModel, Gear, SimArm, SimFriction};
 
 const TICK: f64 = 1e-3;
 const POSE: [f64; JOINTS] = [0.3, 0.4, -0.7, 0.4, 0.6, -0.2];
-/// Part of the rotor that turns with the link, kg·m².
+/// Part of the rotor inertia that belongs to the link, kg·m².
 const OUTPUT: f64 = 0.01;
 
 fn frictionless(gears: [Gear; JOINTS]) -> SimArm {
@@ -39,7 +39,7 @@ fn energy(arm: &Arm) -> f64 {
             sum += 0.5 * rotor * arm.qd[j].powi(2);
         }
     }
-    // The frames of the joints are also the frames of the links.
+    // The coordinate frames of the joints are also the coordinate frames of the links.
     let poses = dynamics.forward_kinematics(&arm.q);
     for (link, pose) in parts.model.links[1..].iter().zip(&poses) {
         let com: f64 = (0..3).map(|i| pose.rotation[2][i] * link.origin.xyz[i]).sum();

@@ -6,7 +6,7 @@ use crate::drive::Drive;
 use crate::gripper::Gripper;
 use crate::request::NodeRequest;
 
-/// Time from the end of a request until the first answer is ready, and from each answer to the next, µs.
+/// Time from the end of a request until the first answer is ready, and from each answer to the next answer, µs.
 pub(super) const ANSWER_US: (u32, u32) = (38, 6);
 /// Length of the gripper's answer to Move, bytes.
 const GRIPPER_ANSWER: usize = 20;
@@ -16,24 +16,24 @@ const GRIPPER_ANSWER: usize = 20;
 pub struct Nodes {
     /// Drives from the base to the wrist.
     pub drives: [Drive; JOINTS],
-    /// Node 6; `None`: not installed.
+    /// Gripper (node 6); `None` if it is not installed.
     pub gripper: Option<Gripper>,
 }
 
 impl Nodes {
-    /// Returns `true` if any node acknowledges frames.
+    /// Returns `true` if at least one node acknowledges frames.
     pub fn any_on_bus(&self) -> bool {
         self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
     }
 
-    /// Returns the states of the nodes. Without a gripper, its state is Fault.
+    /// Returns the states of the nodes. Without a gripper, the state of node 6 is Fault.
     pub fn states(&self) -> [NodeState; NODES] {
         let gripper = self.gripper.as_ref().map_or(NodeState::FAULT, Gripper::state);
         core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
     }
 
-    /// Returns a node's answer to a request that ended at `now_us`, and the time from then until the answer is ready,
-    /// µs.
+    /// Returns a node's answer to a request that ended at `now_us`, and the time from that end until the answer is
+    /// ready, µs.
     pub fn answer(
         &mut self,
         node: usize,

@@ -17,7 +17,7 @@ impl Drive {
         }
     }
 
-    /// Processes a ChangeFsm with any byte. The tick decides what the byte means.
+    /// Processes a ChangeFsm request with any byte. The tick function determines the meaning of the byte.
     fn change(&mut self, state: NodeState) -> Answer {
         let before = self.states.state();
         if !self.fault.ignores_state {
@@ -37,7 +37,7 @@ impl Drive {
                 self.goal = if self.mode == 1 { torque.get(n).copied().unwrap_or(0.0) } else { 0.0 };
                 Some(Answer::Joint { node: self.node, report: self.report() })
             }
-            // `NodeRequest` has a separate variant for it.
+            // `NodeRequest` has a separate variant for this request.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { mode, config, .. } => {
                 let accepted = matches!(self.states.state(), NodeState::INIT | NodeState::READY);
@@ -69,14 +69,15 @@ impl Drive {
         if self.outside() {
             warnings |= warning::OUTSIDE_WORKING_AREA;
         }
-        // The warning is also set before the first configuration, at any level of the line.
+        // The warning is also set before the first configuration, at any level of the safety line.
         if self.safety_line() || !self.configured {
             warnings |= warning::SAFETY_LINE;
         }
         JointReport {
             position: self.position,
             velocity: self.velocity,
-            // Reports the magnitude with the sign of the last command. This is not a measurement.
+            // The drive reports the magnitude with the sign of the last command. The reported value is not a
+            // measurement.
             torque: if self.goal < 0.0 { -self.torque.abs() } else { self.torque.abs() },
             temperature: byte(self.temperature),
             state: self.states.state(),
@@ -89,7 +90,7 @@ impl Drive {
     }
 }
 
-/// Returns a temperature in °C as the bus transmits it; negative values wrap around.
+/// Converts a temperature in °C to the value on the bus. Negative values wrap around.
 fn byte(celsius: f64) -> u8 {
     floor(celsius) as u8
 }

@@ -3,10 +3,10 @@
 /// Side of the gear on which the encoder is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EncoderPlace {
-    /// On the motor's side; the position refers to the joint through the gear.
+    /// Motor side of the gear. The position is converted to the joint side with the gear ratio.
     #[default]
     Motor,
-    /// On the link's side.
+    /// Link side of the gear.
     Link,
 }
 
@@ -23,20 +23,20 @@ pub struct DriveConfig {
     pub rest_ms: u32,
     /// Speed at the raw value 32767, rad/s: 2.0, or 6.283185 for older drives.
     pub velocity_full_scale: f64,
-    /// Measured speed at which the drive trips, rad/s, in both directions. Real drives have 1.8 (older ones 1.5 or
-    /// 1.0), which is 1.2 times the default arm's velocity limit. [`SimConfig::new`](crate::SimConfig::new) uses 1.2
-    /// times the limit of each joint.
+    /// Measured speed at which the drive trips, rad/s, in both directions. Real drives have a limit of 1.8 (older
+    /// drives 1.5 or 1.0), which is 1.2 times the default arm's velocity limit.
+    /// [`SimConfig::new`](crate::SimConfig::new) uses 1.2 times the limit of each joint.
     pub over_speed: f64,
-    /// Side of the gear at which the position is measured. The speed is always measured at the motor. The side matters
-    /// only for elastic gears.
+    /// Side of the gear at which the position is measured. The drive always measures the speed at the motor. The side
+    /// has an effect only for elastic gears.
     pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,
-    /// Torque at the joint divided by the requested torque. The drive reports the requested torque as delivered. Real
-    /// drives: about 1/1.3.
+    /// Torque at the joint divided by the requested torque. The drive reports the requested torque as the actual
+    /// torque. For real drives, the value is about 1/1.3.
     pub delivers: f64,
-    /// `true` if the drive processes only one message per interrupt. After two requests back to back it then stays one
-    /// message late.
+    /// `true` if the drive processes only one message per interrupt. After two requests without a pause between them,
+    /// such a drive stays one message late.
     pub one_message_per_interrupt: bool,
     /// `true` if the drive executes ChangeFsm in the interrupt and answers with the code of the transition. Otherwise
     /// it answers with the previous state.
@@ -68,8 +68,8 @@ impl DriveConfig {
     /// Smallest and largest over-speed limit that the simulator's options accept, rad/s.
     pub const OVER_SPEED: (f64, f64) = (0.01, 100.0);
 
-    /// Returns the properties of drives with the previous firmware: other speed scale, short answers, one message per
-    /// interrupt.
+    /// Returns the properties of drives with the previous firmware: a different speed scale, short answers, and one
+    /// message per interrupt.
     pub fn older() -> Self {
         Self {
             velocity_full_scale: 6.283185,
@@ -84,7 +84,7 @@ impl DriveConfig {
 /// Current effects of faults on a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveFault {
-    /// `true` if the node is off the bus, while its motor continues.
+    /// `true` if the node is disconnected from the bus while its motor continues.
     pub silent: bool,
     /// Motor-control fault bits.
     pub motor_control: u8,
@@ -94,7 +94,7 @@ pub struct DriveFault {
     pub encoder_offset: f64,
     /// `true` if the drive reports its position as inaccurate.
     pub not_accurate: bool,
-    /// `true` if the safety line has the level for danger.
+    /// `true` if the safety line has the level that means danger.
     pub safety_line: bool,
     /// `true` if the drive answers requests for another state but does not execute them.
     pub ignores_state: bool,

@@ -1,5 +1,5 @@
-//! Sensors of a drive: a coarse absolute encoder at the joint ([`EncoderPlace`](super::EncoderPlace)), and a delayed speed from the motor's
-//! own encoder.
+//! Sensors of a drive. These are a coarse absolute encoder at the joint ([`EncoderPlace`](super::EncoderPlace)), and the encoder of the
+//! motor, from which a delayed speed is computed.
 
 /// Counts per turn of the 16-bit absolute encoder.
 const ENCODER_COUNTS: f64 = 65_536.0;
@@ -7,7 +7,7 @@ const ENCODER_COUNTS: f64 = 65_536.0;
 const HALF_TURN: f64 = jtc_wire::POSITION_SCALE;
 /// Counts of the motor's incremental encoder per radian of the joint, with the gear ratio of 121.
 const MOTOR_COUNTS_PER_RAD: f64 = 10_000.0 * 121.0 / core::f64::consts::TAU;
-/// Number of encoder differences of 1 ms that are averaged for the speed.
+/// Number of encoder differences (each over 1 ms) whose average is the speed.
 const SPEED_WINDOW: usize = 10;
 
 /// Both encoders of a drive.
@@ -19,8 +19,8 @@ pub(super) struct Encoders {
 }
 
 impl Encoders {
-    /// Returns the speed of a joint after another millisecond, in which it moved to `q` (rad), rad/s. It is computed
-    /// from the motor's encoder, which is much finer than the joint's.
+    /// Returns the speed of a joint (rad/s) after one more millisecond, in which the joint moved to `q` (rad). The
+    /// speed is computed from the encoder of the motor, which is much finer than the encoder of the joint.
     pub(super) fn speed(&mut self, q: f64) -> f64 {
         let motor = floor(q * MOTOR_COUNTS_PER_RAD);
         let oldest = core::mem::replace(&mut self.history[self.oldest], motor);
@@ -28,8 +28,8 @@ impl Encoders {
         (motor - oldest) as f64 / (MOTOR_COUNTS_PER_RAD * SPEED_WINDOW as f64 * 0.001)
     }
 
-    /// Returns the position of a joint at `q` (rad) as the absolute encoder measures it, rad. The number of whole turns
-    /// is lost.
+    /// Returns the position of a joint at `q` (rad) as the absolute encoder measures it, rad. The result does not
+    /// contain the number of whole turns.
     pub(super) fn position(&self, q: f64) -> f64 {
         let turns = q / core::f64::consts::TAU;
         let count = floor(turns * ENCODER_COUNTS + 0.5) as i16;
@@ -37,8 +37,8 @@ impl Encoders {
     }
 }
 
-/// Returns the largest whole number that is not above `x`. Replaces `f64::floor`, which is a function call if the
-/// compiler may not use the processor's instruction.
+/// Returns the largest whole number that is less than or equal to `x`. Replaces `f64::floor`, which is a slow function
+/// call if the compiler does not use the processor instruction for it.
 pub(super) fn floor(x: f64) -> i64 {
     let near = x as i64;
     near - i64::from(near as f64 > x)

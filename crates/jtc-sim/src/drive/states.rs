@@ -3,7 +3,8 @@ use jtc_bus::NodeState;
 
 use super::DriveConfig;
 
-/// Codes of transitions that differ between generations of drives. These are the codes of the simulated generation.
+/// Codes of transitions, which differ between generations of drives. The values are the codes of the simulated
+/// generation.
 const READY_TO_INIT: NodeState = NodeState::new(14);
 const REACTION_TO_FAULT: NodeState = NodeState::new(15);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
@@ -14,7 +15,7 @@ pub(super) struct States {
     state: NodeState,
     /// Number of ticks since `state` was entered.
     age: u32,
-    /// Last requested state; Start means none.
+    /// Last requested state. Start means that no state was requested.
     pending: NodeState,
     /// `true` if the motor was aligned since the last reset.
     aligned: bool,
@@ -32,7 +33,7 @@ impl States {
         self.state
     }
 
-    /// Stores a request with any byte; [`accept`](Self::accept) decides what the byte means.
+    /// Stores a request with any byte. [`accept`](Self::accept) determines the meaning of the byte.
     pub(super) fn request(&mut self, state: NodeState) {
         self.pending = state;
     }
@@ -42,7 +43,7 @@ impl States {
         self.age = self.age.saturating_add(1);
     }
 
-    /// Returns `true` if another error changes nothing, because the drive already reacts to an error or has just
+    /// Returns `true` if a further error has no effect, because the drive already reacts to an error or has just
     /// started.
     pub(super) fn reacting(&self) -> bool {
         matches!(
@@ -55,7 +56,7 @@ impl States {
         )
     }
 
-    /// Begins the pending transition, if the current state has one.
+    /// Begins the pending transition, if the current state permits a transition.
     pub(super) fn accept(&mut self, config: &DriveConfig) {
         let next = match (self.pending, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
@@ -63,7 +64,7 @@ impl States {
             (NodeState::INIT, NodeState::FAULT) => FAULT_TO_INIT,
             (NodeState::READY, NodeState::INIT) => NodeState::INIT_TO_READY,
             (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
-            // Some drives, including this one, treat an echoed fault byte as a command to enable.
+            // Some drives, including the simulated drive, treat an echoed fault byte as an enable command.
             (NodeState::ENABLED | NodeState::FAULT, NodeState::READY) => NodeState::READY_TO_ENABLED,
             // The error byte stays 0.
             (NodeState::FAULT_REACTION, state) if state != NodeState::START => {
@@ -84,7 +85,8 @@ impl States {
         self.age = 0;
     }
 
-    /// Continues a transition. Its end clears a pending request. Returns `true` if the errors are acknowledged.
+    /// Continues a transition. The end of the transition clears a pending request. Returns `true` if the errors are
+    /// acknowledged.
     pub(super) fn proceed(&mut self, config: &DriveConfig) -> bool {
         self.rest = self.rest.saturating_sub(1);
         let start_time = if self.aligned { config.enable_ms } else { config.first_enable_ms };

@@ -9,28 +9,29 @@ use crate::faults::FaultKind;
 /// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FaultFileError {
-    /// The file is not valid TOML of this form. The text comes from the TOML reader and contains the position.
+    /// The file is not valid TOML in the format of fault files. The text comes from the TOML reader and contains the
+    /// position in the file.
     Syntax(String),
-    /// The file has no `format = 2`.
+    /// The file does not contain `format = 2`.
     Format {
-        /// Format of the file.
+        /// Format number of the file.
         found: Option<f64>,
     },
-    /// The file uses the key `node`, which existed before format 2.
+    /// The file uses the key `node`, which was used before format 2.
     Node {
         /// Number of the fault in the file, from 1.
         fault: usize,
         /// Value in the file.
         node: f64,
     },
-    /// A fault has neither or both of `joint` and `gripper`.
+    /// A fault contains both `joint` and `gripper`, or neither of the two keys.
     Device {
         /// Number of the fault in the file, from 1.
         fault: usize,
         /// Kind of the fault.
         kind: String,
     },
-    /// The file of a hand cannot be used.
+    /// The trajectory file of a hand cannot be used.
     Hand {
         /// Number of the fault in the file, from 1.
         fault: usize,
@@ -112,7 +113,7 @@ pub enum FaultFileError {
         /// State in the file.
         state: String,
     },
-    /// The fault does not have exactly one of `at_s`, `in_state` and `at_point`.
+    /// The fault does not contain exactly one of the keys `at_s`, `in_state` and `at_point`.
     Trigger {
         /// Number of the fault in the file, from 1.
         fault: usize,

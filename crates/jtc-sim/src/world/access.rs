@@ -1,4 +1,4 @@
-//! Methods of the simulation for its users.
+//! Methods that the users of the simulation call.
 use jtc_bus::{Frame, Joint, NODES, NodeState};
 use jtc_core::{BusState, Controller, Telemetry};
 use jtc_dynamics::ArmModel;
@@ -19,15 +19,15 @@ use crate::plant::Truth;
 pub struct Statistics {
     /// Counters of the joint bus.
     pub bus: BusStatistics,
-    /// Number of bytes that reached the controller's end of the line.
+    /// Number of bytes on the serial line that reached the controller.
     pub serial_to_device: u64,
     /// Number of bytes that reached the host.
     pub serial_to_host: u64,
     /// Number of valid host frames that the controller executed.
     pub good_frames: u64,
-    /// Number of bad frames and of noise.
+    /// Number of invalid frames and of noise events.
     pub bad_frames: u64,
-    /// Number of bytes from the host that the board could not store.
+    /// Number of bytes from the host that the board could not store in its buffer.
     pub lost_bytes: u64,
     /// Number of resets by the watchdog.
     pub watchdog_resets: u32,
@@ -48,16 +48,16 @@ impl World {
         self.ticks * TICK_US
     }
 
-    /// Puts bytes of the host on the line; the device receives them at the rate of the line.
+    /// Adds bytes of the host to the serial line. The device receives these bytes at the rate of the line.
     pub fn host_write(&mut self, bytes: &[u8]) {
         if !bytes.is_empty() {
             self.to_device.write(self.now_us(), bytes);
         }
     }
 
-    /// Limits the host's silence to `us` µs of its own time, although virtual time may pass faster. A frame that another program sends in
-    /// pieces is then not interrupted by a gap (J-03) that the host did not cause. Bytes that wait on the line still cause gaps. `None`,
-    /// the default: only virtual time counts.
+    /// Limits the silence of the host to `us` µs of the host's own time, because virtual time may pass faster. Therefore a gap (J-03)
+    /// that the host did not cause cannot interrupt a frame that another program sends in pieces. Bytes that wait on the line still
+    /// cause gaps. With `None`, the default, only virtual time counts.
     pub fn limit_host_silence(&mut self, us: Option<u64>) {
         self.silence_us = us;
     }
@@ -67,7 +67,7 @@ impl World {
         self.to_device.pending()
     }
 
-    /// Takes bytes that have reached the host by now; returns their number.
+    /// Moves the bytes that have reached the host into `buffer`, and returns the number of these bytes.
     pub fn host_read(&mut self, buffer: &mut [u8]) -> usize {
         let count = buffer.len().min(self.host_inbox.len());
         buffer[..count].copy_from_slice(&self.host_inbox[..count]);
@@ -105,7 +105,7 @@ impl World {
         self.plant.truth()
     }
 
-    /// Returns the arm after model errors.
+    /// Returns the arm model after model errors were applied.
     pub fn true_model(&self) -> &ArmModel {
         self.plant.true_model()
     }
@@ -125,13 +125,13 @@ impl World {
         self.exchange.get_or_insert_default();
     }
 
-    /// Returns the inputs and outputs of the controller's board in the last millisecond; `None` unless it is
+    /// Returns the inputs and outputs of the controller's board in the last millisecond. `None` if the board is not
     /// [watched](Self::watch_board).
     pub fn exchange(&self) -> Option<&Exchange> {
         self.exchange.as_deref()
     }
 
-    /// Returns true if the controller had its tick in the last millisecond.
+    /// Returns true if the controller executed its tick in the last millisecond.
     pub fn ticked(&self) -> bool {
         self.ticked
     }
@@ -146,13 +146,13 @@ impl World {
         self.bus.frames()
     }
 
-    /// Queues a frame of a member of the joint bus outside this simulation: an answer for the controller, or a request for the nodes.
-    /// Returns `false` if too many such frames wait already.
+    /// Queues a frame of a node outside this simulation. The frame is an answer for the controller, or a request for the nodes.
+    /// Returns `false` if too many such frames are already waiting.
     pub fn put_bus_frame(&mut self, frame: Frame) -> bool {
         self.bus.put(frame)
     }
 
-    /// Returns the state bytes of joints and gripper (255: no gripper).
+    /// Returns the state bytes of joints and gripper (255 if there is no gripper).
     pub fn node_states(&self) -> [NodeState; NODES] {
         self.node_states
     }
@@ -162,27 +162,27 @@ impl World {
         &self.board.worked
     }
 
-    /// Returns the level of the controller's safety output: true = no error.
+    /// Returns the level of the controller's safety output: `true` means no error.
     pub fn safety_output(&self) -> bool {
         self.safety_output
     }
 
-    /// Sets the level of the controller's safety input: true = no error.
+    /// Sets the level of the controller's safety input: `true` means no error.
     pub fn set_safety_input(&mut self, level: bool) {
         self.safety_input = level;
     }
 
-    /// Places a part under the gripper, or removes it. A part is present from the start.
+    /// Places a part under the gripper, or removes the part. At the start, a part is under the gripper.
     pub fn set_part_present(&mut self, present: bool) {
         self.plant.set_part_present(present);
     }
 
-    /// Adds a fault; `Trigger::At` counts from the start of the simulation.
+    /// Adds a fault. `Trigger::At` counts from the start of the simulation.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.add(fault);
     }
 
-    /// Adds the faults of a fault file; `Trigger::At` counts from the start of the simulation.
+    /// Adds the faults of a fault file. `Trigger::At` counts from the start of the simulation.
     pub fn inject_all(&mut self, plan: FaultPlan) {
         let known = self.hands.len();
         self.hands.extend(plan.hands);
@@ -194,13 +194,14 @@ impl World {
         }
     }
 
-    /// Pushes a joint with a torque (N·m) for `ms` milliseconds from now on.
+    /// Pushes a joint with a torque (N·m) for `ms` milliseconds, beginning now.
     pub fn push(&mut self, joint: Joint, torque: f64, ms: u64) {
         let trigger = Trigger::At(self.now_us() / TICK_US);
         self.inject(Fault { kind: FaultKind::Push { joint, torque }, trigger, duration_ms: Some(ms) });
     }
 
-    /// Leads the arm along a path by a hand as soon as it is taught. Replaces a hand that leads it already.
+    /// Adds a hand that guides the arm along a path as soon as Teaching begins. Replaces a hand that already guides the
+    /// arm.
     pub fn lead(&mut self, path: HandPath) {
         let kind = FaultKind::Hand { path: self.hands.len() };
         self.hands.push(path);
@@ -208,7 +209,7 @@ impl World {
         self.inject(Fault { kind, trigger, duration_ms: None });
     }
 
-    /// Returns the last millisecond, for the checker of invariants.
+    /// Returns the last millisecond, for the check of invariants.
     pub fn moment(&self) -> Moment<'_> {
         Moment {
             time_us: self.now_us(),

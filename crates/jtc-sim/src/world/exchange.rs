@@ -1,5 +1,5 @@
-//! Inputs and outputs of the controller's board in a millisecond. For programs that run another board, or the
-//! controller in another program, in parallel with the simulated board.
+//! Inputs and outputs of the controller's board in a millisecond. These are for programs that run a different board, or
+//! a controller in a different program, in parallel with the simulated board.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Outputs};
 
@@ -45,7 +45,7 @@ impl Default for Exchange {
 }
 
 impl Exchange {
-    /// Adds the inputs and outputs of the tick.
+    /// Adds the inputs and outputs of the tick to the exchange.
     pub(super) fn note(&mut self, pins: &Pins<'_>, outputs: &Outputs, board: &Board) {
         self.ticked = true;
         self.bus = pins.bus.to_vec();
@@ -58,8 +58,8 @@ impl Exchange {
 }
 
 impl Board {
-    /// Returns the bytes that the last tick, which had these outputs, sends to the host: a status, an answer to an
-    /// extension request, or none.
+    /// Returns the bytes that the tick with these outputs sends to the host. These are a status, an answer to an
+    /// extension request, or no bytes.
     pub fn bytes_to_host(&self, outputs: &Outputs) -> Vec<u8> {
         let status: &[u8] = if outputs.status { self.status_frame() } else { &[] };
         let answer = if outputs.answer_line.is_some() { self.answer_frame() } else { &[] };

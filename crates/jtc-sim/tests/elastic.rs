@@ -93,7 +93,8 @@ fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     assert!(most > 5.0 && (change - work).abs() < 2e-3 * most, "{change} J, {work} J put in");
 }
 
-/// Each joint in turn has an elastic gear and a blocked motor. Its link oscillates at √(K/J).
+/// The test gives each joint, one after the other, an elastic gear and a blocked motor. The link of this joint
+/// oscillates at √(K/J).
 #[test]
 fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     for joint in 0..JOINTS {
@@ -105,7 +106,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
         arm.q[joint] += 1e-4;
         let inertia = Dynamics::new(&arm.parts().model, [0.0; 3]).mass_matrix(&POSE)[joint][joint] + OUTPUT;
         let expected = (stiffness / inertia).sqrt();
-        // Measures ten whole periods between crossings of the middle.
+        // Measures ten whole periods between crossings of the middle position.
         let (mut t, mut first, mut crossings) = (0.0, None, 0);
         let dt = 1e-4;
         while crossings <= 10 {
@@ -131,7 +132,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     }
 }
 
-/// With a blocked motor, a loaded link sags by the torque divided by the stiffness.
+/// With a blocked motor, a loaded link moves down by the torque divided by the stiffness.
 #[test]
 fn a_loaded_link_rests_at_torque_over_stiffness() {
     let gear = Gear { stiffness: 20_000.0, damping: 200.0 };
@@ -148,7 +149,8 @@ fn a_loaded_link_rests_at_torque_over_stiffness() {
     }
 }
 
-/// With increasing stiffness, also with friction, the arm approaches an arm with rigid gears.
+/// With increasing stiffness, the motion of the arm approaches the motion of an arm with rigid gears, also with
+/// friction.
 #[test]
 fn stiff_gears_move_the_arm_as_rigid_ones_do() {
     for model in [FrictionModel::default(), FrictionModel::Smooth { width: 0.01 }] {

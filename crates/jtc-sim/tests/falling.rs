@@ -3,8 +3,8 @@ use jtc_bus::{NodeState, Request, Target};
 use jtc_core::{ControllerState, error};
 use jtc_sim::{Operator, SimConfig, Support, host};
 
-/// Returns an arm that the controller holds with its upper arm bent forward by this angle, so that gravity pulls it
-/// further.
+/// Returns an arm that the controller holds with the upper arm bent forward by this angle, so that gravity pulls the
+/// upper arm down.
 fn held(shoulder: f64) -> Operator {
     let start = [0.0, shoulder, -0.3, 0.0, 0.2, 0.0];
     let config = SimConfig { start, support: Support::Stand, baud: None, ..SimConfig::default() };
@@ -25,7 +25,7 @@ fn asks_to_enable(operator: &Operator) -> bool {
     }
 }
 
-/// Clears the errors `after_ms` after the arm was released.
+/// Clears the errors `after_ms` after the torque was switched off.
 fn fall_and_clear(shoulder: f64, after_ms: u64) {
     let mut operator = held(shoulder);
     operator.world.set_safety_input(false);
@@ -35,7 +35,7 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
     let (mut asked, mut last) = (None, [0.0; 6]);
     for ms in 0..15_000 {
         if ms % 500 == 0 && operator.state() == ControllerState::Error {
-            // Cleared repeatedly, because drives that fall faster than 1.8 rad/s report over-speed.
+            // The test clears the errors repeatedly, because drives that fall faster than 1.8 rad/s report over-speed.
             operator.world.host_write(&host::clear_all());
         }
         operator.step();
@@ -54,7 +54,7 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
             let correction =
                 if joint.state == NodeState::ENABLED { joint.torque - joint.torque_model } else { 0.0 };
             let step = (correction - *last).abs();
-            // When a joint begins to yield, its torque falls within 10 ms (J-68).
+            // When a joint begins to yield, its torque decreases within 10 ms (J-68).
             assert!(step < 12.0 || joint.internal != 0, "{after_ms} + {ms} ms: torque step of {step} N·m");
             *last = correction;
         }

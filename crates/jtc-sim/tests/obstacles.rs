@@ -1,4 +1,4 @@
-//! The controller with an arm that meets walls, picks up loads, and has elastic gears and drives with their own
+//! Tests of the controller with an arm that touches walls, picks up loads, and has elastic gears and drives with an
 //! over-speed trip.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, error, joint_error};
@@ -26,9 +26,9 @@ fn inject(operator: &mut Operator, kind: FaultKind, ms: Option<u64>) {
     operator.world.inject(Fault { kind, trigger: now, duration_ms: ms });
 }
 
-/// Only joint 1 turns, from 0 to 1 rad and back, with a wall at 0.5 rad. The largest torque of the wall is the torque
-/// v·√(K·J) from the kinetic energy plus the torque of the drive. The wall never pulls, and its torque becomes 0 when
-/// the wall is removed.
+/// Only joint 1 moves, from 0 to 1 rad and back, with a wall at 0.5 rad. The largest torque of the wall is the sum of
+/// the torque v·√(K·J) from the kinetic energy and the torque of the drive. The wall never pulls, and its torque
+/// becomes 0 when the wall is removed.
 #[test]
 fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     let start = [0.0, -0.4, 0.9, 0.2, -0.3, 0.5];
@@ -69,8 +69,8 @@ fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     }
 }
 
-/// A load is picked up and dropped again. The holding torque changes by the load's weight, and returns to its old
-/// value.
+/// The arm picks up a load and drops it. The holding torque changes by the weight of the load, and then returns to its
+/// earlier value.
 #[test]
 fn a_load_that_is_taken_up_is_held_and_dropped() {
     let mut operator = held(config());
@@ -91,7 +91,7 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     let load = jtc_dynamics::Payload { mass, com, ..jtc_dynamics::Payload::NONE };
     let (loaded, empty) = (of(load), of(jtc_dynamics::Payload::NONE));
     for j in 0..6 {
-        // Stiction carries a part of the weight.
+        // Stiction carries part of the weight.
         let weight = loaded[j] - empty[j];
         assert!(
             (with[j] - before[j] - weight).abs() < 9.0,
@@ -107,7 +107,8 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     assert!(events.iter().any(|event| event.contains("payload 1.5 kg at (0, 0.02, 0.06) m")), "{events:?}");
 }
 
-/// The controller's own speed check (J-35) is visible only with drives that trip later than the default drives.
+/// The speed check of the controller (J-35) has a visible effect only with drives that trip at a higher speed than the
+/// default drives.
 #[test]
 fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     let run = |over_speed: Option<f64>| {
@@ -147,8 +148,8 @@ fn a_brake_that_stays_closed_holds_the_joint() {
     }
 }
 
-/// With gears of 20,000 N·m/rad the default arm is brought up, held and moved. The drives report the positions of the
-/// motors.
+/// With gears of 20,000 N·m/rad, the controller enables, holds and moves the default arm. In this test the drives
+/// report the positions of the motors.
 #[test]
 fn an_arm_with_gears_that_yield_is_held_and_moved() {
     let run = || {
@@ -188,9 +189,9 @@ fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     assert_eq!(pushed, [5.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// Elastic gears twist between the joint's encoder and the motor's encoder. For any motion and contact of the arm, the
-/// controller reports the twist neither as a jump of an encoder nor as another speed scale, whether the drives measure
-/// the position at the motor or at the link.
+/// An elastic gear twists, so the joint encoder and the motor encoder measure different positions. For any motion and
+/// contact of the arm, the controller must not report this twist as an encoder jump or as a different speed scale. This
+/// applies to drives that measure the position at the motor and to drives that measure it at the link.
 #[test]
 fn j35_gears_that_yield_are_no_false_alarm() {
     for (trial, place) in
@@ -215,7 +216,7 @@ fn j35_gears_that_yield_are_no_false_alarm() {
         if trial % 2 == 0 {
             inject(&mut operator, FaultKind::Push { joint, torque }, Some(20 + (500.0 * rng.f64()) as u64));
         } else {
-            // At the position of the joint, on the side towards which it moves.
+            // The wall is near the position of the joint, on the side towards which the joint moves.
             let speed = operator.world.truth().qd[joint.index()];
             let side = if speed >= 0.0 { Side::Above } else { Side::Below };
             let rad = operator.world.truth().q[joint.index()] + 0.05 * speed.signum();

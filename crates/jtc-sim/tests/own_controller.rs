@@ -1,9 +1,9 @@
-//! Compares the world's controller with another board that gets the same inputs, and tests the plant with torques
-//! instead of a bus.
+//! Comparison of the simulated controller with a second board that receives equal inputs, and tests of the plant with
+//! torques instead of a bus.
 use jtc_core::{Config, ControllerState, Parameters};
 use jtc_sim::{Board, Fault, FaultKind, FaultPlan, Operator, Pins, Plant, SimConfig, Support, Trigger};
 
-/// A second board with the inputs of the world's board has bit-identical outputs, also through missed ticks and a reset
+/// A second board with the inputs of the simulated board has bit-identical outputs, also with missed ticks and a reset
 /// by the watchdog.
 #[test]
 fn a_board_with_the_inputs_of_the_worlds_has_its_outputs() {
@@ -46,8 +46,8 @@ fn a_board_with_the_inputs_of_the_worlds_has_its_outputs() {
     assert_eq!(board.watchdog_resets, 1);
 }
 
-/// Gravity compensation holds the arm at its position, zero torque lets it fall, and torques above the drives' limits
-/// are clipped.
+/// With gravity compensation the arm stays at its position, and with zero torque it falls. Torques above the limits of
+/// the drives are clipped.
 #[test]
 fn a_plant_without_its_bus_moves_under_the_torques_that_it_is_given() {
     let start = [0.0, 0.6, -1.0, 0.3, 0.4, 0.0];

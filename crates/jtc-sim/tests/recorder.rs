@@ -1,4 +1,4 @@
-//! The flight recorder in whole sessions: its contents, and a replay that gives the same results (J-56).
+//! Tests of the flight recorder in whole sessions: its contents, and a replay with identical results (J-56).
 use std::collections::HashMap;
 
 use jtc_core::recorder::{Block, Log, Outcome, Record, Replay, SNAPSHOT_MS, Unsure};
@@ -23,10 +23,11 @@ fn blocks(world: &World) -> Vec<Block> {
     world.recorder().blocks().copied().collect()
 }
 
-/// Replays the log and compares each tick with the values that the controller computed in the session.
+/// Replays the log, and compares the results of each tick with the values that the controller computed in the session.
 fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
     let blocks = blocks(world);
-    // The replay takes only settings and points from the session's controller. Everything else is in the snapshots.
+    // From the controller of the session, the replay uses only settings and points. All other data are in the
+    // snapshots.
     let then = world.controller();
     let mut controller = Controller::new(then.config().clone(), vec![RawPoint::default(); POINTS_MAX]);
     controller.put_points(0, then.points());
@@ -39,7 +40,7 @@ fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
             Outcome::Same => {
                 counts.same += 1;
                 let Some(seen) = seen.get(&tick) else { continue };
-                // `records_lost` is excluded, because the link sets it.
+                // `records_lost` is excluded, because the link sets this value.
                 let then = Telemetry { records_lost: 0, ..*seen };
                 assert_eq!(Telemetry { records_lost: 0, ..step.telemetry }, then, "tick {tick}");
             }
@@ -82,7 +83,7 @@ fn j56_random_sessions_with_faults_replay_bit_for_bit() {
     assert!(all.same > 100_000, "{all:?}");
 }
 
-/// Returns a controller that holds the arm, with a path loaded.
+/// Returns a controller that holds the arm, with a trajectory in memory.
 fn loaded() -> Operator {
     let config = SimConfig { start: FROM, baud: None, ..SimConfig::default() };
     let mut operator = Operator::new(config);
@@ -91,7 +92,8 @@ fn loaded() -> Operator {
     operator
 }
 
-/// Runs along the path and returns the telemetry of each tick; `sends` returns the bytes that a host sends in a tick.
+/// Executes the trajectory and returns the telemetry of each tick. `sends` returns the bytes that a host sends in a
+/// tick.
 fn run(sends: impl Fn(u32) -> Vec<u8>) -> (Operator, Vec<Telemetry>) {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
@@ -118,15 +120,17 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
     assert!(undisturbed == read, "a torque differs");
 }
 
-/// The recorder keeps at least two seconds before an error and the time after it, with more traffic than the controller
-/// can execute. This holds for any lost part of the first snapshot's interval.
+/// The recorder keeps at least two seconds before an error and the time after the error, even with more traffic than
+/// the controller can execute. The recorder keeps this time with any lost
+/// part of the first snapshot's interval.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut least = usize::MAX;
     for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
-        // Frames that take only a few instructions each, and parameters, which require a snapshot.
+        // The traffic consists of frames with only a few instructions each, and of parameters, which require a
+        // snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
         }
@@ -146,7 +150,7 @@ fn ticks(blocks: &[Block]) -> usize {
     Log::new(blocks).filter(|record| matches!(record, Record::Tick { .. })).count()
 }
 
-/// With a changed point of the trajectory, the replay is equal up to that point and differs afterwards.
+/// With a changed point of the trajectory, the replay is equal up to that point and differs after it.
 #[test]
 fn j56_the_first_tick_that_differs_is_named() {
     const POINT: usize = 120;
@@ -168,7 +172,7 @@ fn j56_the_first_tick_that_differs_is_named() {
     let differs = Replay::new(Log::new(&blocks), controller, hash)
         .find(|step| step.outcome == Outcome::Differs)
         .expect("a tick differs");
-    // A point has an effect from the point before it on, and the effect reaches the torque on the bus within a few
+    // A point has an effect that begins at the previous point, and that reaches the torque on the bus within a few
     // ticks.
     let acts = seen[&(10 * (POINT as u32 - 1))];
     let tick = differs.telemetry.tick;

@@ -1,9 +1,10 @@
-//! An arm whose gears have stiction. At rest the controller must not hunt.
+//! Tests of an arm whose gears have stiction. At rest, the controller must not oscillate (hunt).
 //!
-//! With bristle friction a joint stops as soon as stiction holds it, slightly off the command. An integral that
-//! continues there raises the torque until the joint breaks away and stops on the other side. The torque then swings by
-//! twice the stiction forever, at a few tenths of a hertz or, because of the encoder's steps, faster. The test averages
-//! the torque command over 50 ms, which keeps the swing and removes single encoder steps.
+//! With bristle friction, a joint stops as soon as stiction holds the joint, with a small deviation from the command.
+//! If the integral continues at this deviation, the torque rises until the joint breaks away and stops on the other
+//! side. The torque then oscillates permanently by twice the stiction, at a few tenths of a hertz or, because of the
+//! encoder steps, faster. The test averages the torque command over 50 ms, which keeps this oscillation and removes
+//! single encoder steps.
 use jtc_core::JOINTS;
 use jtc_sim::{FrictionModel, LuGre, Operator, SimConfig, host};
 
@@ -39,7 +40,7 @@ fn swing(seed: u64, model: FrictionModel) -> [f64; JOINTS] {
     range.map(|(low, high)| high - low)
 }
 
-/// An integral that continues at rest would make joints 1 to 3 swing by 7 to 8 N·m here.
+/// If the integral continued at rest, the torque of joints 1 to 3 would oscillate by 7 to 8 N·m in this test.
 #[test]
 fn j41_no_hunting_in_stiction() {
     for seed in [1, 2, 3] {

@@ -1,12 +1,13 @@
 //! A Stop or a Pause takes effect in the tick after its last byte, with any other bytes on the line (J-04).
 //!
-//! Each test runs two worlds that differ only in the bytes on the line: only the Stop in one, also other bytes in the
-//! other. From the tick after the last byte of the Stop on, both must give bit-identical commands.
+//! Each test runs two simulations that differ only in the bytes on the line. The line of the first carries only the
+//! Stop, and the line of the second also carries other bytes. From the tick after the last byte of the Stop, the two
+//! simulations must produce bit-identical commands.
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::{Operator, SimConfig, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, Response, fixed};
 
-/// Bytes that a host writes, each with its time in ms from the beginning.
+/// Bytes that a host writes, each with the time in ms after the start.
 type Script = Vec<(u64, Vec<u8>)>;
 
 /// Returns an arm that moves on its path, with a line of `baud` bit/s or without transmission time.
@@ -44,7 +45,7 @@ fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
 fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
     let (mut busy, ms) = play(baud, script, end);
     assert_eq!(busy.world.telemetry().trajectory, TrajectoryState::Execute, "still on the way");
-    // Written early enough that its last byte arrives in the same millisecond.
+    // The Stop is written so early that its last byte arrives in the same millisecond in both simulations.
     let frame = host::exec(command);
     let lead = baud.map_or(0, |rate| (70_000 / u64::from(rate)) + 1);
     let (mut quiet, quiet_ms) = play(baud, &vec![(ms - lead, frame.clone())], frame.len() as u64);
@@ -89,7 +90,7 @@ fn j04_a_stop_behind_hundreds_of_frames() {
 
 #[test]
 fn j04_a_stop_behind_four_thousand_frames() {
-    // 24 000 bytes take two seconds at this rate. At the highest rate they are more than the board can store.
+    // 24 000 bytes take two seconds at this rate. At the highest rate, the board cannot store so many bytes.
     for (baud, frames) in [(115_200, 4000), (15_000_000, 4000), (15_000_000, 200_000)] {
         let bytes = [fixed::CLEAR_OCCURRED_ERRORS.repeat(frames), fixed::STOP.to_vec()].concat();
         let end = bytes.len() as u64;
@@ -102,7 +103,7 @@ fn j04_a_stop_behind_four_thousand_frames() {
     }
 }
 
-/// Only above 960 kBd do the shortest frames arrive faster than the controller executes them. Below that rate, only
+/// The shortest frames arrive faster than the controller executes them only above 960 kBd. Below that rate, only
 /// records are lost.
 #[test]
 fn j04_short_frames_are_executed_as_fast_as_they_come() {
@@ -122,7 +123,7 @@ fn j04_short_frames_are_executed_as_fast_as_they_come() {
 
 #[test]
 fn j04_a_stop_among_pump_frames() {
-    // A hundred frames per second for three seconds, and more after the Stop.
+    // The host sends a hundred frames per second for three seconds, and more frames after the Stop.
     let mut script: Script = (0..500).map(|n| (10 * n, fixed::PUMP_OFF.to_vec())).collect();
     script.insert(300, (3004, fixed::PAUSE.to_vec()));
     let end = 300 * 10 + 10 + 7;
@@ -136,7 +137,8 @@ fn j04_a_stop_among_pump_frames() {
 fn j04_a_stop_in_noise() {
     for baud in [115_200, 9600] {
         for byte in [0x00, 0x55, 0xFF, 0x9B, 0x0B] {
-            // A byte every 6 ms, before, within and after the Stop; the Stop follows one of these bytes without a gap.
+            // A byte arrives every 6 ms, before, within and after the Stop. The Stop follows one of these bytes without
+            // a gap.
             let mut script: Script = (0..500).map(|n| (6 * n, vec![byte])).collect();
             script[250].1.extend(fixed::STOP);
             let end = 251 + 7;
@@ -150,7 +152,8 @@ fn j04_a_stop_in_noise() {
 #[test]
 fn j04_a_stop_behind_a_false_header_and_a_long_frame() {
     let points = host::there_and_back(&[0.0; 6], &[0.1; 6], 1.0, 2, 10);
-    // From a client with extensions. From a client without extensions, the segment would also stop the arm (J-30).
+    // These frames come from a client with extensions. If they came from a client without extensions, the segment would
+    // also stop the arm (J-30).
     let long = [&fixed::GET_INFO[..], &host::trajectory(&points, 10, 400).concat()].concat();
     for front in [&[0x9B, 0x04, 0xEA, 0x56][..], &[0x9B], &long, &long[..long.len() - 3]] {
         let bytes = [front, &fixed::STOP].concat();
@@ -168,20 +171,21 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
         .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
         .expect("it stops");
     operator.listener.responses.clear();
-    // An Execute after frames with gains, which take one tick each, and a Stop after it.
+    // An Execute follows frames with gains, which need one tick each, and a Stop follows the Execute.
     let frames = [&fixed::PID_PARAM_USE_DEFAULT.repeat(30)[..], &fixed::EXECUTE, &fixed::STOP].concat();
     operator.world.host_write(&frames);
     for _ in 0..1500 {
         operator.step();
         assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Stop, "nothing moves");
     }
-    // The upload came from a host without extensions, so its Execute is refused with a data status that existing hosts
-    // know (J-51).
+    // The upload came from a host without extensions, so the controller rejects its Execute with a data status that
+    // existing hosts know (J-51).
     assert_eq!(exec_records(&operator), [DataStatus::IncorrectValue, DataStatus::NoError]);
     assert_eq!(operator.listener.responses.len(), 32, "one record a frame");
 }
 
-/// An existing proxy sends new waypoints while the arm moves, and repeats only these frames until they are accepted.
+/// An existing proxy sends new waypoints while the arm moves, and repeats only these frames until the controller
+/// accepts them.
 #[test]
 fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     for baud in [Some(115_200), None] {
@@ -207,8 +211,8 @@ fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     }
 }
 
-/// If the user of an existing proxy requests a motion beyond a limit, the proxy would wait forever for a refused
-/// segment, and forward no other command.
+/// If the user of an existing proxy requests a motion beyond a limit, the proxy would repeat a rejected segment
+/// forever, and would not forward any other command.
 #[test]
 fn j36_an_existing_host_outlives_a_trajectory_that_breaks_a_limit() {
     for baud in [Some(115_200), None] {

@@ -1,4 +1,4 @@
-//! Short stories of an operator and an arm.
+//! Tests in the form of short stories of an operator and an arm.
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::{BusTap, DriveConfig, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
@@ -98,7 +98,7 @@ fn j12_j21_a_stopped_tick_resets_the_controller_and_leaves_an_internal_error_lat
     );
     assert!(!operator.world.safety_output(), "J-22: 0 while the internal error is latched");
     assert_eq!(operator.world.truth().torque, [0.0; 6]);
-    // The error latches, so parameters alone do not enable the arm again.
+    // The error is latched, so new parameters alone do not enable the arm again.
     operator.world.host_write(&host::use_defaults());
     operator.run(1500);
     assert!(operator.state() == ControllerState::Error && internal(&operator));
@@ -178,7 +178,7 @@ fn j07_a_friction_table_and_what_follows_it_at_once_are_taken_without_losing_a_t
         let mut operator = Operator::new(config);
         operator.bring_up().unwrap();
         operator.listener.responses.clear();
-        // A table similar to a measured one: torques increase with speed.
+        // A table similar to a measured table, in which the torques increase with speed.
         let one = |_| {
             let axis = (0..20).map(|i| -1.9 + 0.2 * i as f32).chain((0..20).map(|i| 5.0 + 4.0 * i as f32));
             let torque = (0..400).map(|i| 3.0 * (-1.9 + 0.2 * (i / 20) as f32));
@@ -210,8 +210,8 @@ fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
     operator.bring_up().unwrap();
     operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
     operator.execute(10_000).unwrap();
-    // If another node sends a broadcast directly after one of the controller's, an older drive stays one request late
-    // from then on.
+    // If another node sends a broadcast directly after a broadcast of the controller, an older drive remains one
+    // request late after that.
     let ask = jtc_bus::Request::ChangeFsm { target: [jtc_bus::Target::NoChange; 7] }.emit();
     operator.world.put_bus_frame(ask);
     operator.run(20);
@@ -235,7 +235,7 @@ fn j12_the_first_frame_after_an_error_is_zero_torque_also_during_bring_up() {
     }
 }
 
-/// Every second tick is skipped, as if each tick took too long.
+/// Every second tick is skipped, as if each tick needed too much time.
 #[test]
 fn j12_ticks_that_go_on_missing_are_an_internal_error() {
     for missing in [9, 10] {
@@ -259,8 +259,8 @@ fn j12_ticks_that_go_on_missing_are_an_internal_error() {
     }
 }
 
-/// Sends a frame in two parts, `ticks` apart in virtual time, while the host was silent for `silence_us` of real time.
-/// Returns the numbers of valid and invalid frames that the controller found.
+/// Sends a frame in two parts, `ticks` apart in virtual time, while the host is silent for `silence_us` µs of real
+/// time. Returns the numbers of valid and invalid frames that the controller found.
 fn in_two_pieces(ticks: u64, silence_us: Option<u64>) -> (u64, u64) {
     let mut operator = held();
     let before = operator.world.statistics();

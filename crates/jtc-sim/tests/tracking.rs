@@ -19,7 +19,7 @@ fn held(seed: u64) -> Operator {
     operator
 }
 
-/// Returns the RMS of commanded minus measured position in a run, rad.
+/// Returns the RMS of commanded minus measured position during a motion, rad.
 fn run(operator: &mut Operator) -> [f64; 6] {
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let (mut sum, mut count) = ([0.0; 6], 0.0);
@@ -72,7 +72,7 @@ fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
     }
 }
 
-/// Returns the RMS of commanded minus true position, rad, at the time when the torque of a tick takes effect.
+/// Returns the RMS of commanded minus true position, rad, at the time at which the torque of a tick has an effect.
 fn true_error(config: SimConfig) -> [f64; 6] {
     let mut operator = Operator::new(SimConfig { start: FROM, baud: None, ..config });
     operator.bring_up().unwrap();
@@ -94,8 +94,8 @@ fn true_error(config: SimConfig) -> [f64; 6] {
     }
 }
 
-/// The simulated drives' measurements are two ticks old. With another setting, the arm deviates from its path by its
-/// motion during the difference.
+/// The measurements of the simulated drives are two ticks old. With a different setting of the delay, the arm deviates
+/// from its path by the distance that it moves during the difference.
 #[test]
 fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     let error = |delay_ticks: u8| {
@@ -107,14 +107,14 @@ fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     for wrong in [0, 1, 3] {
         let ticks = f64::from(2 - i32::from(wrong)).abs();
         for (j, (right, wrong)) in right.iter().zip(error(wrong)).enumerate() {
-            // Each joint moves at 0.2 rad/s RMS or more.
+            // Each joint moves with an RMS speed of at least 0.2 rad/s.
             assert!(wrong > *right + 0.1e-3 * ticks, "joint {}: {right} and {wrong}, {ticks} off", j + 1);
         }
     }
 }
 
-/// With drives that deliver less torque, the arm follows as well as usual if the gain compensates for it, and worse if
-/// it does not.
+/// With drives that deliver less torque, the tracking is as good as usual if the gain compensates for this, and worse
+/// if it does not.
 #[test]
 fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     let error = |delivers: f64, gain: f64| {
@@ -132,8 +132,8 @@ fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     assert!(worst(&without) > 1.5 * worst(&ideal), "{without:?} {ideal:?}");
 }
 
-/// Late answers are nearly as good as timely ones: with any setting of the delay, the arm stays about as near to its
-/// path.
+/// Late answers are nearly as good as answers in time. With any setting of the delay, the deviation from the path is
+/// about equal.
 #[test]
 fn j63_late_answers_are_as_good_as_those_in_time() {
     let error = |seed: u64, answer_jitter_ms: u8, delay_ticks: u8| {

@@ -1,9 +1,9 @@
-//! A simulated arm that is thrown around violently stays in its range, except that its end stops yield slightly.
+//! A simulated arm that is pushed violently stays in its range of positions, except that its end stops yield slightly.
 use jtc_core::{Friction, Parameters};
 use jtc_sim::{Arm, FrictionModel, SimArm, SimFriction};
 
 const TICK: f64 = 1e-3;
-/// Largest yielding of the end stops, rad. A joint of the default arm hits them at up to 80 rad/s.
+/// Largest deflection of the end stops, rad. A joint of the default arm hits the end stops at up to 80 rad/s.
 const YIELD: f64 = 0.5;
 
 /// Returns an arm with links of `mass` times the default masses and rotors of `rotor` kg·m².
@@ -24,8 +24,8 @@ fn in_range(arm: &Arm, what: &str) {
     }
 }
 
-/// Throws the arm around: pushes of up to 400 N·m on all joints at once, friction at low temperature or multiplied, and
-/// brakes that close and open meanwhile.
+/// Moves the arm violently, with pushes of up to 400 N·m on all joints at once, friction at low temperature or
+/// multiplied, and brakes that close and open during the motion.
 fn throw_about(parts: &SimArm, seed: u64, what: &str) {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut arm = Arm::new(parts.clone(), [1.2; 6], [0.0; 6]);

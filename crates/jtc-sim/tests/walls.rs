@@ -1,4 +1,4 @@
-//! Walls that the arm meets, and loads that it picks up and drops, compared with the laws of mechanics.
+//! Tests of walls that the arm touches, and of loads that it picks up and drops, compared with the laws of mechanics.
 #[path = "../../jtc-plan/tests/robots/mod.rs"]
 #[allow(dead_code, reason = "the tests of jtc-plan use more")]
 mod robots;
@@ -31,8 +31,8 @@ fn of_links(mut model: ArmModel, masses: [f64; JOINTS], size: f64, rotors: [f64;
     SimArm { model, rotor_inertia: rotors, ..SimArm::default() }
 }
 
-/// Returns the default arm; a UR5 with its published dimensions and masses; and an arm as small and light as a Z1, with
-/// the lightest rotors that the simulator supports.
+/// Returns the default arm, a UR5 with its published dimensions and masses, and an arm as small and light as a Z1. The
+/// third arm has the lightest rotors that the simulator supports.
 fn arms() -> [(&'static str, SimArm); 3] {
     use std::f64::consts::FRAC_PI_2;
     let light = robots::by_dh([
@@ -68,7 +68,7 @@ fn flange(arm: &SimArm, q: &[f64; JOINTS]) -> [f64; 3] {
 
 const POSE: [f64; JOINTS] = [0.3, 0.4, -0.7, 0.4, 0.6, -0.2];
 
-/// The torque divided by the depth is the stiffness, however the motion is integrated.
+/// The torque divided by the depth is the stiffness, independent of the integration of the motion.
 #[test]
 fn a_pushed_joint_rests_in_its_wall_at_torque_over_stiffness() {
     for (name, parts) in arms() {
@@ -99,8 +99,8 @@ fn a_pushed_joint_rests_in_its_wall_at_torque_over_stiffness() {
     }
 }
 
-/// Walls of 20,000 N·m/rad on all joints at once, hit at speed: no step gains energy, and the arm comes to rest and
-/// stays there.
+/// The arm hits walls of 20,000 N·m/rad on all joints at once, while it moves fast. The energy does not increase in any
+/// step, and the arm comes to rest and stays at rest.
 #[test]
 fn stiff_walls_on_every_joint_are_stable_on_every_arm() {
     for (name, parts) in arms() {
@@ -135,16 +135,16 @@ fn stiff_walls_on_every_joint_are_stable_on_every_arm() {
                         assert!((arm.q[j] - POSE[j]).abs() < 0.3, "{name}: {:?} after {ms} ms", arm.q);
                     }
                 }
-                // Bounces without damping keep the energy. The light arm loses and gains some of it at the surfaces of
-                // its walls.
+                // Without damping, the energy remains constant when the arm bounces. The light arm loses and gains some
+                // energy at the surfaces of its walls.
                 assert!(highest < 1.03 * first, "{name}, {stiffness}, {damping}: {highest} J of {first} J");
             }
         }
     }
 }
 
-/// A flange rests on a table. The joint torques of the wall balance its force, checked by virtual work with positions
-/// only.
+/// A flange rests on a table. The joint torques of the wall correspond to its force. The test checks this by virtual
+/// work, with positions only.
 #[test]
 fn the_force_of_a_plane_acts_through_the_flange() {
     for (name, parts) in arms() {
@@ -156,7 +156,8 @@ fn the_force_of_a_plane_acts_through_the_flange() {
         let inside = |x: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| x[i] + depth * normal[i] / length) };
         arm.set_walls(&[Wall::Plane { position, normal, stiffness, damping: 0.0 }]);
         assert_eq!(arm.wall_torque(), [0.0; JOINTS], "{name}: at the surface");
-        // The arm enters the wall because the wall is moved. An equal wall, created outside the arm, is then used.
+        // The arm is inside the wall because the test moves the wall. For this, the test uses an equal wall that was
+        // created outside the arm.
         let mut before = POSE;
         let away = |q: &[f64; JOINTS]| -> f64 {
             (0..3).map(|i| (flange(&parts, q)[i] - inside(position)[i]) * normal[i] / length).sum()
@@ -189,7 +190,8 @@ fn the_force_of_a_plane_acts_through_the_flange() {
     }
 }
 
-/// An arm that falls onto a table comes to rest on it. The depth is the contact force divided by the stiffness.
+/// An arm that falls onto a table comes to rest on the table. The depth in the table is the contact force divided by
+/// the stiffness.
 #[test]
 fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
     for (name, parts) in arms() {
@@ -214,7 +216,7 @@ fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
     }
 }
 
-/// If a wall is created inside the arm, its surface begins at the arm, and the arm is not thrown.
+/// If a wall is created inside the arm, its surface begins at the arm, and the wall does not push the arm away.
 #[test]
 fn a_wall_that_begins_inside_the_arm_throws_nothing() {
     let mut arm = Arm::new(SimArm { gravity: [0.0; 3], ..bare(SimArm::default()) }, [0.0; JOINTS], POSE);
@@ -222,8 +224,8 @@ fn a_wall_that_begins_inside_the_arm_throws_nothing() {
     arm.set_walls(&[wall]);
     (0..100).for_each(|_| arm.step(&[0.0; JOINTS], TICK));
     assert_eq!(arm.q, POSE);
-    // The surface follows the arm as the arm leaves. When the arm comes back, it meets the wall at the point at which
-    // it turned.
+    // The surface follows the arm when the arm moves away. When the arm returns, it touches the wall at the point at
+    // which the arm changed its direction.
     arm.qd[0] = -0.5;
     (0..200).for_each(|_| arm.step(&[0.0; JOINTS], TICK));
     let turned = arm.q[0];
@@ -234,13 +236,13 @@ fn a_wall_that_begins_inside_the_arm_throws_nothing() {
         furthest = furthest.max(arm.q[0]);
     }
     assert!(furthest > turned && furthest < turned + 0.02, "{turned} {furthest}");
-    // Setting the same wall again changes nothing.
+    // If an identical wall is set again, the state does not change.
     let before = arm.clone();
     arm.set_walls(&[wall]);
     assert_eq!((arm.wall_torque(), arm.q), (before.wall_torque(), before.q));
 }
 
-/// A wall that the arm does not reach, rigid gears and a dropped load do not change a single bit of the result.
+/// With a wall that the arm does not reach, with rigid gears and with a dropped load, the result is bit-identical.
 #[test]
 fn what_is_not_there_changes_no_bit() {
     let mut plain = Arm::new(SimArm::default(), [1.0; JOINTS], POSE);
@@ -261,7 +263,7 @@ fn what_is_not_there_changes_no_bit() {
     }
 }
 
-/// Returns the gravity torque of an arm at rest, computed from the acceleration of its fall.
+/// Returns the gravity torque of an arm at rest, computed from the acceleration with which it falls.
 fn gravity_torque(arm: &Arm, parts: &SimArm, load: &Payload) -> [f64; JOINTS] {
     let mut falling = arm.clone();
     let dt = 1e-7;
@@ -274,8 +276,8 @@ fn gravity_torque(arm: &Arm, parts: &SimArm, load: &Payload) -> [f64; JOINTS] {
 }
 
 proptest! {
-    /// Picking up and dropping a load changes the gravity torque by the torque of the load's weight at its position.
-    /// The expected torque is computed by virtual work from the height of its centre.
+    /// When the arm picks up or drops a load, the gravity torque changes by the torque of the weight of the load.
+    /// The expected torque is computed by virtual work from the height of the centre of the load.
     #[test]
     fn a_dropped_load_changes_the_gravity_torque_by_its_weight(
         q in prop::array::uniform6(-1.4..1.4f64),
@@ -312,7 +314,7 @@ proptest! {
         prop_assert_eq!(gravity_torque(&arm, &parts, &payload), without);
     }
 
-    /// For any motion of the arm into a wall or out of it, the wall does not pull: its force is along its normal or 0.
+    /// For any motion of the arm into or out of a wall, the wall does not pull. Its force is along its normal or 0.
     #[test]
     fn a_wall_never_pulls(
         q in prop::array::uniform6(-1.4..1.4f64),
@@ -323,7 +325,7 @@ proptest! {
     ) {
         let parts = bare(SimArm::default());
         let start = flange(&parts, &q);
-        // The wall is created well outside the arm, so that it is at its configured position.
+        // The test creates the wall at a clear distance from the arm, so that it is at its configured position.
         let mut arm = Arm::new(parts.clone(), [0.0; JOINTS], q);
         let wall = |z: f64| Wall::Plane {
             position: [start[0] + z, 0.0, 0.0], normal: [-1.0, 0.0, 0.0], stiffness, damping,

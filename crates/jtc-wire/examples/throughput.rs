@@ -1,4 +1,5 @@
-//! Prints the throughput of the CRC and of the stream parser as one JSON object. Run it with `cargo run --profile dist -p jtc-wire
+//! Prints the throughput of the CRC function and of the stream parser as one JSON object. Run it with `cargo run --profile dist -p
+//! jtc-wire
 //! --example throughput`.
 use std::hint::black_box;
 
@@ -9,8 +10,8 @@ use test_kit::clock::CpuTime;
 static ONE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_XMODEM);
 static SIXTEEN: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_XMODEM);
 
-/// Returns GB/s in the fastest of many short rounds of `bytes` bytes each, because other programs can only slow a round down. All
-/// contenders take turns, so that a slow moment affects each of them.
+/// Returns GB/s in the fastest of many short rounds of `bytes` bytes each, because other programs can only make a round slower.
+/// The rounds of the measured functions alternate, so that a slow period of the computer affects all functions.
 fn measure(bytes: usize, contenders: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     const ROUNDS: usize = 301;
     let mut best = vec![f64::INFINITY; contenders.len()];
@@ -25,7 +26,7 @@ fn measure(bytes: usize, contenders: &mut [&mut dyn FnMut()]) -> Vec<f64> {
 }
 
 fn main() {
-    // A round is short enough to fit between two decisions of the scheduler.
+    // A round is so short that it can end before the scheduler of the computer switches to another program.
     const REPEATS: usize = 10;
     let mut frame = vec![0; FRAME_MAX];
     let point = |i: usize| RawPoint { position: [i as i16; 6], velocity: [-1; 6], acceleration: [77; 6] };

@@ -1,5 +1,5 @@
-//! Events that the parsers of all lines have found, copied in order for the controller. While the controller works, the parsers can take
-//! more bytes.
+//! Events from the parsers of all serial lines, copied in order for the controller. While the controller processes the events, the
+//! parsers can accept more bytes.
 use crate::frame::{FRAME_MAX, FrameRef, FrameType};
 use crate::response::{DataStatus, FrameStatus, Response};
 use crate::stream::LinkEvent;
@@ -7,14 +7,15 @@ use crate::stream::LinkEvent;
 /// Maximum number of events in a batch, and of events that a controller executes in one tick.
 pub const EVENTS_MAX: usize = 16;
 
-/// An event with its line and its position in the stream.
+/// An event with its serial line and its position in the byte stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceivedEvent<'a> {
-    /// Number of its line.
+    /// Number of the serial line of the event.
     pub line: usize,
-    /// Position of the first byte of the event in the stream of that line.
+    /// Position of the first byte of the event in the byte stream of that line.
     pub position: u64,
-    /// Set if a frame came on a plain line: there was no extension request in the 2 s before the first byte of the frame (J-51).
+    /// `true` for a frame on a plain line. On a plain line, no extension request arrived in the 2 s before the first byte of the
+    /// frame (J-51).
     pub plain: bool,
     /// The received event.
     pub event: LinkEvent<'a>,
@@ -22,10 +23,10 @@ pub struct ReceivedEvent<'a> {
 
 /// Events in the order of execution. All fields are integers, so that a memory of zeros is an empty batch.
 pub struct EventBatch {
-    /// Number of stored events, and number of those that are done.
+    /// Number of stored events, and number of events that the controller has executed.
     len: u16,
     done: u16,
-    /// Number of used bytes.
+    /// Number of used bytes of the byte buffer.
     used: u16,
     entries: [Entry; EVENTS_MAX],
     bytes: [u8; FRAME_MAX],
@@ -34,7 +35,7 @@ pub struct EventBatch {
 #[derive(Clone, Copy)]
 struct Entry {
     position: u64,
-    /// Position of the bytes of a frame.
+    /// Position of the bytes of a frame in the byte buffer.
     start: u16,
     length: u16,
     line: u8,
@@ -56,7 +57,7 @@ impl EventBatch {
         Self { len: 0, done: 0, used: 0, entries: [entry; EVENTS_MAX], bytes: [0; FRAME_MAX] }
     }
 
-    /// Copies an event. Returns false if the batch has too few free entries or bytes for it.
+    /// Copies an event. Returns `false` if the batch has too few free entries or bytes for the event.
     pub fn push(&mut self, received: &ReceivedEvent<'_>) -> bool {
         let start = usize::from(self.used);
         let Some(entry) = self.entries.get_mut(usize::from(self.len)) else { return false };
@@ -64,7 +65,7 @@ impl EventBatch {
             LinkEvent::Frame(frame) => {
                 let Some(place) = self.bytes.get_mut(start..start + frame.bytes.len()) else { return false };
                 place.copy_from_slice(frame.bytes);
-                // A frame has at most FRAME_MAX bytes, so this fits.
+                // A frame has at most FRAME_MAX bytes, so the sum fits into 16 bits.
                 self.used += frame.bytes.len() as u16;
                 (FRAME, frame.frame_type as u8, FrameStatus::NoError, frame.bytes.len() as u16)
             }
@@ -85,7 +86,7 @@ impl EventBatch {
         true
     }
 
-    /// Returns the event with index `n` among those that are not done.
+    /// Returns the event with index `n` in the list of events that are not done.
     pub fn get(&self, n: usize) -> Option<ReceivedEvent<'_>> {
         let n = usize::from(self.done).checked_add(n)?;
         let entry = self.entries.get(..usize::from(self.len))?.get(n)?;
@@ -112,7 +113,7 @@ impl EventBatch {
         })
     }
 
-    /// Marks the oldest `count` events as done. When all events are done, the batch is empty again.
+    /// Marks the oldest `count` pending events as done. When all events are done, the batch is empty again.
     pub fn done(&mut self, count: usize) {
         let left = usize::from(self.len - self.done);
         self.done += count.min(left) as u16;
@@ -121,7 +122,7 @@ impl EventBatch {
         }
     }
 
-    /// Returns true if no event is left.
+    /// Returns `true` if no pending event is left.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }

@@ -1,4 +1,4 @@
-//! Bits of the controller's words in JtcStatus. Each word is a table with bit, name, text and meaning.
+//! Bits of the words in JtcStatus that describe the controller. Each word is a table with bit, name, text and meaning.
 use jtc_bus::bit_words;
 
 bit_words! {
@@ -6,7 +6,7 @@ bit_words! {
     error: u16 {
         /// Safety input low.
         EMERGENCY_INPUT = 0, "emergency input";
-        /// An internal error holds the safety output at 0.
+        /// An internal error keeps the safety output at 0.
         EMERGENCY_OUTPUT = 1, "emergency output";
         /// Any internal error.
         INTERNAL = 2, "internal error";
@@ -18,29 +18,29 @@ bit_words! {
         INTERNAL_CAN = 5, "internal CAN error";
         /// Error of the host link. Not used by this controller, which does not report a silent host as an error.
         INTERNAL_COM = 6, "internal COM error";
-        /// A node reports an error or misbehaves.
+        /// A node reports an error or does not behave as expected.
         EXTERNAL_JOINTS = 7, "external joints error";
     }
 
     /// Bits of a joint's internal error words, current and occurred.
     joint_error: u16 {
-        /// A set position exceeds its limit.
+        /// A commanded position exceeds its limit.
         POSITION = 0, "position over limit";
-        /// A set velocity exceeds its limit, or a measured speed exceeds its own limit (J-35).
+        /// A commanded velocity exceeds its limit, or a measured speed exceeds the limit for measured speeds (J-35).
         VELOCITY = 1, "velocity over limit";
-        /// A set acceleration exceeds its limit.
+        /// A commanded acceleration exceeds its limit.
         ACCELERATION = 2, "acceleration over limit";
         /// A computed torque exceeds its limit.
         TORQUE = 3, "torque over limit";
         /// The position error exceeds its limit.
         POSITION_ERROR = 4, "position error over limit";
-        /// The friction table has no value.
+        /// The friction table contains no value for the current state.
         FRICTION_TABLE = 5, "friction table value missing";
     }
 
     /// Bits of the parameters that the controller has not received.
     missing_parameter: u8 {
-        /// Friction polynomial or table.
+        /// Friction polynomial or friction table.
         FRICTION = 0, "friction";
         /// PID gains.
         PID = 1, "PID";
@@ -54,7 +54,7 @@ pub mod can_flag {
     /// Frames of the controller are not acknowledged, or its CAN controller is bus-off.
     pub const TRANSMIT_TIMEOUT: u32 = 1 << 0;
 
-    /// Bit 8+n: node n (joints 0..5, gripper 6) does not answer.
+    /// Bit 8+n, which means that node n (joints 0..5, gripper 6) does not answer.
     pub const fn no_answer(node: usize) -> u32 {
         0x100_u32.wrapping_shl(node as u32)
     }

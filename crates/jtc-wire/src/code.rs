@@ -2,8 +2,8 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-/// Declares a list of codes: an enum, the list of its variants, the conversion from a byte, and the names. A variant without a text has its
-/// identifier as name.
+/// Declares a list of codes. It consists of an enum, the list of its variants, the conversion from a byte, and the names. The name of a
+/// variant without a text is its identifier.
 macro_rules! codes {
     (@text $name:ident $text:literal) => { $text };
     (@text $name:ident) => { stringify!($name) };
@@ -19,7 +19,7 @@ macro_rules! codes {
             /// All codes, in the order of their numbers.
             pub const ALL: [Self; [$($code),+].len()] = [$(Self::$name),+];
 
-            /// Returns the code of number `byte`.
+            /// Returns the code with the number `byte`.
             pub const fn from_byte(byte: u8) -> Option<Self> {
                 match byte {
                     $($code => Some(Self::$name),)+
@@ -54,13 +54,13 @@ pub trait Known: Copy + Eq + fmt::Debug + 'static {
     /// Returns the byte in the wire format.
     fn code(self) -> u8;
 
-    /// Returns the name, which is the same in every program.
+    /// Returns the name of the code. All programs use this name.
     fn name(self) -> &'static str;
 }
 
-/// A received code: a variant of `T`, or a code that this version does not know.
+/// A received code. It is a variant of `T`, or a code that this version does not know.
 ///
-/// Compare a code with variants of `T`, never with a number.
+/// Always compare a code with variants of `T` and not with a number.
 ///
 /// ```
 /// use jtc_wire::{Code, ControllerState};
@@ -92,12 +92,12 @@ impl<T: Known> Code<T> {
         T::ALL.iter().copied().find(|known| known.code() == self.byte)
     }
 
-    /// Returns true if the code is one of `wanted`.
+    /// Returns `true` if the code is one of `wanted`.
     pub fn is_in(self, wanted: &[T]) -> bool {
         wanted.iter().any(|&wanted| self == wanted)
     }
 
-    /// Returns the name, which is the same in every program.
+    /// Returns the name of the code. All programs use this name.
     pub fn name(self) -> &'static str {
         self.known().map_or(T::UNKNOWN, T::name)
     }

@@ -1,4 +1,4 @@
-//! The commands of the host: the meaning of the frame of each type.
+//! Commands of the host, which are the meanings of the host frames.
 use crate::code::codes;
 use crate::extension::{Name, Values};
 use crate::floats::Floats;
@@ -7,7 +7,7 @@ use crate::response::DataStatus;
 use crate::segment::Segment;
 
 codes! {
-    /// The command in TrajSetExecStatus.
+    /// Command in a TrajSetExecStatus frame.
     #[allow(missing_docs)]
     ExecCommand {
         Stop = 1, "stop";
@@ -19,31 +19,33 @@ codes! {
 /// Bits of the nodes 0..6.
 pub const ALL_NODES: u8 = 0x7F;
 
-/// Meaning of a command, borrowed from the frame. The lengths are valid; the numbers in `Floats` are not checked yet.
+/// Meaning of a command, which borrows the bytes of the frame. The lengths are valid. The numbers in `Floats` are not
+/// checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command<'a> {
-    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old frame of 6 bytes means the controller and all nodes.
+    /// Command to clear current errors. In the frame, bit 0 of the first mask selects the controller, and bits 0..6 of
+    /// the second mask select the nodes. The old frame of 6 bytes selects the controller and all nodes.
     ClearCurrentErrors {
-        /// Clear the controller's own errors.
+        /// `true` to clear the errors of the controller itself.
         jtc: bool,
         /// Mask of nodes.
         nodes: u8,
     },
-    /// Clear current and occurred errors.
+    /// Command to clear current and occurred errors.
     ClearOccurredErrors,
     /// Segment of a trajectory.
     Trajectory(Segment<'a>),
-    /// 6 × (20 velocities, 20 temperatures, 400 torques).
+    /// Friction table: for each of 6 joints 20 velocities, 20 temperatures and 400 torques.
     FrictionTable(Floats<'a>),
-    /// Use the default table.
+    /// Command to use the default friction table.
     FrictionTableUseDefault,
-    /// 6 × (Kp, Ki, Kd, IntMin, IntMax).
+    /// Gains: Kp, Ki, Kd, IntMin and IntMax of each of 6 joints.
     PidParam(Floats<'a>),
-    /// Use the default gains.
+    /// Command to use the default gains.
     PidParamUseDefault,
-    /// 7 × 6 joint origins, 7 × 13 links.
+    /// Arm model: 7 joint origins of 6 numbers, then 7 links of 13 numbers.
     ArmModel(Floats<'a>),
-    /// Use the default model.
+    /// Command to use the default arm model.
     ArmModelUseDefault,
     /// Command for the execution of the trajectory.
     TrajSetExecStatus(ExecCommand),
@@ -51,9 +53,9 @@ pub enum Command<'a> {
     TeachingModeEnable,
     /// Switch teaching off.
     TeachingModeDisable,
-    /// 6 × 4 or 6 × 6 coefficients, highest index first.
+    /// Friction polynomial: 4 or 6 coefficients of each of 6 joints, highest index first.
     FrictionPolynomial(Floats<'a>),
-    /// Use the default polynomial (also type 0x0E with 6 bytes).
+    /// Command to use the default friction polynomial (also a frame of type 0x0E with 6 bytes).
     FrictionPolynomialUseDefault,
     /// Reset nodes.
     ResetCanDevices {
@@ -67,64 +69,64 @@ pub enum Command<'a> {
     },
     /// Request for the identity of the device and of its firmware (J-52).
     GetInfo,
-    /// Request for the settings from number `first` on, in the order of the device's table (J-53).
+    /// Request for the settings, beginning at number `first`, in the order of the table of the device (J-53).
     GetSettings {
         /// Number of settings to skip.
         first: u16,
     },
-    /// Settings to change, all of them or none (J-53).
+    /// Request to change settings, either all or none (J-53).
     SetSettings(Values<'a>),
-    /// The name of the arm (J-54).
+    /// Command that sets the name of the arm (J-54).
     SetName(Name),
-    /// A part of the arm image (J-54).
+    /// Request for a part of the arm image (J-54).
     GetArm {
         /// First requested byte of the image.
         offset: u16,
     },
-    /// Store the arm in use, so that it is kept without power (J-54).
+    /// Command to store the active arm in non-volatile memory (J-54).
     StoreArm,
-    /// Switch the torque off and return to Init (J-53).
+    /// Command to switch the torque off and return to Init (J-53).
     Disable,
-    /// Jog with these joint velocities, rad/s (J-58).
+    /// Command to jog with these joint velocities, rad/s (J-58).
     Jog(Floats<'a>),
-    /// A page of the flight recorder's log (J-56).
+    /// Request for a page of the flight recorder's log (J-56).
     GetLog {
         /// Number of a block.
         block: u32,
         /// First requested byte of the block.
         offset: u16,
     },
-    /// Clear the log of the flight recorder and start a new recording (J-56).
+    /// Command to clear the log of the flight recorder and start a new recording (J-56).
     ClearLog,
-    /// Points of the trajectory in memory (J-56).
+    /// Request for points of the trajectory in the memory of the device (J-56).
     GetPoints {
         /// Number of points to skip.
         first: u16,
     },
 }
 
-/// Positions of the parts of the short bodies, counted from the first byte of the body.
+/// Positions of the fields in short frame bodies, counted from the first byte of the body.
 pub mod field {
-    /// ClearCurrentErrors: bit 0 the controller itself.
+    /// Field of ClearCurrentErrors in which bit 0 selects the controller itself.
     pub const CLEAR_JTC: usize = 0;
-    /// ClearCurrentErrors: bits 0..6 the nodes.
+    /// Field of ClearCurrentErrors in which bits 0..6 select the nodes.
     pub const CLEAR_NODES: usize = 1;
     /// TrajSetExecStatus: the command.
     pub const EXEC: usize = 0;
-    /// ResetCanDevices: bits 0..6 the nodes.
+    /// Field of ResetCanDevices in which bits 0..6 select the nodes.
     pub const RESET_NODES: usize = 0;
-    /// GripperControl: pump 0 or 1.
+    /// Field of GripperControl with the state of the pump, 0 or 1.
     pub const PUMP: usize = 0;
-    /// GetSettings, GetArm and GetPoints: number of the first item or byte, u16.
+    /// Field of GetSettings, GetArm and GetPoints with the number of the first item or byte, u16.
     pub const FROM: core::ops::Range<usize> = 0..2;
-    /// GetLog: block, u32, and byte in it, u16.
+    /// Fields of GetLog with the number of the block, u32, and the position of the byte in the block, u16.
     pub const LOG: core::ops::Range<usize> = 0..6;
 }
 
 impl<'a> Command<'a> {
-    /// Parses a frame on the device. Returns `IncorrectValue` for an unknown [`ExecCommand`], for an invalid pump byte, and for a body that
-    /// is too short for its type; [`crate::Receiver`] never returns such a body. Returns `NotAllowed` for a frame that only a device sends,
-    /// such as JtcStatus.
+    /// Parses a frame that a device has received. Returns `IncorrectValue` for an unknown [`ExecCommand`], for an invalid pump byte, and
+    /// for a body that is too short for the frame type. [`crate::Receiver`] never returns such a body. Returns `NotAllowed` for a frame
+    /// that only a device sends, such as JtcStatus.
     pub fn parse(frame: FrameRef<'a>) -> Result<Self, DataStatus> {
         let body = frame.body();
         let byte = |i: usize| body.get(i).copied().ok_or(DataStatus::IncorrectValue);
@@ -188,13 +190,13 @@ impl<'a> Command<'a> {
             }
             FrameType::ClearLog => Self::ClearLog,
             FrameType::GetPoints => Self::GetPoints { first: from()? },
-            // Frames that a device sends: JtcStatus and the answers. Without this arm, the compiler would insert a trap for the unused
-            // numbers between the types.
+            // These are frames that a device sends, which are JtcStatus and the answers. Without this match arm, the compiler would
+            // insert a trap for the unused numbers between the types.
             _ => return Err(DataStatus::NotAllowed),
         })
     }
 
-    /// Returns the type of the command's frame.
+    /// Returns the type of the frame that carries the command.
     pub const fn frame_type(&self) -> FrameType {
         match self {
             Self::ClearCurrentErrors { .. } => FrameType::ClearCurrentErrors,

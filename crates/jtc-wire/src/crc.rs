@@ -1,7 +1,8 @@
-//! CRC-16/XMODEM of whole slices and of pieces, and the arithmetic that checks a frame inside a longer stream.
+//! CRC-16/XMODEM of whole slices and of parts, and the arithmetic that checks a frame inside a longer stream.
 use crc::{CRC_16_XMODEM, Crc, Table};
 
-// A microcontroller uses one table of 512 bytes. A PC uses sixteen, which is eight to ten times as fast.
+// On a microcontroller, the CRC function uses one table of 512 bytes. On a PC, it uses sixteen such tables, which is
+// eight to ten times as fast.
 #[cfg(target_pointer_width = "64")]
 type Tables = Table<16>;
 #[cfg(not(target_pointer_width = "64"))]
@@ -18,7 +19,8 @@ pub fn crc16(bytes: &[u8]) -> u16 {
     CRC.checksum(bytes)
 }
 
-/// Returns the register after `bytes` if it was `register` before them. This computes `crc16` in pieces.
+/// Returns the CRC register after `bytes`, if its value before these bytes was `register`. With this function, the
+/// caller can compute `crc16` in several steps.
 ///
 /// ```
 /// use jtc_wire::{crc16, crc16_update};
@@ -30,10 +32,11 @@ pub fn crc16_update(register: u16, bytes: &[u8]) -> u16 {
     digest.finalize()
 }
 
-/// The polynomial without its highest term.
+/// CRC polynomial without its highest term.
 const POLYNOMIAL: u16 = 0x1021;
 
-/// Returns the register after one zero byte. This is also the bit-by-bit definition from which constants are computed.
+/// Returns the CRC register after one zero byte. This function is also the bit-by-bit definition from which the
+/// constants are computed.
 const fn zero_byte(mut register: u16) -> u16 {
     let mut bit = 0;
     while bit < 8 {
@@ -43,7 +46,7 @@ const fn zero_byte(mut register: u16) -> u16 {
     register
 }
 
-/// Like `crc16`, for constants.
+/// Computes `crc16` in constant expressions.
 pub(crate) const fn crc16_const(bytes: &[u8]) -> u16 {
     let mut register = 0;
     let mut i = 0;
@@ -62,7 +65,7 @@ const fn multiply(a: u16, b: u16) -> u16 {
         bit -= 1;
         let carry = product & 0x8000 != 0;
         product <<= 1;
-        // Masks are used instead of branches, so that the time does not depend on the data.
+        // The function uses masks instead of branches, so that its execution time does not depend on the data.
         product ^= POLYNOMIAL & 0u16.wrapping_sub(carry as u16);
         product ^= a & 0u16.wrapping_sub(b >> bit & 1);
     }
@@ -85,14 +88,14 @@ const fn powers(step: usize) -> [u16; 256] {
     table
 }
 
-/// x^(8·i) and x^(8·256·i) modulo the polynomial.
+/// Powers x^(8·i) and x^(8·256·i) modulo the polynomial.
 static LOW: [u16; 256] = powers(1);
 static HIGH: [u16; 256] = powers(256);
 
-/// Returns the register after `count` zero bytes, in constant time. `count` is below 65,536.
+/// Returns the CRC register after `count` zero bytes, in constant time. `count` is below 65,536.
 ///
 /// The CRC is linear. If `a` and `b` are the registers at two positions of a stream, `count` bytes apart, the CRC of the bytes between them
-/// is `b ^ advance(a, count)`. So any frame in a stream can be checked with two registers.
+/// is `b ^ advance(a, count)`. So two registers are sufficient to check any frame in a stream.
 pub(crate) fn advance(register: u16, count: usize) -> u16 {
     let power = multiply(LOW[count & 0xFF], HIGH[count >> 8 & 0xFF]);
     multiply(register, power)

@@ -1,4 +1,4 @@
-//! Text of a frame: one line, as in a network sniffer. `{:#}` adds all numbers.
+//! Text of a frame in one line, as in a network sniffer. The format `{:#}` also shows all numbers of the frame.
 use core::fmt::{Display, Formatter, Result};
 
 use crate::command::Command;
@@ -10,7 +10,7 @@ use crate::segment::Segment;
 use crate::status::Status;
 use crate::words::{self, Bits};
 
-/// Text of any bytes: a frame of either direction, or the fault of the bytes.
+/// Text of any bytes: the frame, of either direction, or the reason why the bytes are not a frame.
 ///
 /// ```
 /// use jtc_wire::Described;
@@ -69,7 +69,7 @@ impl Display for FrameRef<'_> {
         match Command::parse(*self) {
             Ok(command) => {
                 command.fmt(f)?;
-                // Two frames have this meaning, but only one of them is the correct one.
+                // Two frame types have this meaning, but only one of these is the correct type.
                 if self.frame_type != command.frame_type() {
                     write!(f, " (sent as an empty {})", self.frame_type)?;
                 }
@@ -203,7 +203,7 @@ impl Display for Status {
     }
 }
 
-/// Names of the set bits, only for words in which any bit is set.
+/// Writer of the names of the set bits, for words in which at least one bit is set.
 struct Lists<'a, 'b> {
     f: &'a mut Formatter<'b>,
 }
@@ -243,16 +243,17 @@ impl Display for crate::GripperStatus {
     }
 }
 
-/// A part of a capture.
+/// Part of a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Piece<'a> {
-    /// A valid frame of either direction.
+    /// Valid frame of either direction.
     Frame(FrameRef<'a>),
     /// Bytes between valid frames: invalid frames, noise, or a frame that is cut off at the end of the capture.
     Other(&'a [u8]),
 }
 
-/// Returns the frames of a whole capture and the bytes between them, in order. The times are not known, so gaps do not end a frame.
+/// Returns the frames of a whole capture and the bytes between the frames, in order. The times are not known, so gaps do not end a
+/// frame.
 ///
 /// ```
 /// use jtc_wire::{Piece, fixed, pieces};
@@ -288,7 +289,7 @@ impl<'a> Iterator for Pieces<'a> {
     }
 }
 
-/// Returns the valid frame at the front of `bytes`.
+/// Returns the valid frame at the start of `bytes`.
 fn frame_at(bytes: &[u8]) -> Option<FrameRef<'_>> {
     let &[_, _, high, low] = bytes.first_chunk()?;
     let n = usize::from(u16::from_be_bytes([high, low]));

@@ -13,8 +13,8 @@ use crate::layout::{SET_VALUES_MAX, VALUE_LEN};
 use crate::segment::{RAW_FULL_SCALE, RawPoint, Segment, field};
 
 impl RawPoint {
-    /// Returns the nearest point that the wire format can represent, from rad, rad/s and rad/s². Returns an error for a number outside the
-    /// scale or a NaN.
+    /// Converts values in rad, rad/s and rad/s² to the nearest point that the wire format can represent. Returns an error for a number
+    /// that is outside the scale or NaN.
     pub fn from_si(
         position: &[f64; JOINTS],
         velocity: &[f64; JOINTS],
@@ -24,12 +24,12 @@ impl RawPoint {
             let limit = channel.scale();
             let mut raw = [0; JOINTS];
             for (joint, (to, &value)) in raw.iter_mut().zip(values).enumerate() {
-                // `value.abs() > limit` would be false for NaN.
+                // The condition `value.abs() > limit` would be false for NaN.
                 if !(-limit..=limit).contains(&value) {
                     return Err(OutOfScale { joint, channel, value, limit });
                 }
                 let exact = value * RAW_FULL_SCALE / limit;
-                // The cast truncates towards zero, so adding one half rounds to the nearest integer.
+                // The cast truncates towards zero, so the addition of one half rounds to the nearest integer.
                 *to = (exact + 0.5f64.copysign(exact)) as i16;
             }
             Ok(raw)
@@ -60,7 +60,7 @@ fn frame(
     Ok(n)
 }
 
-/// Writes a Trajectory frame and returns its length. After an error the content of the buffer is not valid.
+/// Writes a Trajectory frame and returns its length. After an error, the content of the buffer is invalid.
 pub fn trajectory(
     out: &mut [u8],
     (number, segment, segments): (u16, u16, u16),
@@ -121,8 +121,8 @@ pub fn pid_param(out: &mut [u8], gains: &[[f64; 5]; JOINTS]) -> Result<usize, En
     floats(out, FrameType::PidParam, gains.as_flattened().iter().copied())
 }
 
-/// Writes an ArmModel frame. It has the joint origins (x, y, z in m, roll, pitch, yaw in rad) and the links (an origin, Ixx Ixy Ixz Iyy Iyz
-/// Izz in kg·m², mass in kg).
+/// Writes an ArmModel frame. The frame contains the joint origins (x, y, z in m, roll, pitch, yaw in rad) and the links (an origin, Ixx Ixy
+/// Ixz Iyy Iyz Izz in kg·m², mass in kg).
 pub fn arm_model(
     out: &mut [u8],
     joints: &[[f64; 6]; 7],
@@ -132,8 +132,8 @@ pub fn arm_model(
     floats(out, FrameType::ArmModel, values.copied())
 }
 
-/// Writes a FrictionPolynomial frame. `coefficients` has 4 or 6 coefficients per joint, c0 first. In the wire format the highest index is
-/// first.
+/// Writes a FrictionPolynomial frame. `coefficients` contains 4 or 6 coefficients per joint, beginning with c0. In the wire format,
+/// the coefficient with the highest index is first.
 pub fn friction_polynomial<const N: usize>(
     out: &mut [u8],
     coefficients: &[[f64; N]; JOINTS],
@@ -150,7 +150,7 @@ pub struct FrictionTable<'a> {
     pub velocity: &'a [f32; 20],
     /// Temperatures, °C, strictly increasing.
     pub temperature: &'a [f32; 20],
-    /// Torques, N·m, one row per velocity.
+    /// Torques, N·m, with one row per velocity.
     pub torque: &'a [[f32; 20]; 20],
 }
 
@@ -171,7 +171,7 @@ fn raw_floats(out: &mut [u8], frame_type: FrameType, floats: Floats<'_>) -> Resu
 }
 
 impl Command<'_> {
-    /// Writes the frame of the command and returns its length. Floats are copied unchanged.
+    /// Writes the frame of the command and returns its length. The floats of the command are copied unchanged.
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
         let mut fixed = |bytes: &[u8]| {
             let given = out.len();

@@ -1,6 +1,6 @@
-//! The extensions of the protocol (J-50): identity, settings and the arm image. Requests are types 0x40 to 0x4F. A device can answer a
-//! request with a frame of type 0x50 to 0x5F, in addition to the response record. The device sends such a frame only after a request, and
-//! only on the line of the request.
+//! Extensions of the protocol (J-50), for identity, settings and the arm image. Requests are types 0x40 to 0x4F. A device can answer a
+//! request with a frame of type 0x50 to 0x5F, in addition to the response record. The device sends such an answer only after a request,
+//! and only on the serial line of the request.
 use core::fmt;
 
 use crate::crc16;
@@ -20,30 +20,31 @@ pub use reactions::{Reactions, StopCause, StopKind};
 
 pub use info::{BootCause, INFO_WRITTEN, Info, Program, SIMULATOR, StoreState, capability};
 
-/// Version of the extensions that this crate implements. Later versions only add to it.
+/// Version of the extensions that this crate implements. Later versions only add functions.
 pub const EXTENSION_VERSION: u8 = 1;
 /// Highest number of values in a Settings frame.
 pub const PAGE_VALUES: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / VALUE_LEN;
-/// Highest number of bytes of the arm image in an Arm frame.
+/// Maximum number of bytes of the arm image in an Arm frame.
 pub const PAGE_BYTES: usize = ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN;
-/// Highest number of points in a Points frame.
+/// Maximum number of points in a Points frame.
 pub const PAGE_POINTS: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / POINT_LEN;
-/// Bytes of a [`Name`].
+/// Number of bytes of a [`Name`].
 pub const NAME_LEN: usize = 32;
 
-/// Name of an arm: UTF-8 without control characters, padded with zeros.
+/// Name of an arm, as UTF-8 text without control characters, padded with zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct Name([u8; NAME_LEN]);
 
 impl Name {
-    /// Creates a name. Returns `None` if `text` has more than [`NAME_LEN`] bytes, or control characters.
+    /// Creates a name. Returns `None` if `text` is longer than [`NAME_LEN`] bytes or contains control characters.
     pub fn new(text: &str) -> Option<Self> {
         let mut bytes = [0; NAME_LEN];
         bytes.get_mut(..text.len())?.copy_from_slice(text.as_bytes());
         (!text.chars().any(char::is_control)).then_some(Self(bytes))
     }
 
-    /// Returns as many whole characters of `text` as fit, without control characters.
+    /// Returns a name with as many whole characters of `text` as fit into [`NAME_LEN`] bytes, without control
+    /// characters.
     pub fn cut(text: &str) -> Self {
         let (mut bytes, mut len) = ([0; NAME_LEN], 0);
         for c in text.chars().filter(|c| !c.is_control()) {
@@ -54,7 +55,8 @@ impl Name {
         Self(bytes)
     }
 
-    /// Parses a name from the wire format. Returns `None` if it is not valid text, or if a byte after its end is not zero.
+    /// Parses a name from the wire format. Returns `None` if the name is not valid text, or if a byte after the end of the
+    /// text is not zero.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let bytes: [u8; NAME_LEN] = bytes.try_into().ok()?;
         let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
@@ -82,19 +84,19 @@ impl fmt::Display for Name {
     }
 }
 
-/// The value of a setting (J-53). The controller's table has the name, unit and range of each setting number.
+/// Value of a setting (J-53). The table of the controller contains the name, unit and range of each setting number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SettingValue {
     /// Number of the setting.
     pub setting: u8,
-    /// Joint from 1, base to wrist; 0 if the setting does not belong to a joint.
+    /// Number of the joint, from 1 at the base; 0 if the setting does not belong to a joint.
     pub joint: u8,
-    /// Value in the unit of the setting; 0 or 1 for a switch.
+    /// Value in the unit of the setting. For a switch, the value is 0 or 1.
     pub value: f64,
 }
 
 impl SettingValue {
-    /// Returns the bytes in the wire format: setting, joint, value.
+    /// Returns the bytes in the wire format, in the order setting, joint, value.
     pub fn emit(&self) -> [u8; VALUE_LEN] {
         let [a, b, c, d, e, f, g, h] = self.value.to_be_bytes();
         [self.setting, self.joint, a, b, c, d, e, f, g, h]
@@ -127,7 +129,7 @@ impl<'a> Values<'a> {
         self.0.len() / VALUE_LEN
     }
 
-    /// Returns true if the list is empty.
+    /// Returns `true` if the list is empty.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -149,14 +151,14 @@ impl fmt::Display for Values<'_> {
     }
 }
 
-/// A device's answer to an extension request, in addition to the response record.
+/// Answer of a device to an extension request, in addition to the response record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer<'a> {
     /// Answer to GetInfo.
     Info(Info),
     /// Answer to GetSettings.
     Settings {
-        /// Number of values before the first of these.
+        /// Number of the settings before the first value of this frame.
         first: u16,
         /// Total number of values.
         total: u16,
@@ -165,9 +167,9 @@ pub enum Answer<'a> {
     },
     /// Answer to GetArm: bytes of the arm image.
     Arm {
-        /// Position of the first of these bytes in the image.
+        /// Position in the image of the first byte of this frame.
         offset: u16,
-        /// Length of the image.
+        /// Length of the arm image in bytes.
         total: u16,
         /// The bytes.
         bytes: &'a [u8],
@@ -176,9 +178,9 @@ pub enum Answer<'a> {
     Log(LogPage<'a>),
     /// Answer to GetPoints: points of the trajectory in memory.
     Points {
-        /// Number of points before the first of these.
+        /// Number of points before the first point of this frame.
         first: u16,
-        /// Total number of points.
+        /// Total number of points in the trajectory.
         total: u16,
         /// The points.
         points: Points<'a>,
@@ -202,7 +204,7 @@ impl<'a> Points<'a> {
 }
 
 impl<'a> Answer<'a> {
-    /// Parses an answer. Returns `None` if the frame has another type or its body is not valid.
+    /// Parses an answer. Returns `None` if the frame has a different type or an invalid body.
     pub fn parse(frame: FrameRef<'a>) -> Option<Self> {
         let body = frame.body();
         let page = || {
@@ -228,7 +230,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// Returns the type of the answer's frame.
+    /// Returns the type of the frame that carries the answer.
     pub const fn frame_type(&self) -> FrameType {
         match self {
             Self::Info(_) => FrameType::Info,
@@ -262,8 +264,8 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// Writes a frame whose body has two parts, and returns its length. The board runs this function, so it contains no slice operation that
-/// could panic.
+/// Writes a frame whose body has two parts, and returns its length. The board runs this function, so the function must not contain a
+/// slice operation that could panic.
 fn sealed(out: &mut [u8], frame_type: FrameType, first: &[u8], second: &[u8]) -> Result<usize, EncodeError> {
     let (n, given) = (FRAME_MIN + first.len() + second.len(), out.len().min(ANSWER_MAX));
     let short = EncodeError::BufferTooShort { needed: n, given };

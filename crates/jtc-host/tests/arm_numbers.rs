@@ -1,5 +1,5 @@
-//! Each number of an arm file is removed, duplicated, or given the opposite sign, one number at a time. Each change must be
-//! detected.
+//! The test changes one number of an arm file at a time: it removes the number, duplicates it, or reverses its sign. The
+//! reader must detect each change.
 use std::ops::Range;
 
 use jtc_host::arm::{Arm, Source};

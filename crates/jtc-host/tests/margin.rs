@@ -174,7 +174,7 @@ proptest! {
     }
 }
 
-/// Returns the arm with a payload whose gravity takes this share of the torque of joint 2 in the stretched pose.
+/// Returns the arm with a payload whose weight requires this share of the torque of joint 2 in the stretched pose.
 fn stretched(share: f64) -> (Arm, Config) {
     let (arm, mut config) = (Arm::avena(), Arm::avena().config());
     let hold = |config: &Config| {

@@ -259,7 +259,7 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
     }
 }
 
-/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. Such teaching is considered
+/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. This teaching counts as
 /// ended when the record of the command that ends it has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {

@@ -10,19 +10,20 @@ use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 
 /// Plans the fastest motion from rest to rest along a path within the limits of velocity, acceleration and torque. The method is
 /// time-optimal path parameterisation by reachability analysis (Pham and Pham 2018). If the limits include a jerk limit, an interior-point
-/// method shortens the time law. The method starts from a law that is averaged over a window. It evaluates velocity, acceleration, jerk
-/// and torque at points along the path. The motion is also verified between its samples, and slowed down until it keeps all limits.
+/// method shortens the time law. The method starts from a law that is averaged over a window. This method evaluates velocity,
+/// acceleration, jerk and torque at points along the path. The motion is also verified between its samples, and slowed down until it keeps
+/// all limits.
 ///
 /// # Errors
 ///
 /// [`PlanError::Limit`] and [`PlanError::Range`] for limits that permit no motion, [`PlanError::Position`] and
-/// [`PlanError::Path`] if the path leads outside the limits or has no direction, [`PlanError::Torque`] if the torque is
+/// [`PlanError::Path`] if the path is partly outside the limits or has no direction, [`PlanError::Torque`] if the torque is
 /// too small at every speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
     unexplained(path, limits, arm).map(|motion| reasons::explained(motion, limits, arm))
 }
 
-/// Like [`along`], without determining the limiting constraints.
+/// Like [`along`], but does not determine the limiting constraints.
 pub(crate) fn unexplained(
     path: &dyn Path,
     limits: &Limits,

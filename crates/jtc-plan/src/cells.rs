@@ -133,8 +133,9 @@ fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Res
     Ok(())
 }
 
-/// Torque available for motion up (`high`) and down (`low`) at one end of a cell, N·m. This is the usable torque minus
-/// the holding torque, and minus the highest friction torque up to the speed in the direction of the path.
+/// Torque available for motion up (`high`) and down (`low`) at one end of a cell, N·m. The available torque is the
+/// usable torque minus the holding torque, and minus the highest friction torque up to the speed in the direction of
+/// the path.
 pub(crate) struct Room {
     pub high: JointVec,
     pub low: JointVec,

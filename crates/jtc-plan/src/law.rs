@@ -110,7 +110,8 @@ impl Law {
     }
 
     /// Returns the law averaged over a window of `window` seconds. Each jump of the acceleration becomes a ramp as long
-    /// as the window, and the law takes `window` seconds longer. This function is only for laws without a jerk limit.
+    /// as the window, and the duration of the law increases by `window` seconds. This function is only for laws without
+    /// a jerk limit.
     pub(crate) fn averaged(&self, window: f64) -> Self {
         let ends: Vec<f64> = self.phases.iter().map(|p| p.start).chain([self.duration()]).collect();
         let mut times: Vec<f64> = ends.iter().copied().chain(ends.iter().map(|t| t + window)).collect();

@@ -129,8 +129,8 @@ impl Motion {
     }
 
     /// Returns the binding limits in chronological order. If no limit is reached in an interval, its binding limit is
-    /// the one that is nearest to being reached. It may also be the limit because of which the whole motion was slowed
-    /// down.
+    /// the one that is nearest to being reached. The binding limit may also be the limit because of which the whole
+    /// motion was slowed down.
     pub fn binding(&self) -> &[Binding] {
         &self.binding
     }

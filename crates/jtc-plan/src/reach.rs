@@ -97,11 +97,12 @@ impl Step {
                     continue;
                 }
                 let size = by_acceleration.abs();
-                // The row limits ṡ² alone if the share of s̈ is negligible: beside the limit, or because the row shifts the place by a
-                // negligible part of the step (x·ṡ² + u·s̈ is x·ṡ² at a distance of u/2x).
+                // The row limits only ṡ² if the part of s̈ is negligible. This part is negligible in comparison with the limit, or
+                // because it shifts the point by a negligible part of the step (x·ṡ² + u·s̈ is x·ṡ² at a distance of u/2x).
                 let negligible = size * highest <= NEGLIGIBLE * length * limit
                     || size <= NEGLIGIBLE * length * by_speed.abs();
-                // Likewise, if the row at the first place permits a higher ṡ² only if the arm then comes to rest within the step.
+                // The row also limits only ṡ² if, at the first point, it permits a higher ṡ² only for an arm that comes to rest
+                // within the step.
                 let rests =
                     added == 0.0 && by_acceleration > 0.0 && by_acceleration <= 2.0 * length * by_speed;
                 if (negligible || rests) && by_speed > 0.0 {
@@ -135,7 +136,7 @@ impl Step {
     }
 
     /// Returns the largest possible s̈ at this ṡ². If rounding has made it smaller than the smallest s̈, the bound with less rounding
-    /// error has priority. This is the bound that depends less on ṡ².
+    /// error has priority. The bound with less rounding error is the bound that depends less on ṡ².
     fn fastest(&self, square: f64) -> f64 {
         let (most, least) = (self.most(square), self.least(square));
         if most.0 < least.0 && least.1.by.abs() < most.1.by.abs() { least.0 } else { most.0 }

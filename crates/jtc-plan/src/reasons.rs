@@ -25,8 +25,8 @@ type Use = (f64, Joint, LimitKind);
 pub(crate) struct Reasons {
     /// Limits that the motion reaches.
     pub used_up: Vec<Binding>,
-    /// Reason in the remaining time. This is the limit because of which the whole motion was slowed down, or else the
-    /// limit that is nearest to being reached around that time.
+    /// Reason in the remaining time. The reason is the limit because of which the whole motion was slowed down, or else
+    /// the limit that is nearest to being reached around that time.
     otherwise: Vec<Binding>,
 }
 

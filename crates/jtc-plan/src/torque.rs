@@ -138,10 +138,10 @@ impl<'a> ArmDynamics<'a> {
         torque
     }
 
-    /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`. This
-    /// is the limit minus the margin. The result is at least the sum of holding torque and breakaway friction plus a
-    /// quarter of the remaining torque, or plus 2 % of the limit if that is more. Therefore the arm can always move to
-    /// and from a pose that it can hold.
+    /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`. The
+    /// usable torque is the limit minus the margin. The result is at least the sum of holding torque and breakaway
+    /// friction plus a quarter of the remaining torque, or plus 2 % of the limit if that is more. Therefore the arm can
+    /// always move to and from a pose that it can hold.
     pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
         let (whole, margin) = (limits.torque[j], limits.margin[j]);
         if margin == 0.0 {

@@ -265,9 +265,9 @@ pub(crate) fn holds(
     Ok(())
 }
 
-/// Returns the times at which the torque of a piece is sampled, in seconds after its start. These are both ends,
-/// because the acceleration may jump there, and times between the ends that are at most `step` apart. The times at
-/// which the sign of the friction of a joint reaches ±1 are also included. A piece with higher accelerations inside
+/// Returns the times at which the torque of a piece is sampled, in seconds after its start. The list contains both
+/// ends, because the acceleration may jump there, and times between the ends that are at most `step` apart. The times
+/// at which the sign of the friction of a joint reaches ±1 are also included. A piece with higher accelerations inside
 /// than at its ends has more sample times.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };

@@ -44,7 +44,7 @@ proptest! {
     }
 
     /// A motion through many close waypoints on a smooth curve takes little longer than a motion through a few of
-    /// these. It passes each waypoint within the blend.
+    /// these. The motion passes each waypoint within the blend.
     #[test]
     fn more_waypoints_on_a_curve_cost_little_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
         let rng = &mut fastrand::Rng::with_seed(seed);

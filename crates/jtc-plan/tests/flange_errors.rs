@@ -83,8 +83,8 @@ fn a_line_over_the_base_ends_at_the_shoulder() {
     assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
 }
 
-/// Both ends are within reach, but the positions between the ends are not. These are in the column around the axis of
-/// joint 1 that a PUMA 560 cannot enter.
+/// Both ends are within reach, but the positions between the ends are not. The positions between are in the column
+/// around the axis of joint 1 that a PUMA 560 cannot enter.
 #[test]
 fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let model = robots::puma560();

@@ -258,8 +258,8 @@ proptest! {
     }
 }
 
-/// A motion along a path keeps the flange on its line at all times. This includes the times between the points that the
-/// planner checks.
+/// A motion along a path keeps the flange on its line at all times. The check includes the times between the points
+/// that the planner checks.
 #[test]
 fn motions_along_lines_and_arcs_stay_on_them() {
     let (config, parameters, model) = (Config::avena(), Parameters::avena(), robots::avena());

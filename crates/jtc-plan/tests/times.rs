@@ -10,9 +10,9 @@ use judge::Case;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Some waypoints have later times than in the fastest motion. The planned motion keeps these times and all limits.
-    /// A time may be too early only with rounded corners, because slower adjacent legs slow down the motion at the
-    /// waypoint.
+    /// In this test, some waypoints have later times than in the fastest motion. The planned motion keeps these times
+    /// and all limits. A time may be too early only with rounded corners, because slower adjacent legs slow down the
+    /// motion at the waypoint.
     #[test]
     fn given_times_are_kept(
         seed in any::<u64>(),

@@ -14,7 +14,8 @@ use jtc_wire::{
 
 /// Number of the serial line of the host. The simulation has only one serial line.
 const LINE: usize = 0;
-/// Maximum number of bytes that wait for the parser. It is the size of the ring buffer that the DMA of the board fills.
+/// Maximum number of bytes that wait for the parser. The number is the size of the ring buffer that the DMA of the
+/// board fills.
 const RING: usize = 32 * 1024;
 /// Length of a tick, µs.
 const TICK_US: u32 = 1000;

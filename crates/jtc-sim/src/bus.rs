@@ -1,5 +1,5 @@
-//! Simulation of the joint bus, with one broadcast and its answers per millisecond. It includes frame times,
-//! arbitration, errors and bus-off.
+//! Simulation of the joint bus, with one broadcast and its answers per millisecond. The simulation includes frame
+//! times, arbitration, errors and bus-off.
 
 mod nodes;
 

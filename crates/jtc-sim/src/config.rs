@@ -96,7 +96,7 @@ pub struct SimConfig {
     /// millisecond, the simulation draws a delay from the seed. The order of the answers does not change. If the value
     /// is 0, answers arrive in the next tick.
     pub answer_jitter_ms: u8,
-    /// Bit rate of the serial line, bit/s. If it is `None`, transmission takes no time.
+    /// Bit rate of the serial line, bit/s. If the rate is `None`, transmission takes no time.
     pub baud: Option<u32>,
     /// Inter-byte timeout, µs: a frame ends after this silence on the line (J-03).
     pub inter_byte_timeout_us: u32,

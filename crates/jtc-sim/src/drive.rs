@@ -1,5 +1,5 @@
-//! Drive of a joint with the properties of real drives. These are a slow first enable, a coarse encoder, a delayed
-//! speed, and no timeout of the torque.
+//! Drive of a joint with the properties of real drives. The properties are a slow first enable, a coarse encoder, a
+//! delayed speed, and no timeout of the torque.
 use jtc_bus::{NodeState, config as config_bit, error as error_bit};
 
 use crate::inbox::Inbox;

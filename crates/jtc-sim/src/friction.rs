@@ -82,7 +82,7 @@ impl Default for LuGre {
 pub(crate) struct FrictionTorques {
     model: FrictionModel,
     curves: [SimFriction; JOINTS],
-    /// Polynomial coefficients, with one row per power. They are zero for joints with a table.
+    /// Polynomial coefficients, with one row per power. The coefficients are zero for joints with a table.
     k: [JointVec; 4],
     /// Speed at which the straight line begins, rad/s. The next field is the slope of this line, N·m·s/rad. For joints with a table,
     /// the speed and the slope are zero.
@@ -228,7 +228,7 @@ impl FrictionTorques {
     ///
     /// dz/dt = v − rate·z is too stiff for the Runge-Kutta method with steps of 1 ms, because the rate reaches 10⁴/s at
     /// high speed. For a constant velocity the exact solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x).
-    /// With 1/(1 + x + x²/2) instead of e, the method is of second order and needs no exponential function. It
+    /// With 1/(1 + x + x²/2) instead of e, the method is of second order and needs no exponential function. The method
     /// converges to the exact end value g/σ0 for any x.
     #[inline]
     pub(crate) fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {

@@ -89,7 +89,7 @@ impl Hand {
         }))
     }
 
-    /// Returns the target of the hand. It first moves smoothly to the first point, and then follows the path.
+    /// Returns the target of the hand. The target first moves smoothly to the first point, and then follows the path.
     fn wanted(&self, led: &Led, t: f64) -> JointVec {
         if t >= led.approach_s {
             return self.path.at(t - led.approach_s);

@@ -1,4 +1,4 @@
-//! Small host for tests, soak runs and the fault matrix. It creates frames, receives statuses, and plans simple
+//! Small host for tests, soak runs and the fault matrix. The host creates frames, receives statuses, and plans simple
 //! motions.
 //!
 //! The real client library is `jtc-host`. With this small host, tests of the simulation do not depend on `jtc-host`.
@@ -65,7 +65,7 @@ pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<
 }
 
 /// Returns a motion from standstill to standstill, with a point every `step_ms`. The motion goes from `from` to `to`
-/// (rad) in `seconds` and back, `times` times. It follows a quintic with zero acceleration at both ends.
+/// (rad) in `seconds` and back, `times` times. The motion follows a quintic with zero acceleration at both ends.
 pub fn there_and_back(
     from: &JointVec,
     to: &JointVec,

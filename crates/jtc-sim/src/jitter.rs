@@ -1,4 +1,4 @@
-//! Delay of answers to the controller. It models a controller that reads its receiver at irregular times.
+//! Delay of answers to the controller. The delay models a controller that reads its receiver at irregular times.
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;

@@ -106,7 +106,7 @@ impl Operator {
     pub fn response(&mut self, frame: &[u8]) -> Result<Response, OperatorError> {
         self.listener.responses.clear();
         self.world.host_write(frame);
-        // A long frame takes time on the line.
+        // The transmission of a long frame takes time.
         for _ in 0..8_000 {
             self.step();
             if !self.listener.responses.is_empty() {

@@ -190,8 +190,8 @@ fn a_fault_of_no_duration_is_there_for_a_millisecond() {
 }
 
 /// An elastic gear twists, so the joint encoder and the motor encoder measure different positions. For any motion and
-/// contact of the arm, the controller must not report this twist as an encoder jump or as a different speed scale. This
-/// applies to drives that measure the position at the motor and to drives that measure it at the link.
+/// contact of the arm, the controller must not report this twist as an encoder jump or as a different speed scale. The
+/// test covers drives that measure the position at the motor and drives that measure it at the link.
 #[test]
 fn j35_gears_that_yield_are_no_false_alarm() {
     for (trial, place) in

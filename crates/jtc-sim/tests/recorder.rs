@@ -121,8 +121,8 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
 }
 
 /// The recorder keeps at least two seconds before an error and the time after the error, even with more traffic than
-/// the controller can execute. The recorder keeps this time with any lost
-/// part of the first snapshot's interval.
+/// the controller can execute. The recorder keeps this time with any lost part of the first snapshot's
+/// interval.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();

@@ -1,5 +1,5 @@
-//! Tests of Pause and Stop while a joint needs nearly its full torque (J-33). They measure time, distance and speed
-//! until the arm is at rest.
+//! Tests of Pause and Stop while a joint needs nearly its full torque (J-33). The tests measure time, distance and
+//! speed until the arm is at rest.
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_sim::{ModelError, Support};
 use jtc_wire::ExecCommand;

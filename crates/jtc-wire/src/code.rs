@@ -2,8 +2,8 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-/// Declares a list of codes. It consists of an enum, the list of its variants, the conversion from a byte, and the names. The name of a
-/// variant without a text is its identifier.
+/// Declares a list of codes. The list consists of an enum, the list of its variants, the conversion from a byte, and the names. The
+/// name of a variant without a text is its identifier.
 macro_rules! codes {
     (@text $name:ident $text:literal) => { $text };
     (@text $name:ident) => { stringify!($name) };
@@ -58,7 +58,7 @@ pub trait Known: Copy + Eq + fmt::Debug + 'static {
     fn name(self) -> &'static str;
 }
 
-/// A received code. It is a variant of `T`, or a code that this version does not know.
+/// A received code. The code is a variant of `T`, or a code that this version does not know.
 ///
 /// Always compare a code with variants of `T` and not with a number.
 ///

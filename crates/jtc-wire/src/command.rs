@@ -111,7 +111,7 @@ pub mod field {
     pub const CLEAR_JTC: usize = 0;
     /// Field of ClearCurrentErrors in which bits 0..6 select the nodes.
     pub const CLEAR_NODES: usize = 1;
-    /// TrajSetExecStatus: the command.
+    /// Field of TrajSetExecStatus with the command.
     pub const EXEC: usize = 0;
     /// Field of ResetCanDevices in which bits 0..6 select the nodes.
     pub const RESET_NODES: usize = 0;
@@ -190,7 +190,7 @@ impl<'a> Command<'a> {
             }
             FrameType::ClearLog => Self::ClearLog,
             FrameType::GetPoints => Self::GetPoints { first: from()? },
-            // These are frames that a device sends, which are JtcStatus and the answers. Without this match arm, the compiler would
+            // Only a device sends these frames, which are JtcStatus and the answers. Without this match arm, the compiler would
             // insert a trap for the unused numbers between the types.
             _ => return Err(DataStatus::NotAllowed),
         })

@@ -60,7 +60,7 @@ mod tests {
     fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
         // Different transmission delays have no effect.
         assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
-        // The arm moves at half of the full speed, and then it stands still.
+        // The arm moves at half of the full speed, and is then at rest.
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
         assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
         assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);

@@ -219,7 +219,7 @@ impl<P: Port> Session<P> {
     /// [`MotionError::NotUploaded`], before anything is sent, if this session did not upload exactly this trajectory, or if
     /// the controller no longer has it. [`LinkError::Refused`] if the controller does not start the trajectory because the
     /// arm is not at the first point (J-34) or not in position hold. [`MotionError::LinkLost`] if no confirmation arrived.
-    /// The arm may then be moving.
+    /// In this case the arm may be moving.
     pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
         self.catch_up()?;
         if self.uploaded.as_ref().map(CheckedTrajectory::number) != Some(checked.number()) {
@@ -264,8 +264,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if no motion is in progress; [`MotionError::LinkLost`] if no confirmation arrived. The arm
-    /// may then be moving.
+    /// [`LinkError::Refused`] if no motion is in progress; [`MotionError::LinkLost`] if no confirmation arrived. In this
+    /// case the arm may be moving.
     pub fn pause(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Pause, |s| s.trajectory == TrajectoryState::Pause)
     }
@@ -274,14 +274,14 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if no motion can be stopped; [`MotionError::LinkLost`] if no confirmation arrived. The arm
-    /// may then be moving.
+    /// [`LinkError::Refused`] if no motion can be stopped; [`MotionError::LinkLost`] if no confirmation arrived. In this
+    /// case the arm may be moving.
     pub fn stop(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
 
-    /// Sends an execution command. Returns [`MotionError::LinkLost`] if the command is not confirmed, because the arm
-    /// may then be moving.
+    /// Sends an execution command. Returns [`MotionError::LinkLost`] if the command is not confirmed, because in this
+    /// case the arm may be moving.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
         // No other frame is sent before a Stop or a Pause.

@@ -49,7 +49,7 @@ impl<P: Port> Session<P> {
     ///
     /// [`MotionError::RunFault`] if the controller ended the motion with an error, [`MotionError::HeldStop`] if it stopped
     /// the motion and holds the arm, [`Error::Cancelled`] if `each` returned [`Flow::Cancel`], [`MotionError::LinkLost`] if
-    /// data no longer arrive. The arm may then be moving.
+    /// data no longer arrive. In this case the arm may be moving.
     pub fn follow(&mut self, each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         self.follow_with(each, |_, _| {})
     }

@@ -107,7 +107,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Receives statuses for the given time.
+    /// Receives statuses for the duration `time`.
     ///
     /// # Errors
     ///

@@ -18,7 +18,7 @@ use crate::error::{Error, LinkError, StateError};
 use crate::labels;
 use crate::port::Port;
 
-/// Maximum time until a node is ready. The first enable of a drive takes 4 s. After a reset it takes longer.
+/// Maximum time until a node is ready. The first enable of a drive takes 4 s. After a reset, the enable takes longer.
 const NODE_TIME: Duration = Duration::from_secs(15);
 /// Maximum time from reset to Init.
 const START_TIME: Duration = Duration::from_secs(3);

@@ -9,7 +9,7 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session};
 use jtc_sim::{ModelError, SimConfig, World};
 
-/// Returns the joint positions with this number. Each number gives a different position.
+/// Returns the joint positions with this number. The positions for different numbers are different.
 fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     let config = arm.config();
     std::array::from_fn(|j| {

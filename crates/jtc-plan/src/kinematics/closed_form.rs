@@ -126,7 +126,7 @@ fn moved(zero: &Axes, j: usize, angle: f64, point: &Vector3<f64>) -> Vector3<f64
 impl Shoulder {
     /// Returns up to four solutions of the first three joints with which `centre` is at `target`.
     ///
-    /// With y = E₃·centre and z = E₁⁻¹·target, E₂ takes y to z: y and z have equal coordinates along axis 2 and equal
+    /// With y = E₃·centre and z = E₁⁻¹·target, E₂ maps y to z, so y and z have equal coordinates along axis 2 and equal
     /// distances from each point of the axis.
     fn place(
         &self,

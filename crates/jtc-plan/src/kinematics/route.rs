@@ -40,7 +40,7 @@ pub struct RoutePoint {
 /// arc. The arm reaches a flange pose at the end of a line in this configuration. Joint positions at the end of a line
 /// must also have this configuration. For any other flange pose, the solution nearest to the previous waypoint is used.
 ///
-/// The path parameter continues from section to section. It is in rad in joint space, and in m along lines and arcs.
+/// The path parameter continues from section to section. Its unit is rad in joint space, and in m along lines and arcs.
 #[derive(Clone, Debug)]
 pub struct Route {
     sections: Vec<Section>,
@@ -54,8 +54,8 @@ struct Section {
     way: Way,
     begin: f64,
     /// Points at which the path changes its form, including the ends, as values of the route parameter and of the
-    /// section parameter. The sum of parameters is rounded. This must not move a point to the other side of a change of
-    /// form.
+    /// section parameter. The sum of parameters is rounded. The rounding must not move a point to the other side of a
+    /// change of form.
     marks: Vec<(f64, f64)>,
 }
 

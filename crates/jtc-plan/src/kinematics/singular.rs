@@ -10,7 +10,7 @@ use super::closed_form::{Geometry, Shoulder};
 use super::subproblems::across;
 
 /// Smallest singular value of the Jacobian that is permitted on a path of the flange (see [`Singularity::smallest`]).
-/// This corresponds to half a degree from aligned wrist axes, and to a few degrees from the stretched arm.
+/// The value corresponds to half a degree from aligned wrist axes, and to a few degrees from the stretched arm.
 pub const SINGULAR: f64 = 0.01;
 
 /// Kind of singular pose.

@@ -1,8 +1,8 @@
 //! Rotations that solve one equation of a closed form (the subproblems of Paden and Kahan).
 //!
-//! Each function takes a `hint`: the angle to return if the geometry does not determine the angle, as in singular
-//! poses. If a target is slightly out of reach (which happens for a nearly ideal arm), the nearest reachable target is
-//! used. The result is refined later. It is dropped if it does not reach the goal.
+//! Each function has an argument `hint`, which is the angle that it returns if the geometry does not determine the
+//! angle, as in singular poses. If a target is slightly out of reach (which happens for a nearly ideal arm), the
+//! nearest reachable target is used. The result is refined later. A result that does not reach the goal is dropped.
 use nalgebra::Vector3;
 
 use super::chain::turn;

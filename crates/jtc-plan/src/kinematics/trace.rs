@@ -2,9 +2,9 @@
 //!
 //! A blend begins at the distance r before the corner and ends at the distance r after it. Between these two points,
 //! the parameter of the previous leg slows down to a stop while the parameter of the next leg starts. Let τ go from −r
-//! to r, let w rise smoothly from 0 to 1, and let W = ∫w. The point is then the point of the previous leg at τ − W plus
-//! the displacement of the next leg by W. Position and orientation have continuous second derivatives. The position
-//! stays within the triangle of the corner if the legs are straight.
+//! to r, let w rise smoothly from 0 to 1, and let W = ∫w. The point on the path is the point of the previous leg at τ −
+//! W plus the displacement of the next leg by W. Position and orientation have continuous second derivatives. The
+//! position stays within the triangle of the corner if the legs are straight.
 use nalgebra::Vector3;
 
 use super::PoseError;

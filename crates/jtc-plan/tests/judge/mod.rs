@@ -177,8 +177,8 @@ impl Case {
         })
     }
 
-    /// Torque that a motion may use. This is the limit minus its margin, but at least the holding torque plus a small
-    /// part of the remaining torque.
+    /// Torque that a motion may use. The usable torque is the limit minus its margin, but at least the holding torque
+    /// plus a small part of the remaining torque.
     fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
         let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
         std::array::from_fn(|j| {

@@ -16,7 +16,7 @@ const DAMPING_TIME: f64 = 5e-4;
 /// Elasticity of a gear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gear {
-    /// Stiffness: torque per angle between motor and link, N·m/rad. It is infinite for a rigid gear.
+    /// Stiffness: torque per angle between motor and link, N·m/rad. The stiffness is infinite for a rigid gear.
     pub stiffness: f64,
     /// Damping: torque per speed difference between motor and link, N·m·s/rad.
     pub damping: f64,

@@ -60,8 +60,8 @@ enum Surface {
         normal: [f64; 3],
         /// Position of the surface along the normal, m.
         offset: f64,
-        /// Dynamics with a gravity of 1 m/s² into the wall. They are used to compute the joint torques of a force along
-        /// the normal at the flange.
+        /// Dynamics with a gravity of 1 m/s² into the wall. The simulation uses these dynamics to compute the joint
+        /// torques of a force along the normal at the flange.
         pulled: Box<Dynamics>,
     },
     Joint {
@@ -158,8 +158,8 @@ impl Contact {
     }
 
     /// Returns the contributions of the wall to the squared highest natural frequency (1/s²) and to the fastest decay
-    /// (1/s). They are 0 if the arm cannot touch the wall within `dt`. `mobility` returns the joint accelerations
-    /// caused by torques.
+    /// (1/s). The contributions are 0 if the arm cannot touch the wall within `dt`. `mobility` returns the joint
+    /// accelerations caused by torques.
     pub(super) fn rates(
         &self,
         dynamics: &Dynamics,

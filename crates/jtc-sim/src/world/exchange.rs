@@ -1,5 +1,5 @@
-//! Inputs and outputs of the controller's board in a millisecond. These are for programs that run a different board, or
-//! a controller in a different program, in parallel with the simulated board.
+//! Inputs and outputs of the controller's board in a millisecond. The data are for programs that run a different board,
+//! or a controller in a different program, in parallel with the simulated board.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Outputs};
 
@@ -58,7 +58,7 @@ impl Exchange {
 }
 
 impl Board {
-    /// Returns the bytes that the tick with these outputs sends to the host. These are a status, an answer to an
+    /// Returns the bytes that the tick with these outputs sends to the host. The bytes are a status, an answer to an
     /// extension request, or no bytes.
     pub fn bytes_to_host(&self, outputs: &Outputs) -> Vec<u8> {
         let status: &[u8] = if outputs.status { self.status_frame() } else { &[] };

@@ -1,8 +1,9 @@
 //! Session with the controller. The session is the only writer, receives the stream of statuses, and gets each request
 //! confirmed.
 //!
-//! Records of the controller are one-shot (J-04): for each received frame, exactly one status contains its record, in the
-//! order of the frames. The session queues the records and passes each one to the request that waits for it.
+//! The controller sends each record only once (J-04). For each received frame, exactly one status contains the record of
+//! the frame, in the order of the frames. The session queues the records and passes each one to the request that waits
+//! for it.
 
 mod bench;
 mod capture_pose;

@@ -1,10 +1,11 @@
-//! Waypoint files: positions for a motion, with or without times. The files are used by [`plan`](crate::plan).
+//! Waypoint files, which contain positions for a motion, with or without times. The files are used by
+//! [`plan`](crate::plan).
 //!
-//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a pose
-//! of the flange in the base frame (m, with a quaternion or roll, pitch and yaw). If a flange pose has several solutions,
-//! the joint positions nearest to the previous waypoint are used. `leg` selects the motion to the waypoint: straight in
-//! joint space, or with the flange on a [line or an arc](LegKind). Times are in s from the first waypoint. A file is CSV
-//! with a header, or JSON whose keys have the names of the CSV columns:
+//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a
+//! flange pose. A flange pose is in the base frame, in m with a quaternion or roll, pitch and yaw. If a flange pose has
+//! several solutions, the joint positions nearest to the previous waypoint are used. `leg` selects the motion to the
+//! waypoint, which is straight in joint space, or with the flange on a [line or an arc](LegKind). Times are in s from
+//! the first waypoint. A file is CSV with a header, or JSON whose keys have the names of the CSV columns:
 //!
 //! ```
 //! use jtc_host::waypoints::WaypointFile;

@@ -88,8 +88,8 @@ fn judge(arm: &Arm, config: &Config, planned: &Planned, margin: f64) -> (String,
     let of = |j: usize, v: f64, celsius: f64| friction_at(friction.as_ref(), config, j, v, celsius);
     let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
     let end = (planned.trajectory.duration_s() * 1e3).round() as u32;
-    // The breakaway friction is the greatest friction at low speeds, up to slightly more than the speed at which the sign
-    // of the friction is fully applied.
+    // The breakaway friction is the greatest friction at low speeds. The highest of these speeds is slightly above the
+    // speed at which the sign of the friction is fully applied.
     let breakaway: [f64; JOINTS] = std::array::from_fn(|j| {
         let fastest = config.friction_sign_width + config.joints[j].velocity_max / 128.0;
         let speeds = (-20..=20).map(|i| f64::from(i) / 20.0 * fastest);

@@ -1,4 +1,4 @@
-//! Inverse kinematics: joint positions for flange poses, and straight flange paths.
+//! Inverse kinematics, which computes joint positions for flange poses, and straight flange paths.
 mod chain;
 mod closed_form;
 mod error;
@@ -37,9 +37,9 @@ const REFINE: usize = 25;
 /// Maximum number of iterations of a search.
 const SEARCH: usize = 60;
 
-/// Kinematics of an arm within its position limits: converts joint positions to flange poses and back.
+/// Kinematics of an arm within its position limits, which converts joint positions to flange poses and back.
 ///
-/// Poses are poses of the flange in the base frame, with positions in m; joint positions are in rad. With a solution,
+/// Poses are flange poses in the base frame, with positions in m. Joint positions are in rad. With a solution,
 /// the flange is within 1 nm and 1 nrad of the pose.
 ///
 /// All solutions are computed in closed form for arms with a spherical wrist or with three parallel axes. Examples of
@@ -81,8 +81,9 @@ impl Kinematics {
         self.chain.flange(q)
     }
 
-    /// Returns the geometric Jacobian of the flange at the joint positions `q`, row major: the flange's velocity in the
-    /// base frame (rows 0..3, m/rad) and its angular velocity (rows 3..6, rad/rad), one column per joint.
+    /// Returns the geometric Jacobian of the flange at the joint positions `q`, row major, with one column per joint.
+    /// Rows 0..3 are the velocity of the flange in the base frame (m/rad), and rows 3..6 are its angular velocity
+    /// (rad/rad).
     pub fn jacobian(&self, q: &JointVec) -> [[f64; JOINTS]; 6] {
         let jacobian = self.chain.at(q).jacobian();
         std::array::from_fn(|row| std::array::from_fn(|joint| jacobian[(row, joint)]))
@@ -91,7 +92,7 @@ impl Kinematics {
     /// Returns the joint positions within the limits at which the flange is at `target`. If there are several
     /// solutions, returns the solution nearest to `near`, which has the smallest sum of squared joint motions.
     ///
-    /// A singular target has infinitely many solutions; a solution near `near` is returned.
+    /// A singular target has infinitely many solutions. In this case returns a solution near `near`.
     ///
     /// # Errors
     ///
@@ -115,7 +116,7 @@ impl Kinematics {
     /// contains each solution with every joint within (−π, π]. If the limits permit, it also contains the solution with
     /// joints turned by ±2π. Returns an empty list for an invalid pose.
     ///
-    /// A singular target has infinitely many solutions; the list contains some of these.
+    /// A singular target has infinitely many solutions, of which the list contains some.
     pub fn all(&self, target: &Pose) -> Vec<JointVec> {
         let Ok(goal) = orientation::checked(target) else { return Vec::new() };
         let found = self.solutions(&goal, &[0.0; JOINTS]);
@@ -145,7 +146,7 @@ impl Kinematics {
         found
     }
 
-    /// Returns the reason why no solution is within the limits; `found` contains all solutions.
+    /// Returns the reason why no solution is within the limits. `found` contains all solutions.
     fn reason(&self, goal: &Frame, found: &[JointVec]) -> PoseError {
         let least = found.iter().map(|q| turns::outside(q, &self.limits));
         match least.min_by(|a, b| a.beyond.total_cmp(&b.beyond)) {

@@ -1,4 +1,4 @@
-//! Time laws: position on a section of a path as a function of time.
+//! Time laws, which are the position on a section of a path as a function of time.
 
 /// Part of a time law in which the third derivative of the parameter is constant.
 #[derive(Clone, Copy, Debug, Default)]

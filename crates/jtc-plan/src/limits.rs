@@ -24,8 +24,8 @@ pub struct Limits {
     pub jerk: JointVec,
     /// Highest torque, N·m. The planner uses this limit only with an [`crate::ArmDynamics`].
     pub torque: JointVec,
-    /// Share of the torque limit that is reserved as a margin, 0 to [`MARGIN_MAX`]; see
-    /// [`crate::ArmDynamics::usable_torque`].
+    /// Share of the torque limit that is reserved as a margin, from 0 to [`MARGIN_MAX`] (see
+    /// [`crate::ArmDynamics::usable_torque`]).
     pub margin: JointVec,
 }
 

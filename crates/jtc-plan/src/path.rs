@@ -12,8 +12,8 @@ pub struct PathPoint {
     pub second: JointVec,
 }
 
-/// A path through joint space: positions as a function of a parameter from 0 to [`end`](Path::end), with two
-/// derivatives.
+/// A path through joint space. The positions and two derivatives are functions of a parameter from 0 to
+/// [`end`](Path::end).
 ///
 /// The first derivative is continuous except at [`stops`](Path::stops), and between two [`breaks`](Path::breaks) the
 /// position is three times differentiable. Any parameter is possible. The time laws are best if the parameter is

@@ -77,8 +77,8 @@ fn lowest(bounds: &[Bounds]) -> Vec<Bounds> {
     parts
 }
 
-/// Returns the highest squared speeds at the ends of the parts that can be reached from the start and from which a stop
-/// at the end is possible.
+/// Returns the highest squared speeds at the ends of the parts. Each speed can be reached from the start, and a stop at
+/// the end of the path is possible from it.
 fn speeds(parts: &[Bounds]) -> Vec<f64> {
     let mut nodes = vec![0.0; parts.len() + 1];
     for (i, part) in parts.iter().enumerate() {

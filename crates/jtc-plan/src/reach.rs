@@ -17,7 +17,7 @@ struct Rows {
 }
 
 /// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest along the cells. Squared speeds
-/// are at most `caps`; accelerations and torques are at most `shares` of their limits.
+/// are at most `caps`. Accelerations and torques are at most `shares` of their limits.
 ///
 /// The parameter's acceleration s̈ is constant from each point to the next point, so ṡ² is linear between the two
 /// points.
@@ -97,11 +97,11 @@ impl Step {
                     continue;
                 }
                 let size = by_acceleration.abs();
-                // The row limits only ṡ² if the part of s̈ is negligible. This part is negligible in comparison with the limit, or
+                // The row is a cap of ṡ² if the part of s̈ is negligible. This part is negligible in comparison with the limit, or
                 // because it shifts the point by a negligible part of the step (x·ṡ² + u·s̈ is x·ṡ² at a distance of u/2x).
                 let negligible = size * highest <= NEGLIGIBLE * length * limit
                     || size <= NEGLIGIBLE * length * by_speed.abs();
-                // The row also limits only ṡ² if, at the first point, it permits a higher ṡ² only for an arm that comes to rest
+                // The row is also a cap of ṡ² if, at the first point, it permits a higher ṡ² only for an arm that comes to rest
                 // within the step.
                 let rests =
                     added == 0.0 && by_acceleration > 0.0 && by_acceleration <= 2.0 * length * by_speed;

@@ -10,7 +10,7 @@ const ROW_MAX: usize = 256;
 
 /// Returns the indices of the kept positions in ascending order. Both ends and the positions that must stay (`stays`)
 /// are kept, and as many further positions as needed. Every dropped position is within `share` of the blend from the
-/// straight line between its kept neighbours, and the dropped positions are in order along this line.
+/// straight line between its kept neighbours. The dropped positions are in order along this line.
 pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f64) -> Vec<usize> {
     let last = positions.len() - 1;
     let dense = |i: usize| distance(&positions[i - 1], &positions[i]) <= GAP_SHARE * blend;

@@ -13,8 +13,8 @@ pub const HOLD_SHARE: f64 = 0.97;
 const MOTION_SHARE: f64 = 0.25;
 const MOTION_LEAST: f64 = 0.02;
 
-/// Model for the torque of a motion: the arm with its payload, the inertia of its rotors, and the friction compensation
-/// that the controller adds (J-40, J-42, J-60).
+/// Model for the torque of a motion (J-40, J-42, J-60). It includes the arm with its payload, the inertia of the
+/// rotors, and the friction compensation that the controller adds.
 #[derive(Clone, Debug)]
 pub struct ArmDynamics<'a> {
     dynamics: Dynamics,
@@ -200,7 +200,7 @@ impl<'a> ArmDynamics<'a> {
     }
 
     /// Returns the highest speed that the friction table covers for the joint with index `j` in both directions, rad/s
-    /// (J-36); infinite without a table.
+    /// (J-36). The result is infinite without a table.
     pub(crate) fn velocity_max(&self, j: usize) -> f64 {
         match self.friction {
             Some(Friction::Table(tables)) => {

@@ -53,8 +53,8 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// Returns the time factor that a piece needs to keep the velocity, acceleration and jerk limits; below 1 if the piece
-/// already keeps these limits.
+/// Returns the time factor that a piece needs to keep the velocity, acceleration and jerk limits. The factor is below 1
+/// if the piece already keeps these limits.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {

@@ -1,7 +1,7 @@
 //! Model of the true arm: rigid bodies, rotors with gears, friction, end stops and walls. The equations are integrated with the
 //! Runge-Kutta method in steps of at most 1 ms.
 //!
-//! The true arm intentionally differs from the model in the controller; see [`ModelError`](crate::ModelError).
+//! The true arm intentionally differs from the model in the controller (see [`ModelError`](crate::ModelError)).
 use jtc_core::{Config, Friction, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, LinkInertias, Payload};
 
@@ -56,7 +56,7 @@ pub struct SimArm {
     pub payload: Payload,
     /// Acceleration of gravity in the base frame, m/s².
     pub gravity: [f64; 3],
-    /// Inertia of the drives' rotors at the joints, kg·m²; a value below 0.02 is treated as 0.02.
+    /// Inertia of the drives' rotors, converted to the joints, kg·m². A value below 0.02 is treated as 0.02.
     pub rotor_inertia: JointVec,
     /// Friction per joint.
     pub friction: [SimFriction; JOINTS],
@@ -213,8 +213,8 @@ impl Arm {
         }
     }
 
-    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need, and the share of the
-    /// walls' damping for which this number is sufficient.
+    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need. Also returns the share of
+    /// the walls' damping for which this number is sufficient.
     fn stiff_substeps(&self, dt: f64) -> (f64, f64) {
         let (mut square, mut decay) = (0.0, 0.0);
         let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));

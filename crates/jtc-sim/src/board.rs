@@ -153,7 +153,7 @@ impl Board {
     /// Resets the board, which loses everything except the contents of its non-volatile memory.
     pub fn reset(&mut self) {
         let resets = self.watchdog_resets;
-        // An unfinished write is lost; the previously stored arm is kept.
+        // An unfinished write is lost, and the previously stored arm remains.
         let memory = Memory { writing: None, ..core::mem::take(&mut self.memory) };
         let recorder =
             core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));

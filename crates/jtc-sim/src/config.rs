@@ -87,7 +87,8 @@ pub struct SimConfig {
     pub drives: [DriveConfig; JOINTS],
     /// `true` if a gripper is on the bus.
     pub gripper: bool,
-    /// Joints (bit n = joint n) whose drive is not simulated, because it is on another bus: see [`BusTap`](crate::BusTap).
+    /// Joints (bit n = joint n) whose drive is not simulated, because it is on another bus (see
+    /// [`BusTap`](crate::BusTap)).
     pub absent_drives: u8,
     /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node acknowledges
     /// them.
@@ -98,7 +99,7 @@ pub struct SimConfig {
     pub answer_jitter_ms: u8,
     /// Bit rate of the serial line, bit/s. If the rate is `None`, transmission takes no time.
     pub baud: Option<u32>,
-    /// Inter-byte timeout, µs: a frame ends after this silence on the line (J-03).
+    /// Inter-byte timeout, µs. A frame ends after this time of silence on the serial line (J-03).
     pub inter_byte_timeout_us: u32,
     /// Number of missed ticks after which the controller's watchdog resets it (J-12).
     pub watchdog_ms: u32,

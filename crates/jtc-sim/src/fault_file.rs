@@ -75,7 +75,7 @@ pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 const FORMAT: f64 = 2.0;
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
-/// Largest coordinate of a position in the base frame, m; and of the centre of mass of a load in the flange frame, m.
+/// Largest coordinate of a position in the base frame, and of the centre of mass of a load in the flange frame, m.
 const PLACE_MAX: f64 = 10.0;
 const COM_MAX: f64 = 2.0;
 /// Largest mass of a load, kg.

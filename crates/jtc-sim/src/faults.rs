@@ -256,8 +256,8 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Condition that starts the fault.
     pub trigger: Trigger,
-    /// Duration, ms; 0 is treated as 1, because faults begin and end only at whole milliseconds. If it is `None`, the
-    /// fault never ends.
+    /// Duration, ms. The value 0 is treated as 1, because faults begin and end only at whole milliseconds. If it is
+    /// `None`, the fault never ends.
     pub duration_ms: Option<u64>,
 }
 

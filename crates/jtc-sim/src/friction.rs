@@ -57,16 +57,16 @@ impl Default for FrictionModel {
 /// (Olsson 1996, section 3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LuGre {
-    /// Break-away torque divided by Coulomb torque. The example in the paper uses 1.5; values of harmonic drives are
+    /// Break-away torque divided by Coulomb torque. The example in the paper uses 1.5. Values of harmonic drives are
     /// between 1.1 and 1.6.
     pub stiction_ratio: f64,
     /// Speed at which half of the excess of stiction over Coulomb friction remains, rad/s.
     pub stribeck_speed: f64,
-    /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one count of
-    /// the joint encoder. The stiffness of stiffer bristles is reduced until the natural frequency of the rotor on its bristles is below
-    /// 800 rad/s.
+    /// Deflection at which the bristles carry the Coulomb torque, rad. The stiffness is σ0 = Coulomb torque/deflection. The default is
+    /// about one count of the joint encoder. The stiffness of stiffer bristles is reduced until the natural frequency of the rotor on
+    /// its bristles is below 800 rad/s.
     pub presliding: f64,
-    /// Damping ratio of the rotor on its bristles: σ1 = 2·ratio·√(σ0·rotor inertia).
+    /// Damping ratio of the rotor on its bristles, with σ1 = 2·ratio·√(σ0·rotor inertia).
     pub damping_ratio: f64,
 }
 

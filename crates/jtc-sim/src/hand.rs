@@ -52,8 +52,8 @@ pub(crate) struct Hand {
     led: Option<Led>,
 }
 
-/// State since Teaching began: pose of the arm at that time, duration of the motion to the first point (s), and elapsed
-/// time (s).
+/// State since Teaching began, which contains the pose of the arm at that time, the duration of the motion to the first
+/// point (s), and elapsed time (s).
 #[derive(Clone, Copy, Debug)]
 struct Led {
     from: JointVec,

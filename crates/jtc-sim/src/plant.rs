@@ -1,6 +1,6 @@
-//! Devices on the joint bus: drives, gripper, and the arm that they move. The plant does not depend on a particular
-//! controller. The plant works with the simulated controller of [`World`](crate::World), or with any controller that
-//! sends frames.
+//! Devices on the joint bus (drives and gripper), and the arm that the drives move. The plant does not depend on a
+//! particular controller. The plant works with the simulated controller of [`World`](crate::World), or with any
+//! controller that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
 use jtc_dynamics::{ArmModel, JointVec, Payload};

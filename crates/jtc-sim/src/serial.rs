@@ -78,7 +78,7 @@ pub struct LineFault {
 }
 
 impl LineFault {
-    /// Applies the fault to `bytes`; `rng` selects the affected bytes.
+    /// Applies the fault to `bytes`. `rng` selects the affected bytes.
     pub fn apply(&self, bytes: &mut Vec<u8>, rng: &mut fastrand::Rng) {
         if self.lost > 0.0 {
             bytes.retain(|_| rng.f64() >= self.lost);

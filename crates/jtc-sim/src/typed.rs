@@ -1,4 +1,4 @@
-//! Events that a user types while a simulation runs: `push 3 12 0.5`, `hand FILE`.
+//! Events that a user types during a simulation, such as `push 3 12 0.5` or `hand FILE`.
 use core::fmt;
 
 use jtc_bus::{JOINTS, Joint};

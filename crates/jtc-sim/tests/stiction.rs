@@ -12,7 +12,7 @@ const FROM: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; JOINTS] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
 /// Averaging time, ms.
 const MEAN_MS: u16 = 50;
-/// Largest peak-to-peak torque at rest, N·m: two encoder steps times the largest Kp.
+/// Largest peak-to-peak torque at rest, N·m, which is two encoder steps times the largest Kp.
 const AT_REST: f64 = 1.6;
 
 /// Returns the peak-to-peak torque command of each joint (means over 50 ms), N·m, over 20 s of HoldPos that begin 2 s

@@ -35,15 +35,15 @@ pub enum Command<'a> {
     ClearOccurredErrors,
     /// Segment of a trajectory.
     Trajectory(Segment<'a>),
-    /// Friction table: for each of 6 joints 20 velocities, 20 temperatures and 400 torques.
+    /// Friction table with 20 velocities, 20 temperatures and 400 torques for each of 6 joints.
     FrictionTable(Floats<'a>),
     /// Command to use the default friction table.
     FrictionTableUseDefault,
-    /// Gains: Kp, Ki, Kd, IntMin and IntMax of each of 6 joints.
+    /// Gains Kp, Ki, Kd, IntMin and IntMax of each of 6 joints.
     PidParam(Floats<'a>),
     /// Command to use the default gains.
     PidParamUseDefault,
-    /// Arm model: 7 joint origins of 6 numbers, then 7 links of 13 numbers.
+    /// Arm model with 7 joint origins (6 numbers each) and 7 links (13 numbers each).
     ArmModel(Floats<'a>),
     /// Command to use the default arm model.
     ArmModelUseDefault,
@@ -53,7 +53,7 @@ pub enum Command<'a> {
     TeachingModeEnable,
     /// Switch teaching off.
     TeachingModeDisable,
-    /// Friction polynomial: 4 or 6 coefficients of each of 6 joints, highest index first.
+    /// Friction polynomial with 4 or 6 coefficients for each of 6 joints, highest index first.
     FrictionPolynomial(Floats<'a>),
     /// Command to use the default friction polynomial (also a frame of type 0x0E with 6 bytes).
     FrictionPolynomialUseDefault,
@@ -64,7 +64,7 @@ pub enum Command<'a> {
     },
     /// Switch the pump.
     GripperControl {
-        /// `true`: on.
+        /// `true` to switch the pump on.
         pump: bool,
     },
     /// Request for the identity of the device and of its firmware (J-52).

@@ -10,7 +10,7 @@ use crate::segment::Segment;
 use crate::status::Status;
 use crate::words::{self, Bits};
 
-/// Text of any bytes: the frame, of either direction, or the reason why the bytes are not a frame.
+/// Text of any bytes. The text describes the frame, of either direction, or the reason why the bytes are not a frame.
 ///
 /// ```
 /// use jtc_wire::Described;
@@ -248,7 +248,8 @@ impl Display for crate::GripperStatus {
 pub enum Piece<'a> {
     /// Valid frame of either direction.
     Frame(FrameRef<'a>),
-    /// Bytes between valid frames: invalid frames, noise, or a frame that is cut off at the end of the capture.
+    /// Bytes between valid frames, which are invalid frames, noise, or a frame that is incomplete at the end of the
+    /// capture.
     Other(&'a [u8]),
 }
 

@@ -116,13 +116,13 @@ fn check_count(frame_type: FrameType, count: usize) -> Result<(), EncodeError> {
     fits.then_some(()).ok_or(EncodeError::WrongCount { frame_type, count })
 }
 
-/// Writes a PidParam frame: Kp, Ki, Kd, IntMin and IntMax of each joint (the last two in rad·s).
+/// Writes a PidParam frame with Kp, Ki, Kd, IntMin and IntMax of each joint (the last two in rad·s).
 pub fn pid_param(out: &mut [u8], gains: &[[f64; 5]; JOINTS]) -> Result<usize, EncodeError> {
     floats(out, FrameType::PidParam, gains.as_flattened().iter().copied())
 }
 
-/// Writes an ArmModel frame. The frame contains the joint origins (x, y, z in m, roll, pitch, yaw in rad) and the links (an origin, Ixx Ixy
-/// Ixz Iyy Iyz Izz in kg·m², mass in kg).
+/// Writes an ArmModel frame. The frame contains the joint origins (x, y, z in m, roll, pitch, yaw in rad). After these it contains the
+/// links (an origin, Ixx Ixy Ixz Iyy Iyz Izz in kg·m², mass in kg).
 pub fn arm_model(
     out: &mut [u8],
     joints: &[[f64; 6]; 7],

@@ -165,7 +165,7 @@ pub enum Answer<'a> {
         /// The values.
         values: Values<'a>,
     },
-    /// Answer to GetArm: bytes of the arm image.
+    /// Answer to GetArm, with bytes of the arm image.
     Arm {
         /// Position in the image of the first byte of this frame.
         offset: u16,
@@ -174,9 +174,9 @@ pub enum Answer<'a> {
         /// The bytes.
         bytes: &'a [u8],
     },
-    /// Answer to GetLog: bytes of the flight recorder's log.
+    /// Answer to GetLog, with bytes of the flight recorder's log.
     Log(LogPage<'a>),
-    /// Answer to GetPoints: points of the trajectory in memory.
+    /// Answer to GetPoints, with points of the trajectory in memory.
     Points {
         /// Number of points before the first point of this frame.
         first: u16,

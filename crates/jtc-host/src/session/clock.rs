@@ -71,7 +71,7 @@ mod tests {
     }
 
     proptest! {
-        /// The input is random: statuses may be missing, and the point index may jump, for example because another
+        /// The input is random. Statuses may be missing, and the point index may jump, for example because another
         /// trajectory begins.
         #[test]
         fn time_goes_on_and_is_that_of_arrival_to_a_tenth_of_a_second(

@@ -316,7 +316,7 @@ impl<P: Port> Session<P> {
         Err(self.refused(record).into())
     }
 
-    /// Converts a link error that occurs while the arm moves or may move: adds the known facts about the motion.
+    /// Adds the known facts about the motion to a link error that occurs while the arm moves or may move.
     /// Returns a rejection unchanged.
     pub(super) fn link_lost(&self, error: LinkError, stop_sent: bool) -> Error {
         if !error.is_loss() {

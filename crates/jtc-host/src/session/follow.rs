@@ -161,8 +161,8 @@ fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }
 
-/// Ignores two errors that are not failures: a pause or stop was rejected because the motion has just ended, or a pause
-/// crossed the Stop of another program.
+/// Ignores two errors that are not failures. Either a pause or stop was rejected because the motion has just ended, or
+/// a pause was sent at the same time as the Stop of another program.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
         Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) => Ok(()),

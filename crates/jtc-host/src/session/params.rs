@@ -22,7 +22,7 @@ pub struct PushReport {
     pub parameter: Parameter,
     /// Size of the parameter's frame, bytes.
     pub bytes: usize,
-    /// Number of times that the frame must be sent: two for the friction table.
+    /// Number of times that the frame must be sent, which is two for the friction table.
     pub times: u32,
     /// Duration, s.
     pub time_s: f64,

@@ -18,8 +18,9 @@ pub enum ArmPart<'a> {
 }
 
 impl<P: Port> Session<P> {
-    /// Sends the complete arm to the device: settings and name if they differ, then friction, gains and model. Then reads
-    /// the arm back and compares it. If settings differ, the device must be in Init or Error.
+    /// Sends the complete arm to the device. Settings and name are sent first, if they differ from the device, and then
+    /// friction, gains and model. Then reads the arm back and compares it. If settings differ, the device must be in Init
+    /// or Error.
     ///
     /// # Errors
     ///

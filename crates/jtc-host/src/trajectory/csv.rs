@@ -159,7 +159,7 @@ fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileE
     }
 }
 
-/// Returns the name of column `c`; the time column is not counted.
+/// Returns the name of column `c`. The time column is not counted.
 fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }

@@ -8,7 +8,7 @@
 //!   velocities and accelerations. The velocity at the first and at the last sample is 0. The acceleration at these samples
 //!   is not 0, so the motion begins and ends with a step in acceleration.
 //! - **Positions and velocities**: for each joint, a cubic spline through the velocities supplies the accelerations. So
-//!   rounded positions have no effect on the accelerations. The spline is natural: the jerk is 0 at the ends. The
+//!   rounded positions have no effect on the accelerations. The spline is natural, so the jerk is 0 at the ends. The
 //!   velocities are used unchanged, also at the ends.
 //! - **All three channels**: nothing is derived.
 //!

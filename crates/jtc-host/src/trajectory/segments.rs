@@ -13,7 +13,7 @@ const SEGMENT_POINTS_LONG: usize = 120;
 /// Options for the upload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UploadOptions {
-    /// Points per segment. `None`: chosen automatically.
+    /// Points per segment. If it is `None`, the number is chosen automatically.
     pub points_per_segment: Option<usize>,
     /// Number of the trajectory.
     pub number: u16,

@@ -55,8 +55,8 @@ fn every_int16_value_round_trips() {
     }
 }
 
-/// Section 1 of the requirements: an encoder rejects a value that is out of range. The encoder never wraps or clips the
-/// value.
+/// An encoder rejects a value that is out of range (section 1 of the requirements). The encoder never wraps or clips
+/// the value.
 #[test]
 fn values_outside_the_scale_are_refused_by_name() {
     let mut point = Point::default();

@@ -1,4 +1,4 @@
-//! Waypoints as a table with a header: `t`, `pose`, `leg`, `q1`..`q6` or `q1_deg`..`q6_deg`.
+//! Waypoints as a table with a header of the columns `t`, `pose`, `leg`, `q1`..`q6` or `q1_deg`..`q6_deg`.
 
 use jtc_core::JOINTS;
 use jtc_plan::kinematics::LegKind;

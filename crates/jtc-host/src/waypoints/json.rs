@@ -1,5 +1,5 @@
-//! Waypoints as JSON: a list of objects whose keys are the names in the table's header. The list is either the whole
-//! file or the value of the key `waypoints`.
+//! Waypoints as JSON, which is a list of objects whose keys are the names in the table's header. The list is either the
+//! whole file or the value of the key `waypoints`.
 
 use std::fmt;
 

@@ -237,8 +237,8 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// If a person pushes the arm, the motion ends: the arm yields and is then held. After the error is cleared, the client
-/// can resume the motion.
+/// If a person pushes the arm, the motion ends. The arm yields, and then the controller holds it. After the error is
+/// cleared, the client can resume the motion.
 #[test]
 fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     let mut s = ready(None);

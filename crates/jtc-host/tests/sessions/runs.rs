@@ -1,4 +1,4 @@
-//! Runs (J-55): the procedure that all front ends share.
+//! Tests of the procedure for runs that all front ends share (J-55).
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -1,4 +1,5 @@
-//! Session with a scripted controller: the frames that the session sends, and the error when the link is lost.
+//! Tests of a session with a scripted controller, for the frames that the session sends and for the error when the link
+//! is lost.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
@@ -138,8 +139,8 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
         trajectory: TrajectoryState::Pause.into(),
         ..Status::default()
     };
-    // `records` are the records for this frame, in order; later frames receive no record. `done` selects whether the
-    // controller executes the frame.
+    // `records` contains the records for this frame, in order. Later frames receive no record. `done` selects whether
+    // the controller executes the frame.
     let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
         let (written, mut count) = (answers::Written::default(), 0);
         let taken = std::rc::Rc::clone(&written);

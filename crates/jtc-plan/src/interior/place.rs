@@ -13,8 +13,8 @@ pub(super) struct Place {
     pub b: Three,
     pub slope: Three,
     pub bend: Three,
-    /// Coefficients of bend, slope and squared speed, as shares of the limits: for the jerk (without the speed factor)
-    /// and for the acceleration (which does not depend on the bend).
+    /// Coefficients of bend, slope and squared speed, as shares of the limits. The first are for the jerk (without the
+    /// speed factor), the second for the acceleration (which does not depend on the bend).
     pub jerk: [JointVec; 3],
     pub acceleration: [JointVec; 2],
     /// Highest squared speed, if speed, acceleration and torque are limited at this point.
@@ -55,7 +55,7 @@ impl Place {
         std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Adapts the place to rest: only jerk along the path remains.
+    /// Adapts the point to rest, so that only jerk along the path remains.
     pub(super) fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }

@@ -36,7 +36,7 @@ impl Span {
 const SHARE: f64 = 0.995;
 
 impl<'a> Problem<'a> {
-    /// Creates the problem; `slower` contains the time factor of each cell.
+    /// Creates the problem. `slower` contains the time factor of each cell.
     pub(super) fn new(plan: &'a Plan, slower: &[f64]) -> Option<Self> {
         let cells = plan.cells;
         let count = cells.len();

@@ -43,8 +43,8 @@ pub(crate) fn logarithm(rotation: &Matrix3<f64>) -> Vector3<f64> {
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
     dynamics: Dynamics,
-    /// Divisor of lengths in the Jacobian and in residuals, m: the length of the stretched arm from its first axis to
-    /// the flange.
+    /// Divisor of lengths in the Jacobian and in residuals, m. The value is the length of the stretched arm from its
+    /// first axis to the flange.
     pub length: f64,
     /// Axes at the joint positions 0, on which the closed forms are based.
     pub zero: Axes,
@@ -77,8 +77,8 @@ impl Chain {
         self.dynamics.forward_kinematics(q)[JOINTS]
     }
 
-    /// Returns the residual from `axes` to `goal`: translation divided by [`Chain::length`], then rotation vector
-    /// (rad), in the base frame.
+    /// Returns the residual from `axes` to `goal` in the base frame. The first part is the translation divided by
+    /// [`Chain::length`], and the second part is the rotation vector (rad).
     pub(super) fn residual(&self, goal: &Frame, axes: &Axes) -> Vector6<f64> {
         let shift = (goal.position - axes.flange.position) / self.length;
         let turn = logarithm(&(goal.rotation * axes.flange.rotation.transpose()));
@@ -104,7 +104,8 @@ fn axes(dynamics: &Dynamics, q: &JointVec) -> Axes {
 }
 
 impl Axes {
-    /// Returns the geometric Jacobian of the flange: translation (m/rad), then rotation (rad/rad), in the base frame.
+    /// Returns the geometric Jacobian of the flange in the base frame, first for translation (m/rad) and then for
+    /// rotation (rad/rad).
     pub(super) fn jacobian(&self) -> Matrix6<f64> {
         let mut jacobian = Matrix6::zeros();
         for j in 0..JOINTS {
@@ -141,7 +142,7 @@ mod tests {
     use crate::kinematics::test_arms;
     use proptest::prelude::*;
 
-    /// Returns central differences of the frame per unit of the parameter: for translation and rotation.
+    /// Returns central differences of the frame per unit of the parameter, for translation and rotation.
     fn difference(before: &Frame, after: &Frame, step: f64) -> Vector6<f64> {
         let shift = (after.position - before.position) / (2.0 * step);
         let turn = logarithm(&(after.rotation * before.rotation.transpose())) / (2.0 * step);

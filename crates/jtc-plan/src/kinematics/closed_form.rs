@@ -8,8 +8,8 @@
 //!   coordinate along the parallel axes. The fifth and the sixth joint turn the flange, and the three parallel joints
 //!   form a planar arm.
 //!
-//! Everything is computed in the base frame from the axes at the joint positions 0 (product of exponentials, Brockett
-//! 1984; decomposition by Elias and Wen, IK-Geo, 2022), so the result does not depend on the frames chosen on the axes.
+//! All values are computed in the base frame from the axes at the joint positions 0 (product of exponentials, Brockett
+//! 1984; decomposition by Elias and Wen, IK-Geo, 2022). So the result does not depend on the frames chosen on the axes.
 use jtc_dynamics::JointVec;
 use nalgebra::{Matrix3, Vector3};
 

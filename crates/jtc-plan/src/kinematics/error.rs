@@ -29,7 +29,8 @@ pub enum PoseError {
         /// Largest entry of RᵀR − 1, or 2 for a reflection.
         deviation: f64,
     },
-    /// The arm cannot bring the flange to the position in any orientation: the position is too far away or too close.
+    /// The arm cannot reach the position with any orientation of the flange, because the position is too far away or
+    /// too close.
     #[error(
         "out of reach: {distance:.3} m from the origin of the base; the nearest position of the flange is {missing:.4} m away from it"
     )]

@@ -1,4 +1,4 @@
-//! Legs of a path of the flange: straight lines and arcs.
+//! Legs of a path of the flange, which are straight lines and arcs.
 use jtc_dynamics::Pose;
 use nalgebra::Vector3;
 

@@ -121,7 +121,7 @@ mod tests {
         a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
     }
 
-    /// A quarter turn about each axis: x to y, y to z, z to x.
+    /// A quarter turn about z maps x to y, about x maps y to z, and about y maps z to x.
     #[test]
     fn quarter_turns_are_those_of_the_conventions() {
         let quarter = std::f64::consts::FRAC_PI_2;

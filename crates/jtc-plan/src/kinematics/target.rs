@@ -12,8 +12,8 @@ pub enum Target {
     Flange(Pose),
 }
 
-/// Returns joint positions for each target. For a pose, this is the solution nearest to the previous target; for the
-/// first target, the solution nearest to `start` (rad).
+/// Returns joint positions for each target. For a pose, the result is the solution nearest to the previous target. For
+/// the first target, the result is the solution nearest to `start` (rad).
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Path of the flange: consecutive legs with blended corners.
+//! Path of the flange, which consists of consecutive legs with blended corners.
 //!
 //! A blend begins at the distance r before the corner and ends at the distance r after it. Between these two points,
 //! the parameter of the previous leg slows down to a stop while the parameter of the next leg starts. Let τ go from −r

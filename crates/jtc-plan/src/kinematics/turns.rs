@@ -30,7 +30,8 @@ pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<
     Some(found)
 }
 
-/// Returns the variants of `q` within the limits: each joint, which is within (−π, π], unchanged or turned by ±2π.
+/// Returns the variants of `q` within the limits. In a variant, each joint, which is within (−π, π], is unchanged or
+/// turned by ±2π.
 pub(crate) fn variants(q: &JointVec, limits: &Limits) -> Vec<JointVec> {
     let mut all = vec![*q];
     for j in 0..JOINTS {

@@ -66,7 +66,7 @@ enum Surface {
     },
     Joint {
         index: usize,
-        /// Direction of the push: 1 towards greater angles, −1 towards smaller ones.
+        /// Direction of the push, which is 1 towards greater angles and −1 towards smaller angles.
         sign: f64,
         angle: f64,
     },

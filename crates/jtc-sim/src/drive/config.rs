@@ -21,7 +21,7 @@ pub struct DriveConfig {
     pub enable_ms: u32,
     /// Duration of the pause of the motor control after a stop, ms.
     pub rest_ms: u32,
-    /// Speed at the raw value 32767, rad/s: 2.0, or 6.283185 for older drives.
+    /// Speed that the raw value 32767 represents, rad/s. The value is 2.0, or 6.283185 for older drives.
     pub velocity_full_scale: f64,
     /// Measured speed at which the drive trips, rad/s, in both directions. Real drives have a limit of 1.8 (older
     /// drives 1.5 or 1.0), which is 1.2 times the default arm's velocity limit.

@@ -162,12 +162,12 @@ impl World {
         &self.board.worked
     }
 
-    /// Returns the level of the controller's safety output: `true` means no error.
+    /// Returns the level of the controller's safety output, in which `true` means no error.
     pub fn safety_output(&self) -> bool {
         self.safety_output
     }
 
-    /// Sets the level of the controller's safety input: `true` means no error.
+    /// Sets the level of the controller's safety input, in which `true` means no error.
     pub fn set_safety_input(&mut self, level: bool) {
         self.safety_input = level;
     }

@@ -1,5 +1,5 @@
-//! Session with the controller. The session is the only writer, receives the stream of statuses, and gets each request
-//! confirmed.
+//! Session with the controller. The session is the only writer, receives the stream of statuses, and receives a
+//! confirmation of each request.
 //!
 //! The controller sends each record only once (J-04). For each received frame, exactly one status contains the record of
 //! the frame, in the order of the frames. The session queues the records and passes each one to the request that waits
@@ -252,7 +252,7 @@ impl<P: Port> Session<P> {
                         self.extensions = Extensions::Asked(at);
                     }
                     let mut bytes = vec![0; jtc_wire::ANSWER_MAX];
-                    // The encoded answer has the same length as the received one.
+                    // The encoded answer has the length of the received answer.
                     let n = answer.emit(&mut bytes).unwrap_or(0);
                     bytes.truncate(n);
                     self.answers.push_back(bytes);

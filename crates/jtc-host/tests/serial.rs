@@ -98,7 +98,7 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
     let (answer, _) = loop {
-        // Statuses keep arriving, like those of a controller.
+        // Statuses continue to arrive, as from a controller.
         far.write_all(&status(Response::default())).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         if asked.is_finished() {
@@ -133,7 +133,7 @@ fn a_stop_is_written_until_the_controller_confirms_it() {
     assert!(halt::sockets_of(&path).is_empty(), "the socket goes with the port");
 }
 
-/// Writes a Stop or Pause through the door of a port whose far end does not answer.
+/// Writes a Stop or Pause through the door of a port on which the controller does not answer.
 fn halt_unconfirmed(path: &str, halt: Halt) {
     let socket = door(path);
     std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");

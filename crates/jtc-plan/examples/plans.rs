@@ -6,8 +6,8 @@
 //! - `limits`, then velocity, acceleration, jerk (`inf`: no limit) and torque of six joints: sets the limits for the
 //!   lines that follow.
 //! - `move`, then start and end positions of six joints: prints the duration in s.
-//! - `path`, then the blend (rad), 1 with torque or 0 without, the number of places, and waypoints of six joints:
-//!   prints a line with duration (s), planning time (s) and the number of places. A line for each place follows, with
+//! - `path`, then the blend (rad), 1 with torque or 0 without, the number of points, and waypoints of six joints:
+//!   prints a line with duration (s), planning time (s) and the number of points. A line for each point follows, with
 //!   the path parameter, then position, first and second derivative of six joints.
 use std::error::Error;
 use std::io::{BufRead, Write};

@@ -3,7 +3,7 @@
 //! Each input line is a list of words. The example answers each line except `model` with one line:
 //!
 //! - `model`: 7 joint origins (xyz in m, rpy in rad), then lowest and highest position of the 6 joints (rad).
-//! - `pose`: position (m), quaternion x y z w, joint positions that the solution should be near to. Answer: `solved`,
+//! - `pose`: position (m), quaternion x y z w, joint positions near which the solution should be. Answer: `solved`,
 //!   the nearest solution, and all solutions within the limits; or `refused` and the reason.
 //! - `line`: joint positions at the start, position and quaternion at the end, number of samples. Answer: `path`, and
 //!   for each sample, at equal distances from start to end, its parameter, joint positions, first and second

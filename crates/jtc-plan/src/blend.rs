@@ -163,7 +163,7 @@ impl BlendedPath {
         path
     }
 
-    /// Returns `true` if two waypoints are too close to have a leg between them.
+    /// Returns `true` if two waypoints are so close that there is no leg between the two.
     pub(crate) fn are_one(a: &JointVec, b: &JointVec) -> bool {
         distance(a, b) <= SAME
     }

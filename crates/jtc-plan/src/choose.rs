@@ -8,8 +8,8 @@ use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanErro
 
 /// Maximum distances of dropped waypoints from the straight line, as shares of the blend.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// Minimum ratio of the corners of a path to those of its thinned version for which the path itself is not planned
-/// (with a jerk limit).
+/// Minimum ratio of the number of corners of a path to the number of corners of its thinned version, for which the path
+/// itself is not planned (with a jerk limit).
 const DENSE: usize = 8;
 /// Number of rounds in which rounded corners are replaced by stops.
 const ROUNDS: usize = 5;

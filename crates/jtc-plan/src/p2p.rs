@@ -15,7 +15,7 @@ const STANDING: f64 = 0.01;
 /// increase the duration. With an `arm`, the motion is slowed down until the torque is sufficient, and its speed is
 /// limited to the range of the friction table.
 ///
-/// If both positions are the same, the motion is a rest of 10 ms.
+/// If `from` and `to` are equal, the arm stays at rest for 10 ms.
 ///
 /// # Errors
 ///

@@ -10,8 +10,8 @@ const BINDS: f64 = 0.985;
 /// Time between samples, s, and maximum number of samples.
 const STEP: f64 = 0.002;
 const SAMPLES_MAX: f64 = 4000.0;
-/// Maximum time between a point in time and the place of its binding limit, s. Acceleration ramps can last this long.
-/// Before a corner, the motion is slow because of a limit that is reached later.
+/// Maximum time between a point in time and the time at which its binding limit is reached, s. Acceleration ramps can
+/// last this long. Before a corner, the motion is slow because of a limit that is reached later.
 const NEAR: f64 = 0.05;
 /// Share of the torque limit below which the torque counts as holding torque, which does not depend on the speed.
 const TORQUE: f64 = 0.9;

@@ -46,12 +46,13 @@ impl From<JointVec> for Waypoint {
 /// Plans a motion from the first waypoint to the last, as fast as the limits permit, on straight legs. Corners are
 /// rounded within `blend` rad (see [`BlendedPath`]). If `blend` is 0, the arm stops at each waypoint. If a stop at a
 /// corner is faster than rounding it, the arm stops. If it is faster, the arm passes waypoints that are closer to each
-/// other than the blend on a straighter line. This line is within the blend of each waypoint. If all waypoints are the
-/// same, the motion is a rest of 10 ms.
+/// other than the blend on a straighter line. This line is within the blend of each waypoint. If all waypoints are
+/// equal, the arm stays at rest for 10 ms.
 ///
 /// The motion passes a waypoint with a time at this time, within half a millisecond. If an earlier time is possible,
-/// the motion since the previous waypoint with a time is slowed down. If these two waypoints are at the same position,
-/// the arm stays at rest between the two times. Legs after the last specified time are as fast as possible.
+/// the motion between the previous waypoint with a time and this waypoint is slowed down. If these two waypoints are at
+/// the same position, the arm stays at rest between the two times. Legs after the last specified time are as fast as
+/// possible.
 ///
 /// # Errors
 ///

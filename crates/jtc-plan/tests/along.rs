@@ -148,7 +148,7 @@ fn waypoints_at_one_place_are_a_rest() {
     }
 }
 
-/// J-60: the payload decides whether the arm can be held at the end. The error contains the holding torque.
+/// J-60: the payload determines whether the arm can be held at the end position. The error contains the holding torque.
 #[test]
 fn j60_a_pose_that_cannot_be_held_is_named() {
     let (mut config, parameters) = (Config::avena(), Parameters::avena());

@@ -116,7 +116,7 @@ pub struct Bus {
     pub monitored: bool,
     /// Current faults.
     pub fault: BusFault,
-    /// Counters since the start.
+    /// Counters of the bus since the start.
     pub statistics: BusStatistics,
 }
 

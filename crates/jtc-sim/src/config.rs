@@ -90,8 +90,7 @@ pub struct SimConfig {
     /// Joints (bit n = joint n) whose drive is not simulated, because it is on another bus (see
     /// [`BusTap`](crate::BusTap)).
     pub absent_drives: u8,
-    /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node acknowledges
-    /// them.
+    /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node does this.
     pub bus_monitored: bool,
     /// Largest delay between the end of an answer on the bus and its arrival at the controller, ticks. For each
     /// millisecond, the simulation draws a delay from the seed. The order of the answers does not change. If the value

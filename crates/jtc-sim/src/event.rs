@@ -81,7 +81,7 @@ impl fmt::Display for Event {
 /// An event with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogEntry {
-    /// Time since the start, µs.
+    /// Time since the start of the simulation, µs.
     pub time_us: u64,
     /// The event.
     pub event: Event,

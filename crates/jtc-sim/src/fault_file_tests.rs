@@ -136,7 +136,8 @@ fn mistakes_are_named() {
     assert_eq!(FaultPlan::from_toml("format = 2").unwrap(), FaultPlan::default());
 }
 
-/// A file of format 1, which counts joints from 0, is refused, because it would affect the wrong joints.
+/// A file of format 1, in which joints are counted from 0, is rejected, because its faults would affect the wrong
+/// joints.
 #[test]
 fn files_that_counted_from_0_are_refused_with_what_to_change() {
     let old = "[[fault]]\nkind = \"fault-state\"\njoint = 2\nat_s = 1";

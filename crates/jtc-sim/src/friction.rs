@@ -52,9 +52,9 @@ impl Default for FrictionModel {
 /// - friction torque = σ0·z + σ1(v)·dz/dt + viscous part,
 /// - g(v) = Coulomb level·(1 + (`stiction_ratio` − 1)/(1 + (v/`stribeck_speed`)²)).
 ///
-/// The Coulomb level (c0) and the viscous part (c1..c3) come from the joint's curve. The Stribeck curve has the
-/// rational form of Hess and Soom (1990). σ1 decreases with speed in the same way, which keeps the model dissipative
-/// (Olsson 1996, section 3).
+/// The Coulomb level (c0) and the viscous part (c1..c3) are taken from the curve of the joint. The Stribeck curve has
+/// the rational form of Hess and Soom (1990). σ1 decreases with speed like the Stribeck curve, so that the model
+/// remains dissipative (Olsson 1996, section 3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LuGre {
     /// Break-away torque divided by Coulomb torque. The example in the paper uses 1.5. Values of harmonic drives are

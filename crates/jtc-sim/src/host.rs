@@ -102,7 +102,7 @@ pub struct Listener {
     bytes: Vec<u8>,
     /// Latest status.
     pub last: Option<Status>,
-    /// Responses in the received statuses, oldest first, until the caller removes them.
+    /// Responses in the received statuses, oldest first, which remain until the caller removes these responses.
     pub responses: Vec<jtc_wire::Response>,
     /// Number of received bytes.
     pub received: u64,

@@ -1,5 +1,5 @@
 //! Requests, in the form in which nodes receive them. A request may contain any state byte, although the controller
-//! sends only four of them.
+//! sends only four different state bytes.
 use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
 /// A request that has reached a node.

@@ -176,7 +176,7 @@ impl World {
         }
     }
 
-    /// Applies the active faults, and removes the effects of all others.
+    /// Applies the active faults, and removes the effects of all other faults.
     fn apply_faults(&mut self) {
         let mut bus = BusFault::default();
         let mut line = LineFault::default();

@@ -1,4 +1,5 @@
-//! The tables of reactions in docs/safety.md agree with the behaviour of the controller. `UPDATE_DOCS=1` updates them.
+//! The tables of reactions in docs/safety.md agree with the behaviour of the controller. With `UPDATE_DOCS=1`, the test
+//! updates these tables.
 use sim_checks::matrix::{contact_table, fault_matrix, standstill_table, stopping_table};
 
 #[test]

@@ -40,8 +40,8 @@ fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
     unreachable!()
 }
 
-/// Checks that the command whose last byte is byte `end` of the script slows the arm down in the same way as on a quiet
-/// line.
+/// Checks that the command whose last byte is byte `end` of the script slows the arm down exactly as on a line without
+/// other bytes.
 fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
     let (mut busy, ms) = play(baud, script, end);
     assert_eq!(busy.world.telemetry().trajectory, TrajectoryState::Execute, "still on the way");

@@ -18,9 +18,9 @@ impl<P: Port> Session<P> {
         Ok(std::array::from_fn(|j| config.absent[j].then_some(config.absent_position[j])))
     }
 
-    /// Marks the joints that have a position (rad) as absent, and the others as present. The controller must be in Init or
-    /// Error. While a joint is absent, the controller executes no motion, and an answer from that joint's drive is an
-    /// error.
+    /// Marks the joints that have a position (rad) as absent, and all other joints as present. The controller must be in
+    /// Init or Error. While a joint is absent, the controller executes no motion, and an answer from that joint's drive is
+    /// an error.
     ///
     /// # Errors
     ///

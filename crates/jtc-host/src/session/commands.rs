@@ -114,8 +114,8 @@ impl<P: Port> Session<P> {
         self.command(&fixed::reset_can_devices(nodes))
     }
 
-    /// Switches teaching on (only in HoldPos) or off. Teaching begins when the arm is held at rest. This function waits
-    /// until teaching begins.
+    /// Switches teaching on (only in HoldPos) or off. Teaching begins when the arm is at rest and the controller holds
+    /// it. This function waits until teaching begins.
     ///
     /// # Errors
     ///

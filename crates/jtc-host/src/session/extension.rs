@@ -210,7 +210,7 @@ impl<P: Port> Session<P> {
         Ok(Arm::from_image(&image).map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
     }
 
-    /// Changes settings. The device changes either all of them or none.
+    /// Changes settings. The device changes either all of these settings or none.
     ///
     /// # Errors
     ///

@@ -67,7 +67,8 @@ impl<P: Port> Session<P> {
     ) -> Result<Outcome, Error> {
         let start = self.port.now();
         let (mut begun, mut stopping) = (false, false);
-        // On an error the controller deletes the trajectory and its point index, so the last one is kept here.
+        // After an error, the controller deletes the trajectory and its point index, so the session stores the last
+        // point index.
         let mut point = 0;
         let mut occurred = None;
         loop {

@@ -120,7 +120,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Returns points of the trajectory in the device's memory. If the memory contains fewer than `count` points,
-    /// returns all of them.
+    /// returns all points.
     fn log_points(&mut self, first: usize, count: usize) -> Result<Vec<RawPoint>, LinkError> {
         let mut all = Vec::new();
         while all.len() < count {

@@ -1,7 +1,7 @@
 //! Host supervision (J-59). While the arm moves for this session, the session repeats GetInfo, so that the controller knows
 //! that its host is alive.
 //!
-//! A session that only observes sends nothing. A GetInfo also tells the controller that its host knows all data statuses
+//! A session that only observes sends nothing. A GetInfo also informs the controller that its host knows all data statuses
 //! (J-51).
 
 use std::time::Duration;
@@ -108,7 +108,7 @@ pub fn host_timeout_ms(mut values: impl Iterator<Item = SettingValue>) -> Option
 }
 
 impl<P: Port> Session<P> {
-    /// Sends a GetInfo if its time has come. Returns the time until the next GetInfo.
+    /// Sends a GetInfo if the time for the next GetInfo has been reached. Returns the time until the next GetInfo.
     pub(super) fn show_presence(&mut self) -> Result<Duration, LinkError> {
         let Extensions::Asked(at) = self.extensions else { return Ok(Duration::MAX) };
         if !self.presence.is_shown() {

@@ -8,8 +8,8 @@ use crate::error::{Error, ExtensionError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Changes settings like [`Session::set_settings`], either all of them or none. Before anything is sent, each value is
-    /// checked, and all values are checked together with the device's settings.
+    /// Changes settings like [`Session::set_settings`], either all settings or none. Before anything is sent, each value
+    /// is checked, and all values are checked together with the device's settings.
     ///
     /// # Errors
     ///

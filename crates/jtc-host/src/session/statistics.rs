@@ -17,7 +17,7 @@ pub struct LinkStatistics {
     pub bad_frames: u64,
     /// Frames that were repeated.
     pub retries: u64,
-    /// Time since the session began, or since the earlier snapshot, s.
+    /// Time since the start of the session, or since an earlier snapshot of the statistics, s.
     pub time_s: f64,
 }
 

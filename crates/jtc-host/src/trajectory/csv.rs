@@ -164,8 +164,8 @@ fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }
 
-/// Returns the column for a name in a header, and the factor from its unit. Column 0 is the time. Columns from 1 have the
-/// same order as in the formats without a header.
+/// Returns the column for a name in a header, and the factor from its unit. Column 0 is the time. Column 1 and the
+/// following columns are in the order of the formats without a header.
 fn column_of(name: &str) -> Option<(usize, f64)> {
     let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
     if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
@@ -254,8 +254,8 @@ impl Trajectory {
         self.csv_with(|v| format!(",{:.16e}", v + 0.0))
     }
 
-    /// Returns the trajectory in the format of 19 columns of integers without a header. The values are exactly those in
-    /// the frames.
+    /// Returns the trajectory in the format of 19 columns of integers without a header. The values are exactly the
+    /// integers in the frames.
     ///
     /// # Errors
     ///

@@ -92,7 +92,7 @@ mod tests {
         );
         let words = overshoot_words(&loaded.overshoot).unwrap();
         assert!(words.contains("joint 1 by 0.125 rad (to +0.625 rad, after waypoint 2)"), "{words}");
-        // The overshoot is the same if the times are resampled.
+        // The overshoot does not change if the times are resampled.
         let uneven = text.replace("\n3,", "\n3.0004,");
         let over = Loaded::parse(&uneven, None).unwrap().overshoot;
         assert!(over.len() == 1 && (over[0].beyond_rad - 0.125).abs() < 1e-3, "{over:?}");

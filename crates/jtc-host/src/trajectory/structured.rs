@@ -26,7 +26,7 @@ struct JsonPoint {
     acceleration_rad_s2: Option<[f64; JOINTS]>,
 }
 
-/// `trajectory_msgs/JointTrajectory`, alone or inside a message that contains it.
+/// `trajectory_msgs/JointTrajectory`, alone or inside another message.
 #[derive(Deserialize)]
 struct RosForm {
     joint_names: Option<Vec<String>>,
@@ -225,8 +225,8 @@ fn joint_order(
     if let Some(exact) = exact {
         order.copy_from_slice(&exact);
     } else {
-        // The names of the joints have different prefixes in files of the same arm. The number at the end is the number of
-        // the joint.
+        // In different files for one arm, the names of the joints have different prefixes. The number at the end is the
+        // number of the joint.
         let mut ends: Vec<(u32, usize)> =
             found.iter().enumerate().filter_map(|(i, n)| Some((last_number(n)?, i))).collect();
         ends.sort_unstable();

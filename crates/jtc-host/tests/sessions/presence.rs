@@ -87,7 +87,7 @@ fn j59_a_motion_whose_session_has_gone_is_paused() {
         begin(&mut s);
         s.pass(Duration::from_millis(500)).unwrap();
         assert_eq!(s.last().unwrap().trajectory, TrajectoryState::Execute);
-        // Another session on the same port sends nothing.
+        // A second session on this port sends nothing.
         let mut watching: Session<SimPort> = Session::new(s.into_port());
         watching.pass(Duration::from_millis(u64::from(ms) + 1000)).unwrap();
         let status = watching.last().copied().unwrap();

@@ -150,8 +150,8 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // The controller holds the weight of the arm with the present parameters, so the recovery sends no others. A step
-    // of the recovery reports this.
+    // The controller holds the weight of the arm with the present parameters, so the recovery sends no other
+    // parameters. A step of the recovery reports this.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
@@ -178,8 +178,8 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
 }
 
-/// J-55: gains that do not keep the arm stable, and limits that differ from those of the controller, are rejected before
-/// anything is sent.
+/// J-55: gains that do not keep the arm stable, and limits that differ from the limits of the controller, are rejected
+/// before anything is sent.
 #[test]
 fn j55_recover_checks_the_arm_before_anything_is_sent() {
     let mut s = session(Some(921_600));

@@ -81,7 +81,7 @@ pub enum PoseError {
         "the three points of the arc are not on a circle: the second is {distance:.2e} m from the line through the others"
     )]
     Arc {
-        /// Distance of the second point from the straight line, m; 0 if the first and the last point are the same.
+        /// Distance of the second point from the straight line, m; 0 if the first and the last point are equal.
         distance: f64,
     },
     /// Two orientations with an angle of half a turn between them.

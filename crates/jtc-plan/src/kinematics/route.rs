@@ -371,7 +371,7 @@ mod tests {
     use super::*;
     use jtc_dynamics::JOINTS;
 
-    /// If a parameter is on one side of a change of form, the section parameter is on the same side.
+    /// If a parameter is on one side of a change of form, the section parameter is also on this side.
     #[test]
     fn rounding_does_not_lead_across_a_mark() {
         let ends = [[0.0; JOINTS], [0.7, 0.1, 0.0, 0.0, 0.0, 0.0], [0.1, 0.3, 0.0, 0.0, 0.0, 0.0]];

@@ -13,7 +13,7 @@ pub(crate) const TOLERANCE: f64 = 1e-9;
 const ROUNDING: f64 = 1e-29;
 /// Largest step of a joint in an iteration, rad. For larger steps, the linearisation is not accurate enough.
 const STEP: f64 = 0.7;
-/// Maximum difference of a joint between two solutions that count as the same solution, rad. Two solutions that are so
+/// Maximum difference of a joint between two solutions that count as one solution, rad. Two solutions that are so
 /// close are near a singularity, and the flange moves only by nanometres between the two.
 pub(crate) const SAME: f64 = 1e-4;
 /// Largest number of solutions of an arm with six revolute joints, except in singular poses (Primrose 1986).

@@ -98,8 +98,8 @@ impl Trace {
         Some(self.begins[k] + self.legs[k].via()?)
     }
 
-    /// Returns the parameter nearest to each waypoint, including the ends. A leg without motion has the same parameter
-    /// at both ends.
+    /// Returns the parameter nearest to each waypoint, including the ends. For a leg without motion, the parameters at
+    /// both ends are equal.
     pub(super) fn waypoints(&self) -> Vec<f64> {
         let passed = |n: usize| self.legs.partition_point(|leg| leg.number <= n);
         (0..=self.given).map(|n| self.begins[passed(n)]).collect()

@@ -96,6 +96,6 @@ pub struct DriveFault {
     pub not_accurate: bool,
     /// `true` if the safety line has the level that means danger.
     pub safety_line: bool,
-    /// `true` if the drive answers requests for another state but does not execute them.
+    /// `true` if the drive answers requests for a different state but does not change its state.
     pub ignores_state: bool,
 }

@@ -71,7 +71,7 @@ impl States {
                 self.pending = NodeState::START;
                 NodeState::FAULT
             }
-            // Other requests stay pending until a transition clears them.
+            // All other requests stay pending until a transition clears the pending request.
             _ => return,
         };
         self.enter(next, config);

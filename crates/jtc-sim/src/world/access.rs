@@ -14,7 +14,7 @@ use crate::faults::{Fault, FaultKind, FaultPlan, Trigger};
 use crate::hand::HandPath;
 use crate::plant::Truth;
 
-/// Counters since the start.
+/// Counters since the start of the simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
     /// Counters of the joint bus.
@@ -43,7 +43,7 @@ impl Statistics {
 }
 
 impl World {
-    /// Returns the virtual time since the start, µs.
+    /// Returns the virtual time since the start of the simulation, µs.
     pub fn now_us(&self) -> u64 {
         self.ticks * TICK_US
     }
@@ -228,7 +228,7 @@ impl World {
         &self.log
     }
 
-    /// Returns the counters since the start.
+    /// Returns the counters since the start of the simulation.
     pub fn statistics(&self) -> Statistics {
         Statistics {
             bus: self.bus.statistics,

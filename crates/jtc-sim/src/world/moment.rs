@@ -8,7 +8,7 @@ use crate::plant::Truth;
 /// One millisecond of the simulation, with the actions of the controller and the true state of the arm.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// Time since the start, µs.
+    /// Time since the start of the simulation, µs.
     pub time_us: u64,
     /// `true` if the controller executed its tick.
     pub ticked: bool,

@@ -42,8 +42,8 @@ impl RecoverParameters {
 }
 
 impl<P: Port> Session<P> {
-    /// Like [`Session::recover_until`]. Before the recovery, checks the parameters and compares the arm's limits with those
-    /// of the controller.
+    /// Like [`Session::recover_until`]. Before the recovery, checks the parameters and compares the arm's limits with the
+    /// limits of the controller.
     ///
     /// # Errors
     ///

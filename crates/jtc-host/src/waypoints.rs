@@ -56,7 +56,7 @@ pub enum Target {
 pub struct FileWaypoint {
     /// Position.
     pub target: Target,
-    /// Time of the waypoint from the first one, s. If `None`, the arm arrives as soon as the limits permit.
+    /// Time of the waypoint after the first waypoint, s. If `None`, the arm arrives as soon as the limits permit.
     pub time: Option<f64>,
     /// Motion from the previous waypoint, if the file specifies it.
     pub leg: Option<LegKind>,
@@ -362,7 +362,7 @@ fn leg_word(leg: LegKind) -> &'static str {
     }
 }
 
-/// Formats waypoints as CSV, with a resolution of a millionth of a radian.
+/// Formats waypoints as CSV, with a resolution of 1 µrad.
 pub fn to_csv<'a>(positions: impl IntoIterator<Item = &'a [f64; JOINTS]>) -> String {
     let mut text = String::from("q1,q2,q3,q4,q5,q6\n");
     for position in positions {

@@ -59,6 +59,6 @@ pub struct Binding {
     pub to: f64,
     /// Joint that is closest to its limit.
     pub joint: Joint,
-    /// Limit that the joint is closest to.
+    /// Limit to which this joint is closest.
     pub limit: LimitKind,
 }

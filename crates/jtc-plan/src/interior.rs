@@ -1,7 +1,7 @@
 //! Time laws with limited jerk, by an interior-point method (Boyd and Vandenberghe 2004).
 //!
-//! The squared speed of the parameter is a quadratic spline of the parameter, with a knot at the end of each cell. The
-//! acceleration is half the slope of the spline. The jerk is half its second derivative times the speed. Squared
+//! The squared speed of the path parameter is a quadratic spline of the parameter, with a knot at the end of each cell.
+//! The acceleration is half the slope of the spline. The jerk is half its second derivative times the speed. Squared
 //! velocity, acceleration and torque are therefore linear in the coefficients. The jerk is linear except for the root
 //! of the squared speed. Newton's method minimises the sum of the time and the barriers of all limits, without the
 //! second derivatives of the limits. Only neighbouring coefficients are coupled, so the time of a step is proportional

@@ -1,5 +1,5 @@
-//! The fastest time law under limits of the parameter's speed and acceleration only. Each limit is constant in each
-//! cell of the path.
+//! The fastest time law under limits of only the speed and acceleration of the path parameter. Each limit is constant
+//! in each cell of the path.
 //!
 //! The law may be averaged over a window afterwards. To keep the limits of a cell after averaging, the law must also
 //! keep these limits half a window before and after the cell. Cells are therefore extended at both ends.

@@ -66,8 +66,8 @@ proptest! {
     }
 }
 
-/// If the limits reported as binding are doubled, a motion is faster in nearly all cases. Exceptions exist because a
-/// jerk-limited law is the best of several attempts, and with other limits the attempts differ.
+/// If the limits that are reported as binding are doubled, the motion becomes faster in nearly all cases. Exceptions
+/// exist because a jerk-limited law is the best of several attempts, and with other limits the attempts differ.
 #[test]
 fn what_is_named_is_what_binds() {
     let (mut faster, mut all) = (0, 0);

@@ -127,7 +127,7 @@ proptest! {
         }
     }
 
-    /// The default arm within its own limits, which some solutions exceed.
+    /// The default arm with its position limits, which some solutions exceed.
     #[test]
     fn the_default_arm_keeps_to_its_limits(share in prop::array::uniform6(0.01..0.99f64)) {
         let limits = robots::avena_limits();

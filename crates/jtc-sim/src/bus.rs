@@ -300,8 +300,8 @@ impl Bus {
         }
     }
 
-    /// Transmits as many frames of nodes outside the simulation as the time in the tick permits. Answers go to the
-    /// controller, all other frames to the nodes.
+    /// Transmits as many frames of nodes outside the simulation as the time in the tick permits. The controller
+    /// receives answers, and the nodes receive all other frames.
     fn carry_foreign(&mut self, now_us: u64, nodes: &mut Nodes, time: &mut u32, received: &mut Vec<Frame>) {
         while let Some(frame) = self.foreign.front().copied() {
             if !self.carry(&frame, time, false) {

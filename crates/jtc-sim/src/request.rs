@@ -15,7 +15,7 @@ impl NodeRequest {
     /// Returns the request that a frame contains. `None` for answers and for frames that are not requests to nodes.
     pub fn parse(frame: &Frame) -> Option<Self> {
         if frame.id == id::CHANGE_FSM {
-            // Bytes missing in a short frame are read as 0, which requests no change.
+            // Missing bytes of a short frame count as 0, which does not request a change.
             let state = |n| NodeState::new(frame.data().get(n).copied().unwrap_or(0));
             return Some(Self::ChangeFsm(core::array::from_fn(state)));
         }

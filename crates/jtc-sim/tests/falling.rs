@@ -1,4 +1,4 @@
-//! An arm without brakes that falls while its errors are cleared (J-16).
+//! Tests of an arm without brakes that falls while its errors are cleared (J-16).
 use jtc_bus::{NodeState, Request, Target};
 use jtc_core::{ControllerState, error};
 use jtc_sim::{Operator, SimConfig, Support, host};

@@ -1,4 +1,4 @@
-//! Times for statuses, which contain no time stamp.
+//! Computation of times for statuses, which contain no time stamp.
 
 use std::time::Duration;
 

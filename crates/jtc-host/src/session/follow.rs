@@ -95,7 +95,7 @@ impl<P: Port> Session<P> {
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
                 (Some(TrajectoryState::Stop), _) if begun => return Ok(Outcome::Stopped(status)),
-                // The trajectory was deleted, or nodes have left operation.
+                // The trajectory was deleted, or nodes are no longer in operation.
                 (Some(TrajectoryState::Null), _)
                 | (_, Some(ControllerState::Start | ControllerState::Init))
                     if begun =>

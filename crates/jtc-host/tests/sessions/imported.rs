@@ -9,8 +9,8 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Diagnose, Session, plan};
 use jtc_sim::{SimConfig, World};
 
-/// Returns a six-axis arm with a length of `scale` metres and axes along y and z. Masses scale with the third power, and
-/// torques with the fourth.
+/// Returns a six-axis arm with a length of `scale` metres and axes along y and z. The masses are proportional to the
+/// third power of `scale`, and the torques to the fourth power.
 fn description(scale: f64) -> String {
     // Axis, offset to the next joint (m), mass (kg) and torque limit (N·m) of a joint.
     let parts = [

@@ -1,4 +1,4 @@
-//! Tests of sessions with the complete simulated controller, and with a scripted one.
+//! Tests of sessions with the complete simulated controller, and with a scripted controller.
 
 mod checked;
 mod denied;

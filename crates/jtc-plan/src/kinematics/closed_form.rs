@@ -27,9 +27,9 @@ pub(crate) const NEAR: f64 = 0.02;
 /// A geometry with a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Geometry {
-    /// Last three axes meet in `centre` (m, at the joint positions 0).
+    /// Spherical wrist, whose three axes meet in `centre` (m, at the joint positions 0).
     SphericalWrist { centre: Vector3<f64>, shoulder: Shoulder },
-    /// Axes 2, 3 and 4 are parallel, and axes 5 and 6 meet in `centre` (m, at the joint positions 0).
+    /// Three parallel axes 2, 3 and 4, with axes 5 and 6 that meet in `centre` (m, at the joint positions 0).
     ThreeParallel { centre: Vector3<f64> },
 }
 

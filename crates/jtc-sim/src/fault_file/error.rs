@@ -63,7 +63,7 @@ pub enum FaultFileError {
         /// The superfluous key.
         key: &'static str,
     },
-    /// A value outside its range.
+    /// The value is outside its range.
     Range {
         /// Number of the fault in the file, from 1.
         fault: usize,

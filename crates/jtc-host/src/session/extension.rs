@@ -15,8 +15,8 @@ use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError, StateError};
 use crate::port::Port;
 
-/// Age of the last extension request above which the session sends a new request. A device reports specific reasons for rejections only to a host
-/// that has sent an extension request within the last 2 s (J-51).
+/// Age of the last extension request above which the session sends a new request. A device reports specific reasons for
+/// rejections only to a host that has sent an extension request within the last 2 s (J-51).
 pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Maximum time that a device needs to store an arm, including the erasing of a flash sector.
 const STORING: Duration = Duration::from_secs(30);

@@ -1,4 +1,4 @@
-//! Short frames as constants.
+//! Short command frames as constants.
 use crate::command::ExecCommand;
 use crate::crc::crc16_const;
 use crate::extension::Name;
@@ -26,48 +26,49 @@ pub const fn empty(frame_type: FrameType) -> [u8; 6] {
     sealed(frame_type, &[])
 }
 
-/// ClearCurrentErrors: clears the controller's own errors, and those of the nodes in `nodes` (bits 0..6).
+/// Returns a ClearCurrentErrors frame, which clears the errors of the nodes in `nodes` (bits 0..6) and, if `jtc` is
+/// set, those of the controller.
 pub const fn clear_current_errors(jtc: bool, nodes: u8) -> [u8; 10] {
     sealed(FrameType::ClearCurrentErrors, &[jtc as u8, nodes])
 }
 
-/// TrajSetExecStatus with this command.
+/// Returns a TrajSetExecStatus frame with this command.
 pub const fn exec(command: ExecCommand) -> [u8; 7] {
     sealed(FrameType::TrajSetExecStatus, &[command as u8])
 }
 
-/// ResetCanDevices: resets the nodes in `nodes` (bits 0..6).
+/// Returns a ResetCanDevices frame, which resets the nodes in `nodes` (bits 0..6).
 pub const fn reset_can_devices(nodes: u8) -> [u8; 10] {
     sealed(FrameType::ResetCanDevices, &[nodes])
 }
 
-/// GripperControl: switches the pump.
+/// Returns a GripperControl frame, which switches the pump on or off.
 pub const fn gripper_control(pump: bool) -> [u8; 10] {
     sealed(FrameType::GripperControl, &[pump as u8])
 }
 
-/// GetSettings: requests the values from number `first` on.
+/// Returns a GetSettings frame, which requests the settings from number `first` on.
 pub const fn get_settings(first: u16) -> [u8; 8] {
     sealed(FrameType::GetSettings, &first.to_be_bytes())
 }
 
-/// SetName: sets the name of the arm.
+/// Returns a SetName frame, which sets the name of the arm.
 pub const fn set_name(name: &Name) -> [u8; 38] {
     sealed(FrameType::SetName, name.as_bytes())
 }
 
-/// GetArm: requests the arm image from byte `offset` on.
+/// Returns a GetArm frame, which requests the arm image from byte `offset` on.
 pub const fn get_arm(offset: u16) -> [u8; 8] {
     sealed(FrameType::GetArm, &offset.to_be_bytes())
 }
 
-/// GetLog: requests block `block` of the log from byte `offset` on.
+/// Returns a GetLog frame, which requests block `block` of the log from byte `offset` on.
 pub const fn get_log(block: u32, offset: u16) -> [u8; 12] {
     let ([a, b, c, d], [e, f]) = (block.to_be_bytes(), offset.to_be_bytes());
     sealed(FrameType::GetLog, &[a, b, c, d, e, f])
 }
 
-/// GetPoints: requests the points from number `first` on.
+/// Returns a GetPoints frame, which requests the trajectory points from number `first` on.
 pub const fn get_points(first: u16) -> [u8; 8] {
     sealed(FrameType::GetPoints, &first.to_be_bytes())
 }

@@ -1,4 +1,4 @@
-//! Structure of a frame: header, type, length, body and CRC, and the lengths that each type can have.
+//! Structure of a frame (header, type, length, body and CRC), and the permitted lengths of each type.
 use core::ops::Range;
 
 use crate::code::codes;
@@ -9,9 +9,9 @@ use crate::layout::{ANSWER_MAX, INFO_LEN, LOG_HEAD_LEN, PAGE_HEAD_LEN, SET_VALUE
 pub const HEADER: u8 = 0x9B;
 /// Length of the shortest frame, which has no body (J-02).
 pub const FRAME_MIN: usize = 6;
-/// Length of the longest frame (J-02).
+/// Maximum length of a frame (J-02).
 pub const FRAME_MAX: usize = 60_000;
-/// Joints of the arm.
+/// Number of joints of the arm.
 pub const JOINTS: usize = 6;
 
 /// Positions of the parts of a frame.
@@ -24,7 +24,7 @@ pub mod field {
     pub const TYPE: usize = 1;
     /// Length of the whole frame, u16.
     pub const LENGTH: Range<usize> = 2..4;
-    /// First byte of the body.
+    /// Position of the first byte of the body.
     pub const BODY: usize = 4;
     /// Length of the CRC at the end.
     pub const CRC_LEN: usize = 2;
@@ -35,7 +35,7 @@ pub mod field {
 }
 
 codes! {
-    /// Frame types (J-06 table), named as there.
+    /// Frame types, with the names of the table of J-06.
     #[derive(PartialOrd, Ord)]
     #[allow(missing_docs)]
     FrameType {
@@ -56,7 +56,7 @@ codes! {
         FrictionPolynomialUseDefault = 0x0F;
         ResetCanDevices = 0x10;
         GripperControl = 0x11;
-        // Extensions (J-50): requests from 0x40 on, and their answers from 0x50 on.
+        // Extensions (J-50): requests use the types from 0x40 on, their answers the types from 0x50 on.
         GetInfo = 0x40;
         GetSettings = 0x41;
         SetSettings = 0x42;
@@ -76,32 +76,32 @@ codes! {
     }
 }
 
-/// Lengths that frames of one type can have.
+/// Permitted lengths of the frames of one type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lengths {
     /// A list of lengths.
     OneOf(&'static [u16]),
-    /// Lengths from `first` to `last`, `step` bytes apart.
+    /// Lengths from `first` to `last` in steps of `step` bytes.
     Steps {
         /// Shortest length.
         first: u16,
         /// Difference between two consecutive lengths.
         step: u16,
-        /// Upper bound of the lengths.
+        /// Maximum length.
         last: u16,
     },
 }
 
 /// Length of a Trajectory frame without points.
 pub const TRAJECTORY_OVERHEAD: usize = 14;
-/// Bytes of a point in a Trajectory frame.
+/// Length of a point in a Trajectory frame, in bytes.
 pub const POINT_LEN: usize = 36;
-/// Highest number of points that fit into a frame. (The controller accepts 1,500.)
+/// Maximum number of points that fit into a frame. (The controller accepts 1,500 points.)
 pub const FRAME_POINTS_MAX: usize = (FRAME_MAX - TRAJECTORY_OVERHEAD) / POINT_LEN;
 
 impl FrameType {
-    /// Returns the lengths of whole frames of this type. Some hosts send ClearCurrentErrors and FrictionPolynomial with 6 bytes (J-06).
-    /// JtcStatus has the three lengths of J-08.
+    /// Returns the permitted lengths of complete frames of this type. Some hosts send ClearCurrentErrors and FrictionPolynomial with 6
+    /// bytes (J-06). JtcStatus has the three lengths of J-08.
     pub const fn lengths(self) -> Lengths {
         use FrameType::*;
         match self {
@@ -138,7 +138,7 @@ impl FrameType {
         }
     }
 
-    /// Returns true if a whole frame of this type can have `n` bytes.
+    /// Returns true if a complete frame of this type can have a length of `n` bytes.
     pub const fn can_have(self, n: usize) -> bool {
         match self.lengths() {
             Lengths::OneOf(list) => {
@@ -158,7 +158,7 @@ impl FrameType {
         }
     }
 
-    /// Returns the numbers of floats that a body of this type can have; empty if the body is not a list of floats.
+    /// Returns the permitted numbers of floats in a body of this type; empty if the body is not a list of floats.
     pub(crate) const fn float_counts(self) -> &'static [usize] {
         match self {
             FrameType::FrictionTable => &[2640],
@@ -170,12 +170,12 @@ impl FrameType {
         }
     }
 
-    /// Returns true if the host sends this type. The device sends the others.
+    /// Returns true if the host sends frames of this type. The device sends frames of the other types.
     pub const fn from_host(self) -> bool {
         !matches!(self, FrameType::JtcStatus) && !self.is_answer()
     }
 
-    /// Returns true for a UseDefault frame, which selects parameters that the controller already has.
+    /// Returns true for a UseDefault frame, which selects parameters that are already stored in the controller.
     pub const fn is_default(self) -> bool {
         use FrameType::*;
         matches!(
@@ -184,12 +184,12 @@ impl FrameType {
         )
     }
 
-    /// Returns true if the frame answers an extension request, in addition to the response record (J-50).
+    /// Returns true if the device answers this request with an extension frame, in addition to the response record (J-50).
     pub const fn is_answer(self) -> bool {
         self as u8 >= 0x50
     }
 
-    /// Returns true for an extension request. Existing devices do not know it, and existing hosts do not send it (J-50).
+    /// Returns true for an extension request. Existing devices do not know extension requests, and existing hosts do not send them (J-50).
     pub const fn is_extension(self) -> bool {
         matches!(self as u8, 0x40..0x50)
     }
@@ -199,17 +199,18 @@ const fn steps(first: usize, step: usize, last: usize) -> Lengths {
     Lengths::Steps { first: first as u16, step: step as u16, last: last as u16 }
 }
 
-/// A complete frame with a correct CRC and a length that its type can have. The body is not checked yet.
+/// Complete frame with a correct CRC and a length that is permitted for its type. The body is not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameRef<'a> {
     /// Type of the frame.
     pub frame_type: FrameType,
-    /// All bytes, including header and CRC.
+    /// All bytes of the frame, including header and CRC.
     pub bytes: &'a [u8],
 }
 
 impl<'a> FrameRef<'a> {
-    /// Checks a whole frame: header, type, length and CRC. The length must be the length of `bytes`, and one that the type can have.
+    /// Checks a complete frame: header, type, length and CRC. The length field must equal the length of `bytes` and be
+    /// permitted for the type.
     pub fn new_checked(bytes: &'a [u8]) -> Option<Self> {
         let (head, _) = bytes.split_first_chunk::<4>()?;
         let frame_type = FrameType::from_byte(head[field::TYPE])?;
@@ -217,12 +218,12 @@ impl<'a> FrameRef<'a> {
         let good = head[field::HEADER] == HEADER
             && n == bytes.len()
             && frame_type.can_have(n)
-            // The CRC of a message that is followed by its own CRC is zero.
+            // The CRC over a message and its own CRC is zero.
             && crc16(bytes) == 0;
         good.then_some(Self { frame_type, bytes })
     }
 
-    /// Returns the bytes between the length and the CRC.
+    /// Returns the body: the bytes between the length field and the CRC.
     pub fn body(&self) -> &'a [u8] {
         let end = self.bytes.len().saturating_sub(field::CRC_LEN);
         self.bytes.get(field::BODY..end).unwrap_or(&[])

@@ -1,4 +1,4 @@
-//! Functions of the fuzz targets. Each takes any bytes, and panics if a guarantee is violated.
+//! Functions of the fuzz targets. Each function accepts any bytes, and panics if a guarantee is violated.
 mod reference;
 mod script;
 mod status;
@@ -13,7 +13,7 @@ pub use reference::{Event, events};
 pub use script::{stream_parser, stream_regions};
 pub use status::status_stream;
 
-/// Builds a frame of any type and body with a correct CRC. Its length may be one that its type cannot have.
+/// Builds a frame of any type and body with a correct CRC. The length of the frame may be invalid for its type.
 pub fn sealed(kind: u8, body: &[u8]) -> Vec<u8> {
     let mut bytes = vec![crate::HEADER, kind];
     bytes.extend((body.len() as u16 + 6).to_be_bytes());
@@ -22,7 +22,7 @@ pub fn sealed(kind: u8, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Returns a body length that `kind` can have, selected by `pick`.
+/// Returns a permitted body length for frames of type `kind`; `pick` selects the length.
 fn body_len(kind: FrameType, pick: u8) -> usize {
     match kind.lengths() {
         Lengths::OneOf(list) => usize::from(list[usize::from(pick) % list.len()]) - 6,
@@ -33,11 +33,11 @@ fn body_len(kind: FrameType, pick: u8) -> usize {
     }
 }
 
-/// Returns the frame for an input of [`frame_bodies`]. The input consists of the type, a byte that selects a length, and the body, which is
-/// repeated or cut to that length.
+/// Returns the frame for an input of [`frame_bodies`]. The input consists of the type, a byte that selects the length, and the body. The
+/// body is repeated or cut to that length.
 pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     let [kind, pick, rest @ ..] = data else { return None };
-    // Types up to 0x11 are selected by their number, as in earlier inputs. The other numbers select extensions.
+    // Types up to 0x11 are selected by their number, as in the inputs that were stored earlier. Other numbers select extension types.
     let kind = match usize::from(*kind % 0x20) {
         kind @ 0..0x12 => FrameType::from_byte(kind as u8)?,
         more => *FrameType::ALL.get(more - 1)?,
@@ -46,13 +46,13 @@ pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     Some(sealed(kind as u8, &body))
 }
 
-/// Parses, describes and encodes the frame of [`body_frame`], and parses it again.
+/// Parses, describes and encodes the frame of [`body_frame`], then parses the result again.
 pub fn frame_bodies(data: &[u8]) {
     let Some(bytes) = body_frame(data) else { return };
     let frame = FrameRef::new_checked(&bytes).expect("a good frame");
     assert_eq!(frame.body(), &bytes[4..bytes.len() - 2]);
 
-    // A body that no receiver returns must not cause a panic either.
+    // A body that the receiver never returns must not cause a panic either.
     let raw = FrameRef { frame_type: frame.frame_type, bytes: &data[2..] };
     if let Ok(command) = Command::parse(raw) {
         let mut out = vec![0; data.len() + 64];
@@ -82,7 +82,7 @@ fn scaled_and_back(point: RawPoint) {
     let lowest = [point.position, point.velocity, point.acceleration].as_flattened().contains(&i16::MIN);
     match again {
         Ok(again) => assert_eq!(again, point),
-        // The one raw number that is outside the scale.
+        // -32768 is the only raw value outside the scale.
         Err(_) => assert!(lowest),
     }
 }

@@ -9,7 +9,7 @@ use crate::status::Status;
 pub struct StatusCounters {
     /// Number of valid statuses.
     pub frames: u64,
-    /// Number of runs of bytes that looked like a frame of the device but had a wrong CRC or body.
+    /// Number of byte sequences that looked like a frame of the device but had a wrong CRC or body.
     pub bad_frames: u64,
     /// Number of bytes that do not belong to a valid frame.
     pub skipped_bytes: u64,
@@ -19,14 +19,14 @@ pub struct StatusCounters {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum FromDevice<'a> {
-    /// The status of the controller.
+    /// Status of the controller.
     Status(Status),
-    /// An answer to an extension request (J-50).
+    /// Answer to an extension request (J-50).
     Answer(Answer<'a>),
 }
 
-/// Stream parser of the host, for statuses of 165, 173 and 175 bytes (J-08) and for answers to extension requests. It resynchronises after
-/// noise and lost bytes, without losing a valid frame that follows them.
+/// Stream parser of the host, for statuses of 165, 173 and 175 bytes (J-08) and for answers to extension requests. The parser
+/// resynchronises after noise and lost bytes, and finds every valid frame that follows them.
 ///
 /// ```
 /// use jtc_wire::{Status, StatusReceiver};
@@ -43,7 +43,7 @@ pub enum FromDevice<'a> {
 pub struct StatusReceiver {
     held: [u8; ANSWER_MAX],
     len: usize,
-    /// Number of bytes at the front of `held` that were returned to the caller. The next call removes them.
+    /// Number of bytes at the start of `held` that were already returned to the caller. The next call removes these bytes.
     used: usize,
     counters: StatusCounters,
 }
@@ -56,14 +56,14 @@ impl Default for StatusReceiver {
 
 /// Result of the scan at the first held byte.
 enum ScanResult {
-    /// The first held byte does not begin a frame of the device.
+    /// The first held byte is not the start of a frame of the device.
     Nothing,
-    /// This many bytes are needed to decide.
+    /// Number of bytes that are needed to decide.
     Needs(usize),
 }
 
 impl StatusReceiver {
-    /// Creates a parser that holds no bytes.
+    /// Creates a parser without held bytes.
     pub const fn new() -> Self {
         Self {
             held: [0; ANSWER_MAX],
@@ -73,8 +73,8 @@ impl StatusReceiver {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a status is complete. Returns `None` if all bytes were taken before that. Skips answers
-    /// to extension requests.
+    /// Removes bytes from the start of `bytes` until a status is complete. Returns `None` if `bytes` is empty before a status is complete.
+    /// Skips answers to extension requests.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Status> {
         loop {
             if let FromDevice::Status(status) = self.next_frame(bytes)? {
@@ -83,7 +83,7 @@ impl StatusReceiver {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a frame is complete. Returns `None` if all bytes were taken before that.
+    /// Removes bytes from the start of `bytes` until a frame is complete. Returns `None` if `bytes` is empty before a frame is complete.
     pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Option<FromDevice<'_>> {
         self.drop_front(self.used);
         self.used = 0;
@@ -112,22 +112,22 @@ impl StatusReceiver {
         Some(frame)
     }
 
-    /// Returns the bytes of the frame that [`next_frame`](Self::next_frame) returned last, for a program that passes it on.
+    /// Returns the bytes of the last frame that [`next_frame`](Self::next_frame) returned, so that a program can forward them.
     pub fn frame_bytes(&self) -> &[u8] {
         self.held.get(..self.used).unwrap_or(&[])
     }
 
-    /// Returns the numbers of bytes and statuses received so far.
+    /// Returns the counters of bytes and statuses.
     pub fn counters(&self) -> StatusCounters {
         self.counters
     }
 
-    /// Returns the number of held bytes that may become a frame.
+    /// Returns the number of held bytes, which may become a frame.
     pub fn held(&self) -> usize {
         self.len - self.used
     }
 
-    /// Discards the held bytes, for a line that was closed and opened again.
+    /// Discards the held bytes. Call this after the line was closed and opened again.
     pub fn clear(&mut self) {
         self.counters.skipped_bytes += self.held() as u64;
         (self.len, self.used) = (0, 0);
@@ -221,7 +221,7 @@ mod tests {
         use crate::response::{DataStatus, Response};
         let emitted = Status { point: 77, ..Status::default() }.emit();
         let record = Response::good(FrameType::GetInfo, DataStatus::NotAllowed, 6);
-        // The other layouts are tested as well: without a gripper, and with a short index.
+        // Also tests the layout without a gripper and the layout with a short point index.
         for (cut, length) in [(0..0, 175), (163..173, 165), (17..19, 173)] {
             let mut bytes: Vec<u8> =
                 emitted.iter().enumerate().filter(|(i, _)| !cut.contains(i)).map(|(_, b)| *b).collect();

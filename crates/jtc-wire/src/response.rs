@@ -1,4 +1,4 @@
-//! The record that answers each received frame, and its status codes.
+//! Response record, which answers each received frame, and its status codes.
 use core::fmt;
 
 use crate::FrameType;
@@ -37,39 +37,39 @@ codes! {
     }
 }
 
-/// A response record (J-04).
+/// Response record (J-04).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct Response {
-    /// Type byte as received; 0 if unknown.
+    /// Received type byte; 0 if unknown.
     pub frame_type: u8,
-    /// Result of receiving the frame.
+    /// Result of the reception of the frame.
     pub status: FrameStatus,
-    /// Result for the data of the frame; Idle unless `status` is NoError.
+    /// Result of the check of the frame data; Idle unless `status` is NoError.
     pub data: DataStatus,
     /// Number of received bytes; 0 if unknown.
     pub length: u16,
 }
 
 impl Response {
-    /// Marks that there is no record.
+    /// Empty record: the status does not contain a response.
     pub const NONE: Self = Self::bad(0, FrameStatus::Idle, 0);
 
-    /// Creates the record of a frame or run of bytes that is not a valid frame.
+    /// Creates the record for an invalid frame or a run of bytes.
     pub const fn bad(frame_type: u8, status: FrameStatus, length: u16) -> Self {
         Self { frame_type, status, data: DataStatus::Idle, length }
     }
 
-    /// Creates the record of a valid frame.
+    /// Creates the record for a valid frame.
     pub const fn good(frame_type: FrameType, data: DataStatus, length: u16) -> Self {
         Self { frame_type: frame_type as u8, status: FrameStatus::NoError, data, length }
     }
 
-    /// Returns true if a status with this value carries no record.
+    /// Returns true if a status with this record contains no response.
     pub const fn is_idle(&self) -> bool {
         matches!(self.status, FrameStatus::Idle)
     }
 
-    /// Returns true if the frame arrived without a fault and was accepted.
+    /// Returns true if the frame was received without a fault and accepted.
     pub const fn accepted(&self) -> bool {
         matches!((self.status, self.data), (FrameStatus::NoError, DataStatus::NoError))
     }

@@ -1,25 +1,27 @@
-//! The bodies of Trajectory frames: four numbers, followed by points of eighteen int16.
+//! Bodies of Trajectory frames: four numbers (trajectory, segment, number of segments, step time), followed by points
+//! of eighteen int16 values.
 use crate::frame::{JOINTS, POINT_LEN};
 
-/// A trajectory point in the wire format.
+/// Trajectory point in the wire format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(C)]
 pub struct RawPoint {
-    /// Full scale 3.141592 rad.
+    /// Raw positions; full scale is 3.141592 rad.
     pub position: [i16; JOINTS],
-    /// Full scale 6.283185 rad/s.
+    /// Raw velocities; full scale is 6.283185 rad/s.
     pub velocity: [i16; JOINTS],
-    /// Full scale 12.566370 rad/s².
+    /// Raw accelerations; full scale is 12.566370 rad/s².
     pub acceleration: [i16; JOINTS],
 }
 
-/// Position at 32767 in a trajectory point, rad. These three values are defined by the protocol; they are not rounded constants.
+/// Position, in rad, for a raw value of 32767 in a trajectory point. The protocol defines these three full-scale
+/// values; they are not rounded constants.
 #[allow(clippy::approx_constant)]
 pub const POSITION_SCALE: f64 = 3.141592;
-/// Velocity at 32767 in a trajectory point, rad/s.
+/// Velocity, in rad/s, for a raw value of 32767 in a trajectory point.
 #[allow(clippy::approx_constant)]
 pub const VELOCITY_SCALE: f64 = 6.283185;
-/// Acceleration at 32767 in a trajectory point, rad/s².
+/// Acceleration, in rad/s², for a raw value of 32767 in a trajectory point.
 pub const ACCELERATION_SCALE: f64 = 12.566370;
 
 /// Raw value at full scale.
@@ -31,11 +33,11 @@ pub mod field {
 
     /// Trajectory number, u16.
     pub const TRAJECTORY: Range<usize> = 0..2;
-    /// Segment number from 0, u16.
+    /// Segment number, counted from 0, as a u16.
     pub const SEGMENT: Range<usize> = 2..4;
-    /// Number of segments, u16.
+    /// Number of segments, as a u16.
     pub const SEGMENTS: Range<usize> = 4..6;
-    /// Time between points, ms, u16.
+    /// Time between points in ms, as a u16.
     pub const STEP_TIME: Range<usize> = 6..8;
     /// First point.
     pub const POINTS: usize = 8;
@@ -94,7 +96,7 @@ pub struct Segment<'a> {
 }
 
 impl<'a> Segment<'a> {
-    /// Parses a body. Returns `None` if it is too short for the four numbers. Ignores an incomplete point at the end.
+    /// Parses a body. Returns `None` if the body is too short for its header. Ignores an incomplete point at the end.
     pub fn parse(body: &'a [u8]) -> Option<Self> {
         let (head, points) = body.split_first_chunk::<{ field::POINTS }>()?;
         let u16_at = |i: usize| u16::from_be_bytes([head[i], head[i + 1]]);
@@ -112,7 +114,7 @@ impl<'a> Segment<'a> {
         self.points_from(0)
     }
 
-    /// Returns the points from number `first` on; none past the end.
+    /// Returns the points from number `first` on; empty if `first` is after the last point.
     pub fn points_from(&self, first: usize) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
         self.points.as_chunks::<POINT_LEN>().0.get(first..).unwrap_or(&[]).iter().map(RawPoint::parse)
     }
@@ -127,7 +129,7 @@ impl Segment<'_> {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Returns point `i`, or `None` past the end.
+    /// Returns point `i`, or `None` if there are not enough points.
     pub fn point(&self, i: usize) -> Option<RawPoint> {
         self.points.as_chunks::<POINT_LEN>().0.get(i).map(RawPoint::parse)
     }

@@ -1,7 +1,7 @@
-//! States of the controller and of its trajectory: one table with code, name and meaning of each.
+//! States of the controller and of its trajectory: one table with the code, name and meaning of each state.
 use crate::code::{Known, codes};
 
-/// Declares a list of codes in a status. A received code may be unknown.
+/// Declares the list of codes for a state in a status. A received code can be unknown.
 macro_rules! states {
     ($(#[$doc:meta])* $list:ident, $unknown:literal $rows:tt) => {
         codes! {
@@ -31,13 +31,13 @@ states! {
         /// Set-up is not complete.
         #[default]
         Start = 0;
-        /// The nodes are brought up and parameters are awaited. The torque is zero.
+        /// The controller enables the nodes and waits for parameters. The torque is zero.
         Init = 1;
         /// Holds a position.
         HoldPos = 2;
         /// Follows the trajectory.
         Operate = 3;
-        /// Compensates gravity and the load found, and damps the joints, so that a hand can lead the arm.
+        /// Compensates gravity and the estimated load, and damps the joints, so that the operator can guide the arm by hand.
         Teaching = 4;
         /// The torque is zero until the cause has ended and the host has cleared the error.
         Error = 5;
@@ -45,7 +45,7 @@ states! {
 }
 
 impl ControllerState {
-    /// Returns true if the controller commands torque. Without torque the arm falls.
+    /// Returns true if the controller commands torque. If the controller does not command torque, the arm falls.
     pub fn has_torque(self) -> bool {
         matches!(self, Self::HoldPos | Self::Operate | Self::Teaching)
     }
@@ -57,11 +57,11 @@ states! {
         /// No trajectory.
         #[default]
         Null = 0;
-        /// The trajectory is complete and at its start.
+        /// The trajectory is complete, and the arm is at its start.
         Stop = 1;
         /// Paused on the path.
         Pause = 2;
-        /// Being executed (until standstill).
+        /// The arm executes the trajectory (until standstill).
         Execute = 3;
         /// The trajectory was executed to its last point.
         Finish = 4;

@@ -1,4 +1,4 @@
-//! JtcStatus: the report of the controller to the hosts, 25 times per second.
+//! JtcStatus: the report that the controller sends to the hosts 25 times per second.
 use jtc_bus::NodeState;
 
 use crate::code::Code;
@@ -9,25 +9,25 @@ use crate::state::{ControllerState, TrajectoryState};
 
 /// Length of JtcStatus.
 pub const STATUS_LEN: usize = 175;
-/// Length of the layout with a u16 point index (J-08).
+/// Length of the frame in the layout with a u16 point index (J-08).
 pub const STATUS_LEN_SHORT_INDEX: usize = 173;
-/// Length of the layout without gripper (J-08).
+/// Length of the frame in the layout without a gripper (J-08).
 pub const STATUS_LEN_NO_GRIPPER: usize = 165;
 
 /// Positions of the parts of the 175-byte frame.
 ///
-/// The 165-byte layout ends after the joints. In the 173-byte layout the point index has two bytes, and all parts after it are two bytes
-/// further forward.
+/// The 165-byte layout ends after the joints. In the 173-byte layout the point index has two bytes, so all later parts are two bytes
+/// nearer to the start.
 pub mod field {
     use core::ops::Range;
 
-    /// Record: type of the frame that is answered.
+    /// Response record: type of the frame that is answered.
     pub const RESPONSE_TYPE: usize = 4;
     /// Record: status code.
     pub const RESPONSE_STATUS: usize = 5;
-    /// Record: data status code.
+    /// Response record: data status code.
     pub const RESPONSE_DATA: usize = 6;
-    /// Record: number of received bytes, u16.
+    /// Response record: number of received bytes, as a u16.
     pub const RESPONSE_LENGTH: Range<usize> = 7..9;
     /// State of the controller.
     pub const FSM: usize = 9;
@@ -41,19 +41,19 @@ pub mod field {
     pub const NODE_INIT: usize = 15;
     /// Trajectory execution state.
     pub const TES: usize = 16;
-    /// Index of the current 1 ms point, u32.
+    /// Index of the current 1 ms point, as a u32.
     pub const POINT: Range<usize> = 17..21;
     /// Friction type.
     pub const FRICTION_TYPE: usize = 21;
-    /// CAN: 0 no error, 1 error.
+    /// CAN error: 0 no error, 1 error.
     pub const CAN_ERROR: usize = 22;
-    /// CAN: current flags, u32.
+    /// Current CAN flags, as a u32.
     pub const CAN_CURRENT: Range<usize> = 23..27;
-    /// CAN: occurred flags, u32.
+    /// Occurred CAN flags, as a u32.
     pub const CAN_OCCURRED: Range<usize> = 27..31;
-    /// Joint 0. Each joint has [`JOINT_LEN`] bytes.
+    /// Joint 0. Joints, [`JOINT_LEN`] bytes for each joint.
     pub const JOINTS: usize = 31;
-    /// Length of a joint.
+    /// Length of the part of a joint.
     pub const JOINT_LEN: usize = 22;
     /// Gripper: state, pump, pressure 1, pressure 2, errors, warnings, four zeros.
     pub const GRIPPER: Range<usize> = 163..173;
@@ -74,9 +74,9 @@ pub mod field {
         pub const ERRORS: usize = 3;
         /// Warnings.
         pub const WARNINGS: usize = 4;
-        /// Errors found by the controller, u16.
+        /// Joint errors found by the controller, as a u16.
         pub const INTERNAL: Range<usize> = 5..7;
-        /// Occurred errors found by the controller, u16.
+        /// Occurred joint errors found by the controller, as a u16.
         pub const INTERNAL_OCCURRED: Range<usize> = 7..9;
         /// Position, rad, f32.
         pub const POSITION: Range<usize> = 9..13;
@@ -89,16 +89,16 @@ pub mod field {
     }
 }
 
-/// JtcStatus (section 2). The device uses `emit`, the host uses `parse` (165, 173 and 175 bytes, J-08).
+/// JtcStatus (section 2). The device uses `emit`, and the host uses `parse` (165, 173 and 175 bytes, J-08).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Status {
-    /// Record of a received frame, or an empty record.
+    /// Response record of a received frame, or an empty record.
     pub response: Response,
     /// State of the controller.
     pub state: Code<ControllerState>,
     /// Current errors: bits of [`crate::error`].
     pub errors: u16,
-    /// Occurred errors, with the same bits.
+    /// Occurred errors: bits of [`crate::error`].
     pub occurred: u16,
     /// Missing parameters: bits of [`crate::missing_parameter`].
     pub jtc_init: u8,
@@ -110,11 +110,11 @@ pub struct Status {
     pub point: u32,
     /// Kind of friction: 0 polynomial, 1 table.
     pub friction_type: u8,
-    /// CAN: 0 no error, 1 error.
+    /// CAN error: 0 no error, 1 error.
     pub can_error: u8,
     /// Current CAN flags: bits of [`crate::can_flag`].
     pub can_current: u32,
-    /// Occurred CAN flags, with the same bits.
+    /// Occurred CAN flags: bits of [`crate::can_flag`].
     pub can_occurred: u32,
     /// Joints 0..5.
     pub joints: [JointStatus; JOINTS],
@@ -122,7 +122,7 @@ pub struct Status {
     pub gripper: Option<GripperStatus>,
 }
 
-/// A joint in JtcStatus.
+/// State and errors of a joint in JtcStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct JointStatus {
     /// State of the drive.
@@ -137,7 +137,7 @@ pub struct JointStatus {
     pub warnings: u8,
     /// Errors found by the controller: bits of [`crate::joint_error`].
     pub internal: u16,
-    /// Occurred errors found by the controller.
+    /// Occurred joint errors found by the controller: bits of [`crate::joint_error`].
     pub internal_occurred: u16,
     /// Position, rad.
     pub position: f32,
@@ -149,24 +149,24 @@ pub struct JointStatus {
     pub temperature: u8,
 }
 
-/// The gripper in JtcStatus.
+/// State and errors of the gripper in JtcStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct GripperStatus {
     /// State.
     pub state: NodeState,
-    /// Pump: 0 off, 1 on.
+    /// State of the pump: 0 off, 1 on.
     pub pump: u8,
-    /// 1: the first pressure level is reached.
+    /// Flag for the first pressure level: 1 if this level is reached.
     pub pressure1: u8,
-    /// 1: the second pressure level is reached.
+    /// Flag for the second pressure level: 1 if this level is reached.
     pub pressure2: u8,
-    /// Errors: bits of [`jtc_bus::error`].
+    /// Errors of the gripper: bits of [`jtc_bus::error`].
     pub errors: u8,
-    /// Warnings: bits of [`jtc_bus::warning`].
+    /// Warnings of the gripper: bits of [`jtc_bus::warning`].
     pub warnings: u8,
 }
 
-/// Returns `N` bytes of `bytes` from `at` on, or zeros after the end. No caller reads after the end.
+/// Returns `N` bytes of `bytes` from position `at` on, or zeros after the end. Callers never read after the end.
 fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
 }
@@ -206,14 +206,14 @@ impl JointStatus {
 }
 
 impl Status {
-    /// Returns the 175-byte frame with its CRC. If there is no gripper, its bytes are zero.
+    /// Returns the 175-byte frame, including its CRC. Without a gripper, the bytes of the gripper are zero.
     pub fn emit(&self) -> [u8; STATUS_LEN] {
         let mut frame = [0; STATUS_LEN];
         self.emit_to(&mut frame);
         frame
     }
 
-    /// Like [`emit`](Self::emit), but writes to `b`.
+    /// Like [`emit`](Self::emit), but writes the frame to `b`.
     pub fn emit_to(&self, b: &mut [u8; STATUS_LEN]) {
         use field::*;
         b[frame_field::HEADER] = HEADER;
@@ -251,9 +251,9 @@ impl Status {
         b[CRC].copy_from_slice(&crc.to_be_bytes());
     }
 
-    /// Parses a whole frame of 165, 173 or 175 bytes. Returns `None` if type, length or CRC is wrong.
+    /// Parses a complete frame of 165, 173 or 175 bytes. Returns `None` if the type, length or CRC is wrong.
     ///
-    /// A record with a code that this version does not know becomes a record with the status Idle, so that it confirms nothing.
+    /// If this version does not know a code in the response record, the record gets the status Idle, so that the record confirms nothing.
     pub fn parse(bytes: &[u8]) -> Option<Status> {
         let frame = crate::FrameRef::new_checked(bytes)?;
         if frame.frame_type != FrameType::JtcStatus {
@@ -305,8 +305,8 @@ impl Status {
         })
     }
 
-    /// Replaces the response record in the bytes of a valid status of any layout. A program that passes the status on to several hosts uses
-    /// this. Returns false and changes nothing if the bytes are not a valid status.
+    /// Replaces the response record in the bytes of a valid status of any layout. A program that forwards a status to several hosts calls
+    /// this function. Returns false and changes nothing if the bytes are not a valid status.
     pub fn replace_response(bytes: &mut [u8], response: &Response) -> bool {
         use field::*;
         let status = |frame: crate::FrameRef<'_>| frame.frame_type == FrameType::JtcStatus;
@@ -323,33 +323,33 @@ impl Status {
         true
     }
 
-    /// Returns true in Start and Init, in which the controller does not hold the arm yet.
+    /// Returns true in Start and Init: in these states the controller does not hold the arm yet.
     pub fn is_coming_up(&self) -> bool {
         self.state.is_in(&[ControllerState::Start, ControllerState::Init])
     }
 
-    /// Returns true in a held stop (J-69). The arm is held under torque or comes to rest, and does not move until the host has cleared the
-    /// cause that the joints report.
+    /// Returns true in a held stop (J-69). The controller holds the arm under torque or brings it to rest. The arm does not move again
+    /// until the host has cleared the cause that the joints report.
     pub fn is_held_stop(&self) -> bool {
         self.errors == crate::error::INTERNAL_JOINTS && self.state != ControllerState::Error
     }
 
-    /// Returns true if the controller is in Error, or reports an error other than the cause of a held stop.
+    /// Returns true if the controller is in Error, or reports an error that is not the cause of a held stop.
     pub fn is_faulty(&self) -> bool {
         (self.errors != 0 || self.state == ControllerState::Error) && !self.is_held_stop()
     }
 
-    /// Returns true while the arm follows its trajectory or slows down on it.
+    /// Returns true while the arm follows its trajectory or decelerates on it.
     pub fn is_executing(&self) -> bool {
         self.trajectory == TrajectoryState::Execute
     }
 
-    /// Returns the measured positions of the joints in the frame, rad. An unknown position is 0.
+    /// Returns the measured positions of the joints in the frame, rad. If a position is unknown, 0 is returned for it.
     pub fn positions(&self) -> [f64; JOINTS] {
         self.joints.map(|joint| f64::from(joint.position))
     }
 
-    /// Returns the record of the status, or `None` if it has none.
+    /// Returns the response record of the status, or `None` if the status contains no response.
     pub fn response(&self) -> Option<Response> {
         (!self.response.is_idle()).then_some(self.response)
     }

@@ -1,16 +1,16 @@
-//! The device's stream parser: finds frames in bytes that arrive in pieces of any length, and reports all other bytes (J-03, J-04).
+//! The stream parser of the device: finds frames in bytes that arrive in pieces of any length, and reports all other bytes (J-03, J-04).
 //!
-//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a good frame. It ends at
-//! the next good frame or at a gap. The parser reports one event for a run, as soon as the fault at its first byte is known, and skips the
-//! remainder without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap the parser scans again from
-//! the second byte of such a frame, so that a false header does not hide the frames after it.
+//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a good frame. A run ends
+//! at the next good frame or at a gap. The parser reports one event for a run as soon as the fault of its first byte is known, and skips
+//! its other bytes without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap, the parser scans again
+//! from the second byte of the incomplete frame, so that a false header does not hide the frames after it.
 //!
 //! Terms: a *candidate* is a position with a header, a known type and a length that the type can have. A *gap* is a silence of at least the
 //! inter-byte timeout after received bytes.
 //!
-//! Cost: each byte is copied once and enters the CRC once, when it arrives. The CRC register is stored at every 64th byte, so that a
-//! candidate of any length can be checked with two registers and some arithmetic. In hostile input full of false headers, each header costs
-//! a constant amount of work, and [`Receiver::poll`] scans a bounded number of them per call.
+//! Cost: each byte is copied once and added to the CRC once, when it arrives. The CRC register is stored at every 64th byte, so that a
+//! candidate of any length can be checked with two registers and some arithmetic. In hostile input full of false headers, the work for each
+//! header is constant, and [`Receiver::poll`] scans a bounded number of headers per call.
 use crate::batch::ReceivedEvent;
 use crate::crc::advance;
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
@@ -20,14 +20,14 @@ mod registers;
 
 use registers::Registers;
 
-/// A result of the parser.
+/// Event that the parser found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkEvent<'a> {
     /// A good frame.
     Frame(FrameRef<'a>),
-    /// An invalid frame, and the bytes that follow it without a gap.
+    /// Invalid frame, including the bytes that follow it without a gap.
     Bad(Response),
-    /// A run of bytes whose first byte does not look like a frame.
+    /// Run of bytes whose first byte is not the start of a frame.
     Noise(Response),
 }
 
@@ -41,18 +41,18 @@ impl LinkEvent<'_> {
     }
 }
 
-/// Time after an extension request in which the client of the line is assumed to know the extensions, µs (J-51). After this time the line
-/// is *plain*.
+/// Time after an extension request, in µs, in which the controller assumes that the client of the line knows the extensions (J-51). After
+/// this time the line is *plain*.
 pub const KNOWN_US: u64 = 2_000_000;
 
-/// Highest number of stored gaps among the held bytes.
+/// Maximum number of stored gaps among the held bytes.
 const GAPS: usize = 64;
-/// Amount of work of one `poll`. A skipped byte costs 1; a candidate whose CRC is checked costs `CANDIDATE`.
+/// Maximum work of one call of `poll`. The work for a skipped byte is 1; for a candidate whose CRC is checked it is `CANDIDATE`.
 const BUDGET: usize = 2048;
 const CANDIDATE: usize = 128;
 
-/// Stream parser of rule J-03 with a buffer of at least [`FRAME_MAX`] bytes. With a shorter buffer, frames that do not fit are refused like
-/// frames with a wrong length.
+/// Stream parser of rule J-03 with a buffer of at least [`FRAME_MAX`] bytes. If the buffer is shorter, frames that do not fit are refused
+/// like frames with a wrong length.
 ///
 /// ```
 /// use jtc_wire::{LinkEvent, Receiver};
@@ -68,57 +68,57 @@ const CANDIDATE: usize = 128;
 pub struct Receiver<B> {
     buffer: B,
     inter_byte_timeout_us: u64,
-    /// Position in the stream of the first byte of the buffer.
+    /// Stream position of the first byte of the buffer.
     base: u64,
-    /// The held bytes are `start..end` of the buffer.
+    /// Range `start..end` of the held bytes in the buffer.
     start: usize,
     end: usize,
     /// Time of the last byte, µs.
     last_us: u64,
-    /// The caller holds bytes that `push` has not taken. During this time, silence is not a gap on the line.
+    /// True if the caller still has bytes that `push` has not accepted. During this time, silence is not a gap on the line.
     refused: bool,
-    /// There is a gap before those bytes.
+    /// True if there was a gap before the refused bytes.
     gap_before_refused: bool,
-    /// The bytes from `start` on belong to a run whose event has already been reported.
+    /// True if the bytes from `start` on belong to a run whose event was already reported.
     in_run: bool,
-    /// The last `poll` stopped because of its limited work.
+    /// True if the last `poll` ended because it reached its work limit.
     busy: bool,
     event: Option<Found>,
     gaps: Gaps,
     registers: Registers,
-    /// Position in the stream of the incomplete frame, and time at which its first byte was seen, µs.
+    /// Stream position of the incomplete frame, and the time at which its first byte was seen, in µs.
     began: (u64, u64),
-    /// Time at which the last extension request was completed, µs.
+    /// Time at which the last extension request was completed, in µs.
     asked_us: Option<u64>,
-    /// The frame of the event came on a plain line.
+    /// True if the frame of the event arrived on a plain line.
     plain: bool,
 }
 
 #[derive(Clone, Copy)]
 enum Found {
     Frame(FrameType, usize),
-    /// The fault of a run, and its position in the stream.
+    /// Fault of a run, and its position in the stream.
     Run(Sort, Response, u64),
 }
 
 /// Kind of a run.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sort {
-    /// The run begins like a frame.
+    /// Run that begins like a frame.
     Bad,
     Noise,
 }
 
-/// The scan result at the first held byte.
+/// Scan result at the first held byte.
 enum ScanResult {
     Frame(FrameType, usize),
-    /// Undecided until more bytes or a gap arrive.
+    /// No decision is possible until more bytes or a gap arrive.
     Wait,
     Run(Sort, Response),
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
-    /// Creates a parser. `inter_byte_timeout_us`: silence that ends a frame, µs (5000).
+    /// Creates a parser. `inter_byte_timeout_us` is the silence that ends a frame, in µs (5000).
     pub fn new(buffer: B, inter_byte_timeout_us: u32) -> Self {
         Self {
             buffer,
@@ -145,11 +145,12 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.buffer.as_ref().len().min(FRAME_MAX)
     }
 
-    /// Takes bytes that were received until `now_us`, and returns how many were taken. A full buffer takes fewer bytes. Offer the remainder
-    /// again after `release` or more `poll`s. The delay of these bytes is not a gap.
+    /// Accepts bytes that were received until `now_us`, and returns the number of accepted bytes. If the buffer is full, fewer bytes are
+    /// accepted. Offer the remaining bytes again after `release` or more calls of `poll`. A delay of the remaining bytes does not count as
+    /// a gap.
     ///
-    /// Call it at least once every 2 ms while bytes arrive. If two calls are at least the inter-byte timeout apart, there is a gap between
-    /// them.
+    /// Call `push` at least once every 2 ms while bytes arrive. If the time between two calls is at least the inter-byte timeout, it
+    /// counts as a gap.
     pub fn push(&mut self, now_us: u64, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
             return 0;
@@ -174,14 +175,15 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.registers.absorb(self.end, taken);
         self.end += taken.len();
         self.refused = taken.len() < bytes.len();
-        // If none of the bytes was taken, the gap before them has already been stored.
+        // If no byte was accepted, the gap before these bytes is already stored.
         self.gap_before_refused = false;
         self.last_us = now_us;
         taken.len()
     }
 
-    /// Scans for the next event with a bounded amount of work. Returns true if `event` has one. Call it after `push`, and at least once per
-    /// millisecond, so that gaps are detected. If it returns false and [`busy`](Self::busy) is true, the next call continues the scan.
+    /// Scans for the next event with a bounded amount of work. Returns true if `event` returns an event. Call `poll` after `push`, and at
+    /// least once per millisecond, so that gaps are detected. If `poll` returns false and [`busy`](Self::busy) is true, the next call
+    /// continues the scan.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
             // If the list of gaps is full, its last gap is at the last byte, or the list becomes shorter below.
@@ -226,7 +228,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         true
     }
 
-    /// Returns the event that was found. It remains until it is released.
+    /// Returns the event that was found, until the event is released.
     pub fn event(&self) -> Option<LinkEvent<'_>> {
         Some(match self.event? {
             Found::Frame(frame_type, n) => {
@@ -238,8 +240,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// Returns the position of the first byte of the event, counted from the first byte that was pushed. With this position the event can
-    /// be ordered relative to the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
+    /// Returns the stream position of the first byte of the event, counted from the first byte that was pushed. With this position the
+    /// event can be ordered relative to the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
     pub fn event_position(&self) -> Option<u64> {
         Some(match self.event? {
             Found::Frame(..) => self.base + self.start as u64,
@@ -247,13 +249,13 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// Returns the event in the form that a controller uses, with the number of its line.
+    /// Returns the event in the form that a controller uses, including the line number.
     pub fn received(&self, line: usize) -> Option<ReceivedEvent<'_>> {
         let (event, position) = (self.event()?, self.event_position()?);
         Some(ReceivedEvent { line, position, plain: self.plain, event })
     }
 
-    /// Decides for a complete frame whether its line was plain when the frame began. An extension request ends the plain state of its line.
+    /// Determines for a complete frame whether its line was plain when the frame began. After an extension request, the line is not plain.
     fn judge(&mut self, kind: FrameType, now_us: u64) {
         let (position, seen_us) = self.began;
         let began_us = if position == self.base + self.start as u64 { seen_us } else { now_us };
@@ -264,9 +266,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Discards all held bytes and the event, because bytes were lost before the next one, whose position in the stream is `position`. The
-    /// loss is reported as one run that was not received to its end (J-04). The next bytes do not continue a frame. Up to the next frame
-    /// they belong to that run.
+    /// Discards all held bytes and the event, because bytes were lost before the next byte, whose stream position is `position`. The loss
+    /// is reported as one run that was not completely received (J-04). The next bytes do not continue a frame. The next bytes belong to
+    /// that run until the next frame begins.
     pub fn restart(&mut self, position: u64) {
         (self.base, self.start, self.end) = (position, 0, 0);
         (self.refused, self.gap_before_refused) = (false, false);
@@ -283,7 +285,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Returns true if bytes are held that may become a frame.
+    /// Returns true if there are held bytes that may become a frame.
     pub fn mid_frame(&self) -> bool {
         let frame = match self.event {
             Some(Found::Frame(_, n)) => n,
@@ -292,12 +294,13 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.end > self.start + frame
     }
 
-    /// Returns true if the last `poll` stopped because its work is bounded. The next call can then continue without new bytes.
+    /// Returns true if the last `poll` ended because it reached its work limit. The next call of `poll` can then
+    /// continue without new bytes.
     pub fn busy(&self) -> bool {
         self.busy
     }
 
-    /// Scans the bytes at `start` up to the next gap. There is at least one byte.
+    /// Scans the bytes at `start` up to the next gap. `start..end` contains at least one byte.
     fn scan(&self) -> ScanResult {
         let closed = self.gaps.first();
         let limit = closed.unwrap_or(self.end);
@@ -315,7 +318,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
         let Some(&byte) = seen.get(field::TYPE) else {
             return match closed {
-                // A header without a type.
+                // Incomplete header, without a type.
                 Some(_) => run(Sort::Noise, 0, FrameStatus::DiscontinuousFrame, seen.len()),
                 None => ScanResult::Wait,
             };
@@ -345,7 +348,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Skips the first held byte and at most `most` further bytes, up to the next header or gap. Returns the number of further bytes.
+    /// Skips the first held byte and at most `most` more bytes, until the next header or gap. Returns the number of
+    /// skipped bytes after the first one.
     fn pass_over(&mut self, most: usize) -> usize {
         self.start += 1;
         let limit = self.gaps.first().unwrap_or(self.end).min(self.start + most);
@@ -394,7 +398,7 @@ impl Gaps {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Stores a gap before the byte at `place`. The gaps must be stored in order. Returns false if the list is full.
+    /// Stores a gap before the byte at `place`. The gaps must be stored in order. Returns false if the list of gaps is full.
     fn mark(&mut self, place: usize) -> bool {
         let place = place as u16;
         if self.places[..self.count].last() == Some(&place) {

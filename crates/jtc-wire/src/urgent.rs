@@ -1,18 +1,18 @@
-//! Stop and Pause take effect before all other frames. They are found in the bytes of a line when these arrive, independently of the
-//! parsing of frames (J-04).
+//! Detection of Stop and Pause, which take effect before all other frames. The watch finds these commands in the bytes of a line as
+//! soon as they arrive, independently of the frame parser (J-04).
 //!
-//! A frame may wait for the frames before it, for a false header that announces bytes which never come, or for space in a full buffer. A
-//! Stop must not wait. Therefore the watch recognises the seven bytes of a Stop or a Pause at any position, and the command takes effect in
-//! the next tick. The frame itself still passes through the [`Receiver`](crate::Receiver) and gets its response record when it is its turn.
-//! From its position in the stream the controller can see that the command has already taken effect, and that an Execute that was received
-//! earlier must no longer be executed.
+//! Other frames may have to wait for earlier frames, for bytes that a false header announces, or for space in a full buffer. A Stop must
+//! not wait. The watch therefore recognises the seven bytes of a Stop or a Pause at any position, and the command takes effect in the next
+//! tick. The frame of the command still passes through the [`Receiver`](crate::Receiver) and gets its response record in the normal order.
+//! From the position of the frame in the stream, the controller detects that the command has already taken effect. An Execute that was
+//! received before the command must no longer be executed.
 //!
-//! The disadvantage is that the same seven bytes inside the body of another frame also stop the arm. This error is on the safe side. In a
-//! body of random bytes it occurs at one of 2⁵⁶ positions.
+//! A disadvantage is that these seven bytes in the body of another frame also stop the arm. This error is on the safe side. In a body of
+//! random bytes, the probability of this error is 2⁻⁵⁶ per position.
 use crate::command::ExecCommand;
 use crate::fixed;
 
-/// A command that does not wait for other frames.
+/// Command that takes effect before all other frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum UrgentCommand {
@@ -30,7 +30,7 @@ impl From<UrgentCommand> for ExecCommand {
 }
 
 impl UrgentCommand {
-    /// Returns Stop or Pause; `None` for Execute.
+    /// Returns the urgent command for Stop or Pause; `None` for Execute.
     pub const fn from_exec(command: ExecCommand) -> Option<Self> {
         match command {
             ExecCommand::Stop => Some(Self::Stop),
@@ -40,7 +40,7 @@ impl UrgentCommand {
     }
 }
 
-/// The urgent commands that arrived on a line in one tick: the number of each, and the last one.
+/// Urgent commands that arrived on a line in one tick: the number of each, and the last command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UrgentCommands {
     stops: u8,
@@ -57,7 +57,7 @@ impl UrgentCommands {
         self.add(command, 1);
     }
 
-    /// Appends `count` equal commands.
+    /// Appends the command `count` times.
     pub fn add(&mut self, command: UrgentCommand, count: u8) {
         if count == 0 {
             return;
@@ -72,7 +72,7 @@ impl UrgentCommands {
         self.stops == 0 && self.pauses == 0
     }
 
-    /// Returns each command that came, with its count. The last command is at the end.
+    /// Returns each received command and its count. The last received command is at the end.
     pub fn iter(&self) -> impl Iterator<Item = (UrgentCommand, u8)> {
         let (stops, pauses) = ((UrgentCommand::Stop, self.stops), (UrgentCommand::Pause, self.pauses));
         let order = if self.pause_is_last { [stops, pauses] } else { [pauses, stops] };
@@ -80,9 +80,9 @@ impl UrgentCommands {
     }
 }
 
-/// Length of a Stop or a Pause.
+/// Length of a Stop frame or a Pause frame.
 const LENGTH: usize = 7;
-/// Mask of the last seven bytes. The oldest byte is the highest.
+/// Mask of the last seven bytes. The oldest byte is the most significant byte.
 const WINDOW: u64 = (1 << (8 * LENGTH)) - 1;
 const STOP: u64 = window(&fixed::STOP);
 const PAUSE: u64 = window(&fixed::PAUSE);
@@ -92,7 +92,7 @@ const fn window(bytes: &[u8; LENGTH]) -> u64 {
     u64::from_be_bytes([0, a, b, c, d, e, f, g])
 }
 
-/// State of a line.
+/// State of the watch for one line.
 #[derive(Clone, Copy, Debug)]
 struct Tail {
     /// The last bytes of the line.
@@ -103,17 +103,17 @@ struct Tail {
     last_us: u64,
     /// Commands since the last [`UrgentWatch::take`].
     commands: UrgentCommands,
-    /// Position in the stream at which the last of these commands ended.
+    /// Stream position at which the last of these commands ended.
     hit: u64,
-    /// Number of bytes received when the last urgent command of any line came. A frame that began earlier is considered older than that
-    /// command.
+    /// Number of bytes that had been received on this line when the last urgent command of any line arrived. A frame that began before
+    /// this position is older than the urgent command.
     overtaken: u64,
 }
 
-/// Watches the bytes of all lines to a controller for Stop and Pause.
+/// Watches for Stop and Pause in the bytes of all lines to a controller.
 ///
-/// In each tick, call [`scan`](Self::scan) with the bytes that have arrived on every line, and then [`take`](Self::take). An Execute at a
-/// position that is [`overtaken`](Self::overtaken) must not be executed.
+/// In each tick, call [`scan`](Self::scan) with the bytes that have arrived on each line, and then call [`take`](Self::take). An Execute
+/// at a position that is [`overtaken`](Self::overtaken) must not be executed.
 ///
 /// ```
 /// use jtc_wire::{UrgentCommand, UrgentWatch, fixed};
@@ -132,16 +132,17 @@ pub struct UrgentWatch<const LINES: usize> {
 }
 
 impl<const LINES: usize> UrgentWatch<LINES> {
-    /// Creates a watch. `inter_byte_timeout_us`: silence after which bytes no longer belong to the same frame, µs. Times are only as
-    /// precise as the calls of `scan`. If this timeout is at least one tick longer than the timeout of the receiver, every Stop that the
-    /// receiver finds is also found here.
+    /// Creates a watch. `inter_byte_timeout_us` is the silence, in µs, after which later bytes do not belong to the same frame. The
+    /// precision of this silence depends on the interval between calls of `scan`. If this timeout exceeds the timeout of the receiver by
+    /// at least one tick, the watch finds every Stop that the receiver finds.
     pub const fn new(inter_byte_timeout_us: u32) -> Self {
         let tail =
             Tail { window: 0, received: 0, last_us: 0, commands: UrgentCommands::NONE, hit: 0, overtaken: 0 };
         Self { inter_byte_timeout_us: inter_byte_timeout_us as u64, lines: [tail; LINES] }
     }
 
-    /// Scans the bytes that have arrived on a line until `now_us`: every byte once, in order. This takes a few instructions per byte.
+    /// Scans the bytes that have arrived on a line until `now_us`; pass every byte once, in order. The scan takes a few
+    /// instructions per byte.
     pub fn scan(&mut self, line: usize, now_us: u64, bytes: &[u8]) {
         let Some(tail) = self.lines.get_mut(line) else { return };
         if bytes.is_empty() {
@@ -164,14 +165,14 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         }
     }
 
-    /// Returns the commands of each line since the last call.
+    /// Returns the commands that arrived on each line since the last call.
     pub fn take(&mut self) -> [UrgentCommands; LINES] {
         let commands = self.lines.map(|tail| tail.commands);
         let lines_with = commands.iter().filter(|commands| !commands.is_empty()).count();
         for tail in &mut self.lines {
             let own = !core::mem::take(&mut tail.commands).is_empty();
-            // The order of the lines within a tick is not known. Therefore all bytes received so far are considered older, except those
-            // after the command on the only line that has one.
+            // The order in which the lines received bytes within a tick is unknown. All bytes received so far therefore count as older,
+            // except the bytes after the command if only one line received a command.
             match lines_with {
                 0 => {}
                 1 if own => tail.overtaken = tail.hit,
@@ -181,7 +182,7 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         commands
     }
 
-    /// Returns true if a frame that began at byte `position` of a line was received before the last urgent command of any line.
+    /// Returns true if a frame that began at byte `position` of a line is older than the last urgent command of any line.
     pub fn overtaken(&self, line: usize, position: u64) -> bool {
         self.lines.get(line).is_some_and(|tail| position < tail.overtaken)
     }
@@ -230,7 +231,7 @@ mod tests {
         }
     }
 
-    /// A call without bytes is not a received byte. The gap is measured from the last received byte (J-03).
+    /// A call without bytes does not count as reception. The gap is measured from the last received byte (J-03).
     #[test]
     fn j05_an_empty_scan_does_not_join_across_a_gap() {
         let mut watch = UrgentWatch::<2>::new(6000);

@@ -1,13 +1,13 @@
-//! Texts of states, error bits and codes, which are the same in all outputs.
+//! Texts of states, error bits and codes, which are identical in all outputs.
 pub use jtc_bus::Bits;
 
 use crate::bits::{error, joint_error, missing_parameter};
 
-/// Bits of the controller's error words.
+/// Texts of the bits in the error words of the controller.
 pub const JTC_ERRORS: [&str; 8] = error::NAMES;
-/// Bits of the parameters that the controller has not received.
+/// Texts of the bits for parameters that the controller has not received.
 pub const JTC_INIT: [&str; 3] = missing_parameter::NAMES;
-/// Nodes of the joint bus. Nodes are counted from 0 on the wire, joints from 1.
+/// Texts of the bits for the nodes of the joint bus. On the wire, nodes are counted from 0; joints are counted from 1.
 pub const NODES: [&str; 7] = [
     "node 0 (joint 1)",
     "node 1 (joint 2)",
@@ -17,15 +17,15 @@ pub const NODES: [&str; 7] = [
     "node 5 (joint 6)",
     "gripper",
 ];
-/// Bits of a joint's errors found by the controller.
+/// Texts of the bits for joint errors found by the controller.
 pub const JOINT_INTERNAL: [&str; 6] = joint_error::NAMES;
-/// Bits of a drive's motor-control faults.
+/// Texts of the bits for motor-control faults of a drive.
 pub const MC_FAULTS: [&str; 8] = jtc_bus::motor_control::NAMES;
-/// Bits of a node's errors.
+/// Texts of the bits for errors of a node.
 pub const NODE_ERRORS: [&str; 4] = jtc_bus::error::NAMES;
-/// Bits of a node's warnings.
+/// Texts of the bits for warnings of a node.
 pub const NODE_WARNINGS: [&str; 4] = jtc_bus::warning::NAMES;
-/// Bits of the CAN flags.
+/// Texts of the bits of the CAN flags.
 pub const CAN_FLAGS: [&str; 15] = [
     "transmit timeout",
     "",

@@ -1,10 +1,10 @@
-//! Bytes that are not a valid frame, command or status because of a single fault.
+//! Tests with bytes that are not a valid frame, command or status because of a single fault.
 use jtc_wire::{
     ALL_NODES, Command, DataStatus, Floats, FrameRef, FrameStatus, FrameType, HEADER, LinkEvent, RawPoint,
     Response, Segment, Status, crc16, fixed,
 };
 
-/// Returns the bytes, followed by their CRC.
+/// Returns the bytes, followed by the CRC of these bytes.
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc16(bytes).to_be_bytes()].concat()
 }
@@ -29,7 +29,7 @@ fn j05_a_frame_needs_its_header_type_length_and_crc_at_once() {
     }
 }
 
-/// A body that no receiver returns is a command only if its number of floats is valid for its type.
+/// A body that did not pass a receiver is a command only if its number of floats is permitted for its type.
 #[test]
 fn j07_floats_of_another_count_are_no_command() {
     let bytes = vec![0; 10_580];
@@ -61,7 +61,7 @@ fn j07_a_body_that_is_cut_off_is_no_command() {
     ] {
         for n in 0..needed {
             let expected = match (kind, n) {
-                // Some hosts send this frame.
+                // Some hosts send frames of this length.
                 (FrameType::ClearCurrentErrors, 0) => {
                     Ok(Command::ClearCurrentErrors { jtc: true, nodes: ALL_NODES })
                 }
@@ -98,7 +98,7 @@ fn j08_a_frame_of_another_type_is_no_status() {
     assert!(Status::parse(&Status::default().emit()).is_some());
 }
 
-/// A status without a record contains 0, 0, 0, 0.
+/// In a status without a response, the response record contains 0, 0, 0, 0.
 #[test]
 fn j04_a_status_without_a_record_confirms_nothing() {
     let bytes = Status::default().emit();
@@ -117,7 +117,7 @@ fn a_rest_of_a_float_is_none() {
     }
 }
 
-/// An empty segment is an incorrect value (J-06), so it must be detectable.
+/// An empty segment is an incorrect value (J-06), so the code must be able to detect it.
 #[test]
 fn j06_points_of_a_segment() {
     let point = |i: i16| RawPoint { position: [i; 6], ..RawPoint::default() };

@@ -1,4 +1,4 @@
-//! Inputs that the encoders refuse, and the names of the numbers of a frame.
+//! Tests of inputs that the encoders refuse, and of the names of the numbers in a frame.
 use jtc_wire::{
     Command, EncodeError, FRAME_MAX, FloatName, Floats, FrameType, RawPoint, floats, pid_param, trajectory,
 };
@@ -28,8 +28,8 @@ fn only_frames_of_floats_are_made_of_floats() {
     assert_eq!(Command::PidParam(Floats::new(&bytes)).emit(&mut out), Err(error));
 }
 
-/// An encoder writes a frame while it reads the numbers, so the first error may not contain the final length. A buffer of the requested
-/// length holds more of the frame, and the requested length never exceeds the length of the frame.
+/// An encoder writes a frame while it reads the numbers, so the length in the first error can be less than the final length. A buffer
+/// of the requested length can hold more of the frame, and the requested length never exceeds the length of the complete frame.
 #[test]
 fn a_buffer_that_is_too_short_is_told_how_long_it_must_be() {
     type Encoder = fn(&mut [u8]) -> Result<usize, EncodeError>;
@@ -47,7 +47,7 @@ fn a_buffer_that_is_too_short_is_told_how_long_it_must_be() {
     }
 }
 
-/// The names are in the order of the wire format (the table of frames).
+/// The names are in the order of the wire format (see the table of frames).
 #[test]
 fn j06_every_number_has_its_name() {
     let names = |kind, count| (0..count).map(move |i| FloatName(kind, i).to_string());

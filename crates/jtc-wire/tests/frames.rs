@@ -1,4 +1,4 @@
-//! Frames byte by byte, scaling, and the numbers on the protocol pages.
+//! Tests of the frame bytes, the scaling, and the numbers on the protocol pages.
 use jtc_bus::NodeState;
 use jtc_wire::{
     ACCELERATION_SCALE, Channel, Command, ControllerState, DataStatus, Described, EncodeError, ExecCommand,
@@ -180,7 +180,7 @@ fn scale_ends() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// A value is rounded to the nearest one or refused. It never wraps and is never clipped.
+    /// A value is rounded to the nearest one or refused. A value never wraps around and is never clipped.
     #[test]
     fn scaling_never_wraps_or_clips(value in any::<f64>(), near in -4.0..4.0, joint in 0..6usize) {
         for value in [value, near] {
@@ -268,7 +268,7 @@ fn e01_e02_e05_status_layout() {
     assert_eq!(Status::parse(&bytes), Some(status()));
 }
 
-/// Returns the other layouts of the same status.
+/// Returns the same status in the two other layouts.
 fn layouts() -> [Vec<u8>; 3] {
     let full = status().emit();
     let sealed = |mut bytes: Vec<u8>| {
@@ -294,7 +294,7 @@ fn j08_layouts_of_other_builds() {
     }
 }
 
-/// J-04: a code that is not known confirms nothing.
+/// J-04: a record with an unknown code confirms nothing.
 #[test]
 fn j04_unknown_codes_confirm_nothing() {
     for (at, byte) in [(5, 6), (6, 9)] {

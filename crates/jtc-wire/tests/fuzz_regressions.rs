@@ -1,4 +1,4 @@
-//! Runs the functions of the fuzz targets on the stored inputs, and on some random ones.
+//! Runs the functions of the fuzz targets on the stored inputs and on some random inputs.
 
 use jtc_wire::fuzzing::{frame_bodies, status_stream, stream_parser};
 use proptest::prelude::*;

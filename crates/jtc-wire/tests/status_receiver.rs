@@ -1,7 +1,7 @@
-//! The host's parser of statuses: its counters, and bytes that it does not wait for.
+//! Tests of the status parser of the host: its counters, and bytes for which the parser does not wait.
 use jtc_wire::{STATUS_LEN, Status, StatusReceiver};
 
-/// Feeds all bytes at once and returns the number of statuses found.
+/// Passes all bytes to the parser at once and returns the number of statuses found.
 fn feed(receiver: &mut StatusReceiver, mut bytes: &[u8]) -> usize {
     core::iter::from_fn(|| receiver.next(&mut bytes)).count()
 }
@@ -32,7 +32,7 @@ fn j08_a_wrong_crc_is_counted_once() {
     assert_eq!(counters.skipped_bytes, 2 * STATUS_LEN as u64);
 }
 
-/// A line was closed and opened again. Half of a status before that does not belong to the bytes after it.
+/// The test closes a line and opens it again. The half of a status that arrived before does not belong to the bytes after it.
 #[test]
 fn j08_what_is_held_can_be_forgotten() {
     let mut receiver = StatusReceiver::new();

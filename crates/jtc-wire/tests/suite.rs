@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, so that only one program must be linked. Each file here is a module of it.
+//! All tests of the crate in one program, so that only one program must be linked. Each file in this folder is a module of that program.
 mod checks;
 mod encoding;
 mod frames;

@@ -1,4 +1,4 @@
-//! Texts of frames, states and codes.
+//! Tests of the texts of frames, states and codes.
 use jtc_bus::NodeState;
 use jtc_wire::words::{self, Bits};
 use jtc_wire::{
@@ -52,7 +52,7 @@ fn bits_in_words() {
     assert!(Bits(0b1010, &names).iter().eq([(1, ""), (3, "")]));
 }
 
-/// The masks and the texts of a word come from the same table, which is the one in the protocol.
+/// The masks and the texts of a word come from the same table, which equals the table of the protocol.
 #[test]
 fn masks_have_the_texts_of_their_bits() {
     let errors = error::EMERGENCY_INPUT | error::EXTERNAL | error::EXTERNAL_JOINTS;
@@ -169,7 +169,7 @@ fn j06_coefficients_are_called_by_their_index() {
     check::<6>();
 }
 
-/// No frame contains such a command, but it can be constructed.
+/// A frame never contains such a command, but code can construct it.
 #[test]
 fn j07_a_polynomial_of_too_few_numbers_can_be_said() {
     let command = Command::FrictionPolynomial(Floats::new(&[0; 20]));
@@ -228,7 +228,7 @@ fn a_node_says_all_that_is_wrong_with_it() {
     );
 }
 
-/// The pieces add up to the capture, its valid frames are found, and the bytes between two frames are one piece.
+/// Concatenated in order, the pieces give the whole capture; each valid frame is one piece, and so are the bytes between two frames.
 #[test]
 fn a_capture_in_pieces() {
     let status = Status::default().emit();

@@ -3,46 +3,46 @@ use super::{NAME_LEN, Name, Values};
 use crate::floats::Floats;
 use crate::layout::VALUE_LEN;
 
-/// Positions of the parts in the image.
+/// Positions of the parts of the image.
 pub mod field {
     use core::ops::Range;
 
-    /// First bytes of an image.
+    /// Magic number: the first bytes of an image.
     pub const MAGIC: [u8; 4] = *b"JTCA";
-    /// Version of the layout.
+    /// Version of the image layout.
     pub const VERSION: u8 = 1;
     /// Position of the version byte.
     pub const VERSION_AT: usize = 4;
-    /// Position of the byte for the kind of friction: 0 polynomial, 1 table.
+    /// Position of the byte that selects the kind of friction: 0 polynomial, 1 table.
     pub const FRICTION_AT: usize = 5;
-    /// Number of settings, u16.
+    /// Number of settings, as a u16.
     pub const SETTINGS: Range<usize> = 6..8;
-    /// The body of a PidParam frame.
+    /// Position of the gains, in the format of the body of a PidParam frame.
     pub const PID: Range<usize> = 8..128;
-    /// The body of an ArmModel frame.
+    /// Position of the arm model, in the format of the body of an ArmModel frame.
     pub const MODEL: Range<usize> = 128..660;
-    /// Position of the friction: the body of a FrictionPolynomial frame with six coefficients per joint, or of a FrictionTable frame. It is
-    /// followed by the settings, each in the format of a SetSettings frame, and by the name.
+    /// Position of the friction: the body of a FrictionPolynomial frame with six coefficients per joint, or the body of a FrictionTable
+    /// frame. After the friction come the settings, each in the format of a SetSettings frame, and then the name.
     pub const FRICTION: usize = 660;
-    /// Length of the polynomials, bytes.
+    /// Length of the friction polynomials, in bytes.
     pub const POLYNOMIAL_LEN: usize = 144;
-    /// Length of the tables, bytes.
+    /// Length of the friction tables, in bytes.
     pub const TABLE_LEN: usize = 10_560;
 }
 
-/// Length of the longest image. Each slot in the flash of the board has space for it.
+/// Length of the longest image. Each slot in the flash of the board has space for an image of this length.
 pub const IMAGE_MAX: usize = 12 * 1024;
 
 /// Friction in an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionImage<'a> {
-    /// 6 × 6 coefficients, highest index first.
+    /// Polynomials: 6 × 6 coefficients, highest index first.
     Polynomial(Floats<'a>),
-    /// 6 × (20 velocities, 20 temperatures, 400 torques).
+    /// Tables: for each of the 6 joints 20 velocities, 20 temperatures and 400 torques.
     Table(Floats<'a>),
 }
 
-/// The parts of an image. The lengths are valid; the numbers are not checked yet.
+/// The parts of an image. The lengths are valid; the values are not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArmImage<'a> {
     /// Gains, in the format of PidParam.
@@ -88,9 +88,9 @@ impl<'a> ArmImage<'a> {
     }
 }
 
-/// Hash of an arm image without its name: of all parameters that affect the motion of the arm (J-52). The hash is FNV-1a with 64 bits (RFC
-/// 9923). The bytes may be added in pieces of any length. The hash distinguishes arms that differ by accident; it does not protect against
-/// forgery.
+/// Hash of all parameters in an arm image that affect the motion of the arm (J-52). The name is not included. The hash is FNV-1a with 64
+/// bits (RFC 9923). The bytes may be added in pieces of any length. The hash distinguishes two arms whose parameters differ by accident,
+/// but does not protect against forgery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hash(u64);
 
@@ -114,7 +114,7 @@ impl Hash {
         self.0
     }
 
-    /// Returns the hash of a whole image, without its name.
+    /// Returns the hash of a complete image, without its name.
     pub fn of_image(bytes: &[u8]) -> u64 {
         Self::new().update(bytes.get(..bytes.len().saturating_sub(NAME_LEN)).unwrap_or(&[])).value()
     }

@@ -11,12 +11,12 @@ use crate::words::{self, Bits};
 
 /// Length of an [`Info`] that this version writes.
 pub const INFO_WRITTEN: usize = 168;
-/// Name of the board of a simulator, whose drives are simulated (J-52).
+/// Board name of a simulator, whose drives are simulated (J-52).
 pub const SIMULATOR: &str = "simulator";
-/// Length of the text for the firmware's version, and of the text for its revision.
+/// Length of the firmware version text and of the firmware revision text.
 const SHORT_TEXT: usize = 16;
 
-/// Positions of the parts, counted from the first byte of the body.
+/// Positions of the parts of an Info frame, counted from the first byte of the body.
 mod field {
     use core::ops::Range;
 
@@ -33,7 +33,7 @@ mod field {
     pub(super) const STORE: usize = 33;
     pub(super) const SEQUENCE: Range<usize> = 34..38;
     pub(super) const LOG: usize = 38;
-    // Byte 39 is zero.
+    // Byte 39 of the body is zero.
     pub(super) const NAME: Range<usize> = 40..72;
     pub(super) const FIRMWARE: Range<usize> = 72..88;
     pub(super) const REVISION: Range<usize> = 88..104;
@@ -45,13 +45,13 @@ mod field {
     pub(super) const REACTIONS: Range<usize> = 144..168;
 }
 
-/// Capabilities of a device beyond version 1 of the extensions, one bit each.
+/// Capabilities of a device that version 1 of the extensions does not require, one bit for each.
 pub mod capability {
-    /// Settings, names and reading back the arm (J-53, J-54).
+    /// Settings, names, and requests that read back the arm (J-53, J-54).
     pub const SETTINGS: u32 = 1;
-    /// An arm can be stored (J-54).
+    /// Storage of an arm in non-volatile memory (J-54).
     pub const STORE: u32 = 1 << 1;
-    /// A speed override (J-57).
+    /// Speed override (J-57).
     pub const SPEED: u32 = 1 << 2;
     /// Jogging (J-58).
     pub const JOG: u32 = 1 << 3;
@@ -59,12 +59,12 @@ pub mod capability {
     pub const PAYLOAD: u32 = 1 << 4;
     /// Flight recorder (J-56).
     pub const RECORDER: u32 = 1 << 5;
-    /// The cause of a held stop (J-69).
+    /// Report of the cause of a held stop (J-69).
     pub const STOP_CAUSE: u32 = 1 << 6;
 }
 
 codes! {
-    /// Cause of the start of a device.
+    /// Reason why the device started.
     #[derive(Default)]
     #[allow(missing_docs)]
     BootCause {
@@ -93,12 +93,12 @@ codes! {
     }
 }
 
-/// Program in flash that the device runs, as the device read it at its start (J-67).
+/// Program in flash that the device runs, as the device read the program at its start (J-67).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Program {
     /// Length of the program, from the first byte of the flash on.
     pub bytes: u32,
-    /// CRC-32 of these bytes (ISO-HDLC, as in zlib and Ethernet).
+    /// CRC-32 of the program (ISO-HDLC, as in zlib and Ethernet).
     pub crc32: u32,
 }
 
@@ -123,21 +123,21 @@ pub struct Info {
     pub boots: u32,
     /// Time since the last start, ms.
     pub uptime_ms: u64,
-    /// Number of response records that were lost because too many were waiting (J-04).
+    /// Number of lost response records: too many records were waiting to be sent (J-04).
     pub lost_records: u32,
     /// Hash of all parameters that affect the motion of the arm ([`super::Hash`]).
     pub hash: u64,
     /// Bits of [`capability`].
     pub capabilities: u32,
-    /// Set if the UseDefault frames select the stored arm instead of the built-in one.
+    /// True if the UseDefault frames select the stored arm instead of the built-in arm.
     pub defaults_stored: bool,
     /// State of the memory for the stored arm.
     pub store: StoreState,
-    /// Number of the stored arm. Each store increments it.
+    /// Serial number of the stored arm. Each time an arm is stored, this number increases by one.
     pub sequence: u32,
     /// State of the flight recorder.
     pub log: LogState,
-    /// Name of the arm in use.
+    /// Name of the arm that the controller uses.
     pub arm: Name,
     /// Version of the firmware.
     pub firmware: [u8; SHORT_TEXT],
@@ -177,7 +177,7 @@ impl Default for Info {
     }
 }
 
-/// Returns as much of a text as fits, padded with zeros.
+/// Returns the part of a text that fits into `SHORT_TEXT` bytes, padded with zeros.
 pub(crate) fn short_text(text: &str) -> [u8; SHORT_TEXT] {
     let mut bytes = [0; SHORT_TEXT];
     for (to, from) in bytes.iter_mut().zip(text.bytes()) {
@@ -186,7 +186,7 @@ pub(crate) fn short_text(text: &str) -> [u8; SHORT_TEXT] {
     bytes
 }
 
-/// Returns the text up to the first zero, or `?` if it is not valid UTF-8.
+/// Returns the text before the first zero byte, or `?` if the text is not valid UTF-8.
 fn text(bytes: &[u8; SHORT_TEXT]) -> &str {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(SHORT_TEXT);
     bytes.get(..end).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or("?")
@@ -209,7 +209,8 @@ impl Info {
         text(&self.revision)
     }
 
-    /// Returns the version of the firmware, followed by its git revision in brackets if it has one. Every program uses this format.
+    /// Returns the firmware version, followed by the git revision in brackets if the revision is known. Every program
+    /// displays the version in this format.
     pub fn firmware_and_revision(&self) -> impl fmt::Display + '_ {
         FirmwareAndRevision(self)
     }
@@ -243,12 +244,12 @@ impl Info {
         b
     }
 
-    /// Parses the body of an Info frame. Bytes that a later version adds are ignored. A cause or state that this version does not know
-    /// becomes the default of its type. Returns `None` if the body is too short or a name is not valid.
+    /// Parses the body of an Info frame. Bytes that a later version of the extensions adds are ignored. If this version does not know
+    /// a cause or a state, the default of the type is used. Returns `None` if the body is too short or a name is not valid.
     pub fn parse(body: &[u8]) -> Option<Self> {
         use field::*;
         let (b, _) = body.split_first_chunk::<INFO_LEN>()?;
-        // The word is zero if the body comes from an earlier version and ends before it (J-67).
+        // This word is zero if the body comes from an earlier version and ends before the word (J-67).
         let word = |at: core::ops::Range<usize>| {
             body.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u32::from_be_bytes(*bytes))
         };

@@ -1,4 +1,4 @@
-//! Pages of the flight recorder's log (J-56).
+//! Pages of the log of the flight recorder (J-56).
 use core::fmt;
 
 use crate::code::codes;
@@ -7,7 +7,7 @@ use crate::layout::{ANSWER_MAX, LOG_HEAD_LEN};
 
 /// Highest number of bytes of the log in a Log frame, in whole words.
 pub const LOG_PAGE: usize = (ANSWER_MAX - FRAME_MIN - LOG_HEAD_LEN) & !3;
-/// Block number that no log contains. A GetLog with this number returns the extent of the log, without bytes.
+/// Block number that does not occur in any log. The answer to a GetLog with this number contains the extent of the log, without bytes.
 pub const LOG_NO_BLOCK: u32 = u32::MAX;
 
 codes! {
@@ -28,22 +28,22 @@ codes! {
 pub struct LogPage<'a> {
     /// State of the recorder.
     pub state: LogState,
-    /// Number of the block: the requested one, or the oldest if the requested one no longer exists.
+    /// Number of the block: the requested block, or the oldest block if the requested block no longer exists.
     pub block: u32,
-    /// Position of these bytes in the block.
+    /// Position of the log bytes in the block.
     pub offset: u16,
-    /// Number after the number of the newest block.
+    /// Block number that follows the number of the newest block.
     pub end: u32,
-    /// Number of points of the trajectory in the memory of the device.
+    /// Number of trajectory points in the memory of the device.
     pub points: u16,
-    /// Hash of those points.
+    /// Hash of these trajectory points.
     pub points_hash: u32,
-    /// The bytes; empty after the end of the log.
+    /// Log bytes; empty after the end of the log.
     pub bytes: &'a [u8],
 }
 
 impl<'a> LogPage<'a> {
-    /// Returns the part of the body before the bytes of the log.
+    /// Returns the part of the body before the log bytes.
     pub(crate) fn head(&self) -> [u8; LOG_HEAD_LEN] {
         let [a, b, c, d] = self.block.to_be_bytes();
         let [e, f] = self.offset.to_be_bytes();
@@ -53,7 +53,7 @@ impl<'a> LogPage<'a> {
         [self.state as u8, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]
     }
 
-    /// Parses the body of a Log frame. Returns `None` if it is too short or its state is not known.
+    /// Parses the body of a Log frame. Returns `None` if the body is too short or its state is unknown.
     pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
         let (head, bytes) = body.split_first_chunk::<LOG_HEAD_LEN>()?;
         let [state, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *head;

@@ -5,13 +5,13 @@ use crate::bits::joint_error;
 use crate::code::codes;
 
 codes! {
-    /// Kind of the cause of a held stop, or of a motion that was given up.
+    /// Kind of the cause of a held stop or of an aborted motion.
     #[derive(Default)]
     StopKind {
         /// A torque was at its limit for too long (J-43).
         #[default]
         Overload = 1, "overload";
-        /// A push on a joint, which was detected by the torque against it (J-66).
+        /// A push on a joint was detected by the torque against the push (J-66).
         Push = 2, "push";
         /// The position error of a joint was too large (J-43).
         PositionError = 3, "position error";
@@ -21,20 +21,21 @@ codes! {
         Velocity = 5, "velocity over limit";
         /// A commanded acceleration exceeded its limit.
         Acceleration = 6, "acceleration over limit";
-        /// The friction table has no value for a commanded velocity (J-42).
+        /// The friction table contains no value for a commanded velocity (J-42).
         FrictionTable = 7, "friction table value missing";
         /// The position controller of a joint is unstable (J-66).
         Unstable = 8, "unstable";
-        /// The encoder of a joint has jumped (J-35).
+        /// The measured position of a joint jumped (J-35).
         EncoderJump = 9, "encoder jump";
-        /// The position and the speed that a drive reports differ by a factor (J-35).
+        /// The position and the speed that a drive reports do not match: they differ by a factor (J-35).
         SpeedScale = 10, "speed scale";
-        /// An arm whose drives were enabled late was too far from the path, or its torque limits left too little torque for the approach
-        /// (J-34).
+        /// When the drives were enabled late, the arm was too far from the path, or the torque limits left too little torque for the
+        /// approach (J-34).
         Approach = 11, "approach";
-        /// A joint could not be held with new gains that were received under torque. The earlier gains are in use again (J-71).
+        /// New gains were received while the joints had torque, and a joint could not be held with these gains. The
+        /// controller uses the earlier gains again (J-71).
         Gains = 12, "gains";
-        /// A push on a joint, which was detected by its speed before its torque (J-66).
+        /// A push on a joint was detected by the joint speed before it was detected by the torque (J-66).
         Shove = 13, "shove";
     }
 }
@@ -44,16 +45,17 @@ codes! {
 pub struct StopCause {
     /// Kind of the cause.
     pub kind: StopKind,
-    /// First joint for which the cause was found, from 1; 0 if the cause does not belong to a joint.
+    /// Number of the first affected joint, from 1; 0 if the cause does not belong to a joint.
     pub joint: u8,
-    /// Value that was found, in the unit of its kind: N·m, rad, rad/s or rad/s². For [`StopKind::SpeedScale`] it is a factor.
+    /// Measured or commanded value that caused the stop, in the unit of its kind: N·m, rad, rad/s or rad/s². For
+    /// [`StopKind::SpeedScale`] it is a factor.
     pub value: f32,
     /// Limit of the value; 0 if the value has no limit.
     pub limit: f32,
 }
 
 impl StopKind {
-    /// Returns the unit of value and limit; empty if they have none.
+    /// Returns the unit of the value and the limit; empty if they have no unit.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Overload | Self::Push | Self::Unstable => "N·m",
@@ -64,7 +66,8 @@ impl StopKind {
         }
     }
 
-    /// Returns the kind for the first joint error that is a limit of the path. Position errors and torques are distinguished elsewhere.
+    /// Returns the kind that corresponds to the first joint error that is a limit of the path. Other code distinguishes
+    /// position errors and torques.
     pub const fn of_limit(joint_error: u16) -> Self {
         if joint_error & joint_error::POSITION != 0 {
             Self::Position
@@ -128,16 +131,16 @@ impl fmt::Display for StopCause {
 /// Reactions of the controller that are in progress, and the cause of its last held stop (J-69).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reactions {
-    /// Cause of the last held stop, and the time since that stop began, ms. `None` if no held stop has occurred since the start or the last
-    /// ClearOccurredErrors.
+    /// Cause of the last held stop, and the time since the start of that stop, in ms. `None` if no held stop has occurred since the start
+    /// or the last ClearOccurredErrors.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints that yield or lower their loads, a bit each.
+    /// Joints that yield to a push or lower their loads, one bit for each joint.
     pub yields: u8,
-    /// Joints whose encoder has jumped since their drives were configured, a bit each (J-35).
+    /// Joints whose encoder has jumped since their drives were configured, one bit for each joint (J-35).
     pub jumped: u8,
     /// Rate of path time, in seconds of path time per second.
     pub rate: f32,
-    /// Time for which the path has been held back in this run, ms (J-75).
+    /// Time for which the controller has held the path back in this run, in ms (J-75).
     pub held_back_ms: u32,
 }
 
@@ -159,7 +162,7 @@ impl Reactions {
         b
     }
 
-    /// Parses the reactions from the wire format. If this version does not know the kind, `stop` is `None`.
+    /// Parses the reactions from the wire format. If the kind is unknown to this version, `stop` is `None`.
     pub(super) fn parse(b: &[u8; REACTIONS_LEN]) -> Self {
         let word = |at: usize| {
             let bytes = b.get(at..).and_then(|bytes| bytes.first_chunk());

@@ -33,7 +33,7 @@ fn j52_an_info_comes_back_as_it_was_sent() {
     let frame = FrameRef::new_checked(&out[..n]).unwrap();
     assert_eq!(Answer::parse(frame), Some(Answer::Info(info())));
     assert_eq!((info().firmware(), info().revision()), ("0.1.0", "4334c10b6b9b1d2d"));
-    // Bytes that a later version adds are ignored. A body that is too short is not valid.
+    // Bytes that a later version of the extensions adds are ignored. A body that is too short is not valid.
     let body = [&info().emit()[..], &[1, 2, 3]].concat();
     assert_eq!(Info::parse(&body), Some(info()));
     assert_eq!(Info::parse(&body[..INFO_LEN - 1]), None);
@@ -48,7 +48,7 @@ fn j67_an_info_of_before_has_no_program() {
     assert_eq!(Info::parse(&body), Some(info));
     let before = Info { program: None, ..info };
     assert_eq!(Info::parse(&before.emit()), Some(before));
-    // An older device sends 136 bytes. A body that ends within the new bytes does not contain a program either.
+    // An older device sends a body of 136 bytes. If the body ends within the newer bytes, the parsed Info does not contain a program.
     for end in INFO_LEN..144 {
         assert_eq!(Info::parse(&body[..end]), Some(before), "{end}");
     }
@@ -72,7 +72,7 @@ fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
         shown.contains("last held stop 1.2 s ago: joint 2 was pushed: the controller held 61.5 N·m"),
         "{shown}"
     );
-    // One device does not report the reactions. Another one stopped for a cause that this version does not know.
+    // The first device does not report the reactions. The second device stopped for a cause that this version does not know.
     for end in INFO_LEN..INFO_WRITTEN {
         assert_eq!(Info::parse(&body[..end]).unwrap().reactions, None, "{end}");
     }
@@ -82,7 +82,7 @@ fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
     assert_eq!(Info::parse(&later).unwrap().reactions, Some(Reactions { stop: None, ..reactions }));
 }
 
-/// The text of every cause contains the joint or the event, and value and limit with their unit.
+/// The text of every cause contains the joint or the event, and the value and the limit with their unit.
 #[test]
 fn j69_every_cause_has_its_words() {
     for kind in StopKind::ALL {
@@ -137,7 +137,7 @@ fn j53_values_travel_whole() {
     assert_eq!(short, Err(EncodeError::BufferTooShort { needed: 16, given: 15 }));
 }
 
-/// The bytes are those of the examples on the protocol page.
+/// The bytes are those of the examples on the protocol documentation page.
 #[test]
 fn j50_requests_are_these_bytes() {
     assert_eq!(fixed::GET_INFO[..4], [0x9B, 0x40, 0, 6]);
@@ -152,7 +152,7 @@ fn j50_requests_are_these_bytes() {
     assert_eq!(value.emit(), [3, 6, 0xBF, 0xF8, 0, 0, 0, 0, 0, 0]);
 }
 
-/// The bytes are those of the examples on the protocol page.
+/// The bytes are those of the examples on the protocol documentation page.
 #[test]
 fn j56_a_page_of_the_log_is_these_bytes() {
     let page = LogPage {
@@ -177,7 +177,7 @@ fn j56_a_page_of_the_log_is_these_bytes() {
     assert!(Answer::Log(full).emit(&mut out).unwrap() <= 256);
 }
 
-/// The reference is the published test vector of FNV-1a, 64 bits.
+/// The expected value is the published test vector of 64-bit FNV-1a.
 #[test]
 fn j52_the_hash_is_fnv_1a() {
     assert_eq!(Hash::new().value(), 0xCBF2_9CE4_8422_2325);
@@ -185,7 +185,7 @@ fn j52_the_hash_is_fnv_1a() {
     assert_eq!(Hash::new().update(b"foo").update(b"bar").value(), 0x8594_4171_F739_67E8);
 }
 
-/// An image with `settings` values.
+/// Returns an image with `settings` values.
 fn image_bytes(table: bool, settings: u16) -> Vec<u8> {
     let mut bytes = b"JTCA".to_vec();
     bytes.extend([1, table.into()]);
@@ -233,8 +233,7 @@ proptest! {
         if let Some(frame) = FrameRef::new_checked(&bytes) {
             if let Some(answer) = Answer::parse(frame) {
                 let mut out = [0; ANSWER_MAX];
-                // An answer that can be parsed is encoded to the same bytes again, except for bytes that a later version may have added to
-                // an Info.
+                // Encoding a parsed answer gives the original bytes, except for bytes that a later version may have added to an Info.
                 if let Ok(n) = answer.emit(&mut out) && !matches!(answer, Answer::Info(_)) {
                     prop_assert_eq!(&out[..n], &bytes[..]);
                 }

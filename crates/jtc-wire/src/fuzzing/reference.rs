@@ -1,24 +1,24 @@
-//! A second stream parser. It is slow and sees the whole stream at once, so that its correctness is easy to verify.
+//! A second stream parser. This parser is slow and needs the complete stream, so its correctness is easy to verify.
 use std::vec::Vec;
 
 use crate::{FrameRef, FrameStatus, Response};
 
-/// An event of the stream.
+/// Event in the stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     /// Bytes of a valid frame.
     Frame(Vec<u8>),
-    /// A run of other bytes.
+    /// Run of bytes that do not belong to a valid frame.
     Bad(Response),
 }
 
-/// Returns the events of a stream. `regions`: the parts of the stream between gaps; `capacity`: length of the longest frame that fits into
-/// the buffer.
+/// Returns the events of a stream. `regions` are the parts of the stream between gaps; `capacity` is the length of the longest frame that
+/// fits into the buffer.
 pub fn events(regions: &[Vec<u8>], capacity: usize) -> Vec<Event> {
     placed_events(regions, capacity).into_iter().map(|(_, event)| event).collect()
 }
 
-/// Like `events`, with the position of the first byte of each event in the stream.
+/// Like `events`, and also returns the position of the first byte of each event in the stream.
 pub(super) fn placed_events(regions: &[Vec<u8>], capacity: usize) -> Vec<(u64, Event)> {
     let mut all = Vec::new();
     let mut begin = 0;
@@ -62,7 +62,7 @@ fn of_region(region: &[u8], capacity: usize) -> Vec<(usize, Event)> {
     found
 }
 
-/// Returns the length of the valid frame at the front.
+/// Returns the length of the valid frame at the start of the bytes.
 fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     let n = usize::from(u16::from_be_bytes([*bytes.get(2)?, *bytes.get(3)?]));
     let frame = FrameRef::new_checked(bytes.get(..n)?)?;
@@ -70,7 +70,7 @@ fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     (!of_device && n <= capacity).then_some(n)
 }
 
-/// Returns the record of bytes that do not begin with a valid frame and end at a gap.
+/// Returns the response record of bytes that do not begin with a valid frame and end at a gap.
 fn judge(bytes: &[u8], capacity: usize) -> Response {
     let record = |kind, status, length: usize| Response::bad(kind, status, length as u16);
     if bytes[0] != 0x9B {

@@ -1,5 +1,5 @@
-//! Streams that are generated from bytes: frames, damaged frames, false headers, noise and gaps, in pieces of any length and with a slow
-//! reader.
+//! Byte streams that are generated from the input: frames, damaged frames, false headers, noise and gaps. The bytes arrive in pieces of
+//! any length, and the reader is slow.
 use std::vec;
 use std::vec::Vec;
 
@@ -11,17 +11,17 @@ const INTER_BYTE_TIMEOUT_US: u64 = 5000;
 
 enum Step {
     Bytes(Vec<u8>),
-    /// Time without a byte, µs.
+    /// Time without bytes on the line, in µs.
     Silence(u64),
-    /// From now on each event is held for this number of pushes.
+    /// After this step, each event is released only after this number of pushes.
     Hold(u8),
-    /// From now on bytes arrive in pieces of this length.
+    /// After this step, bytes arrive in pieces of this length.
     Pieces(usize),
-    /// From now on `poll` is called either after each piece, or only when necessary.
+    /// After this step, `poll` is called either after each piece, or only when necessary.
     Lazy(bool),
 }
 
-/// Reads bytes one after another, and zeros after the end.
+/// Reads the bytes in order, and returns zeros after the end.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -43,7 +43,7 @@ impl<'a> Reader<'a> {
             }
         }
     }
-    /// Returns a valid frame whose body repeats some bytes.
+    /// Returns a valid frame whose body is filled with a repeated byte sequence.
     fn frame(&mut self) -> Vec<u8> {
         let kind = self.kind();
         let n = body_len(kind, self.byte());
@@ -53,7 +53,7 @@ impl<'a> Reader<'a> {
     }
     fn step(&mut self) -> Step {
         Step::Bytes(match self.byte() % 16 {
-            // A byte of 0 gives exactly a gap, because 200 µs have already passed.
+            // A value of 0 gives exactly a gap, because 200 µs have already passed.
             0 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 200 + u64::from(self.byte()) * 100),
             1 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 201),
             2 => return Step::Hold(self.byte() % 40),
@@ -87,7 +87,7 @@ impl<'a> Reader<'a> {
             }
             12 => [HEADER].repeat(self.byte().into()),
             13 => {
-                // Frames inside a Trajectory frame, which may be damaged.
+                // Frames in the body of a Trajectory frame, which may be damaged.
                 let mut body: Vec<u8> = (0..4).flat_map(|_| self.frame()).collect();
                 body.resize(8 + body.len().next_multiple_of(36), self.byte());
                 let mut frame = sealed(FrameType::Trajectory as u8, &body);
@@ -98,7 +98,7 @@ impl<'a> Reader<'a> {
             14 => [self.byte()].repeat(usize::from(self.byte()) * 20),
             _ => match self.byte() {
                 kind @ 0..16 => {
-                    // A Stop or a Pause, repeated a few times. The last one is cut off.
+                    // A Stop or a Pause that is repeated a few times. The last repetition is cut off.
                     let frame = if kind % 2 == 0 { fixed::STOP } else { fixed::PAUSE };
                     let mut frames = frame.repeat(usize::from(kind / 2) + 1);
                     frames.truncate(frames.len() - usize::from(self.byte() % 8));
@@ -117,15 +117,15 @@ struct Driver {
     /// Time of the last byte, µs.
     last: u64,
     hold: u8,
-    /// Number of pushes until the present event is released.
+    /// Number of pushes until the current event is released.
     held: u8,
     piece: usize,
     lazy: bool,
     found: Vec<(u64, Event)>,
     watch: UrgentWatch<1>,
-    /// Time of the watch, which receives bytes when they arrive, even if the reader is slow.
+    /// Time of the watch, which receives the bytes as soon as they arrive, even if the reader is slow.
     arrived_us: u64,
-    /// Positions at which Stops and Pauses have ended.
+    /// Stream positions at which a Stop or a Pause ended.
     urgent: Vec<u64>,
     urgent_count: usize,
     bytes: usize,
@@ -170,7 +170,8 @@ impl Driver {
         }
     }
 
-    /// Feeds the watch with the same pieces as the reader. The watch must find the same commands as in the whole stream.
+    /// Passes the same pieces to the watch as to the reader. The watch must find the same commands as the reference
+    /// finds in the complete stream.
     fn watch(&mut self, bytes: &[u8]) {
         self.arrived_us +=
             if self.now - self.last >= INTER_BYTE_TIMEOUT_US { INTER_BYTE_TIMEOUT_US } else { 0 };
@@ -182,7 +183,7 @@ impl Driver {
             let ends: Vec<u64> = (before + 1..=before + piece.len() as u64)
                 .filter(|end| self.watch.overtaken(0, end - 1))
                 .collect();
-            // Only the last command determines the overtaken position; the others are only counted.
+            // Only the last command determines the overtaken position; the earlier commands are only counted.
             self.urgent.extend(ends.last().filter(|_| count > 0));
             self.urgent_count += count;
         }
@@ -197,7 +198,7 @@ impl Driver {
             bytes = &bytes[taken..];
             self.bytes += taken;
             if taken < piece.len() {
-                // If the reader was slow for longer than a gap, the frame must not be split.
+                // If the reader was delayed by more than a gap, the frame must still not be split.
                 self.now += 2 * INTER_BYTE_TIMEOUT_US;
                 let before = self.found.len();
                 self.drain();
@@ -221,7 +222,7 @@ pub fn stream_regions(data: &[u8]) -> Vec<Vec<u8>> {
     let mut reader = Reader(data);
     reader.byte();
     let mut regions = vec![Vec::new()];
-    // Time since the last byte, µs.
+    // Time since the last byte, in µs.
     let mut silence = 200;
     while !reader.0.is_empty() && regions.iter().map(Vec::len).sum::<usize>() < 150_000 {
         match reader.step() {
@@ -240,8 +241,8 @@ pub fn stream_regions(data: &[u8]) -> Vec<Vec<u8>> {
     regions
 }
 
-/// Runs a script. The first byte selects the size of the buffer; the steps follow. The receiver must find the same events as the reference
-/// parser finds in the whole stream.
+/// Runs a script. The first byte selects the size of the buffer; the bytes after it are the steps. The receiver must find the same events
+/// as the reference parser finds in the complete stream.
 pub fn stream_parser(data: &[u8]) {
     const CAPACITY: [usize; 5] = [64, 256, 1500, 11_000, crate::FRAME_MAX];
     let mut reader = Reader(data);

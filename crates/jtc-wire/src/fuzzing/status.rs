@@ -1,11 +1,12 @@
-//! Streams of statuses of all layouts, damaged statuses and noise.
+//! Streams of statuses in all layouts, damaged statuses and noise.
 use std::format;
 use std::vec::Vec;
 
 use super::sealed;
 use crate::{Answer, FrameRef, FrameType, Status, StatusReceiver};
 
-/// Returns the statuses of a whole stream, each at the first position at which a status begins, and the number of bytes between them.
+/// Returns the statuses of a complete stream, each at the first position at which a status begins, and the number of
+/// bytes between the statuses.
 fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     let (mut found, mut skipped, mut at) = (Vec::new(), 0, 0);
     while at < stream.len() {
@@ -32,7 +33,7 @@ fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     (found, skipped)
 }
 
-/// Runs a script. The first byte is the length of the pieces; the steps follow: statuses generated from some bytes, damaged statuses, and
+/// Runs a script. The first byte is the length of the pieces. The steps follow: statuses generated from some bytes, damaged statuses, and
 /// noise.
 pub fn status_stream(data: &[u8]) {
     let Some((piece, mut rest)) = data.split_first() else { return };
@@ -59,7 +60,7 @@ pub fn status_stream(data: &[u8]) {
             _ => stream.extend(bytes),
         }
     }
-    // With these bytes the receiver can decide about a candidate at the end.
+    // After these bytes, the receiver can decide whether a candidate at the end of the stream is valid.
     stream.extend([0; 256]);
 
     let mut receiver = StatusReceiver::new();
@@ -76,7 +77,7 @@ pub fn status_stream(data: &[u8]) {
         assert!(piece.is_empty());
     }
     let (expected, skipped) = reference(&stream);
-    // Compares bytes, because a NaN does not equal itself.
+    // Compares the bytes, because a NaN is not equal to itself.
     let bytes = |all: &[Status]| all.iter().map(|s| (s.emit(), s.gripper.is_some())).collect::<Vec<_>>();
     assert_eq!(bytes(&found), bytes(&expected));
     assert_eq!(receiver.counters().frames, expected.len() as u64);

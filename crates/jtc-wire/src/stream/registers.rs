@@ -1,4 +1,4 @@
-//! CRC registers that are stored along the receive buffer, so that a candidate of any length can be checked with two of them.
+//! CRC registers that are stored along the receive buffer, so that the CRC of a candidate of any length needs only two of them.
 use crate::crc::crc16_update;
 use crate::frame::FRAME_MAX;
 
@@ -7,7 +7,7 @@ const GRID: usize = 64;
 /// Number of stored CRC registers.
 const REGISTERS: usize = FRAME_MAX.div_ceil(GRID) + 1;
 
-/// CRC registers along the buffer: before its first byte, and before the bytes `phase`, `phase + 64`, …
+/// CRC registers along the buffer: the register before the first byte, and the registers before the bytes `phase`, `phase + 64`, …
 pub(super) struct Registers {
     base: u16,
     last: u16,
@@ -46,7 +46,7 @@ impl Registers {
         }
     }
 
-    /// Removes the bytes before `by`.
+    /// Removes the first `by` bytes.
     pub(super) fn shift(&mut self, by: usize, buffer: &[u8]) {
         self.base = self.at(by, buffer);
         if by >= self.phase {
@@ -66,7 +66,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Bytes arrive in pieces, and some are removed from the front now and then.
+    /// Bytes arrive in pieces, and bytes are sometimes removed from the front.
     fn steps() -> impl Strategy<Value = Vec<(Vec<u8>, Option<prop::sample::Index>)>> {
         let piece = prop::collection::vec(any::<u8>(), 0..200);
         prop::collection::vec((piece, any::<Option<prop::sample::Index>>()), 1..12)
@@ -75,8 +75,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// At every position the register equals that of the whole stream. Fewer than `GRID` bytes must suffice to compute it, so the test
-        /// overwrites the older ones.
+        /// At every position, the register equals the register of the complete stream. Fewer than `GRID` bytes must suffice to compute the
+        /// register, so the test overwrites the older bytes.
         #[test]
         fn any_register_from_a_few_bytes(steps in steps()) {
             let (mut registers, mut gone, mut held) = (Registers::new(), Vec::new(), Vec::new());

@@ -1,9 +1,9 @@
-//! The device's parser at its limits: no bytes, a full buffer, and the work of a call.
+//! Tests of the stream parser of the device at its limits: no bytes, a full buffer, and the work of a call.
 use jtc_wire::{FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, fixed};
 
 use super::{INTER_BYTE_TIMEOUT_US, ON, receiver};
 
-/// A call without bytes does not extend the life of half a frame: its time runs on.
+/// A call without bytes does not reset the timeout of an incomplete frame.
 #[test]
 fn j03_no_bytes_end_no_silence() {
     let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
@@ -66,7 +66,7 @@ fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
     assert_ne!(place(&receiver), before);
 }
 
-/// A call of `poll` skips at most 2,048 bytes, so that it does not delay a tick (J-07).
+/// One call of `poll` skips at most 2,048 bytes, so it does not delay a tick (J-07).
 #[test]
 fn j07_noise_is_passed_over_in_bounded_steps() {
     let mut receiver = receiver();

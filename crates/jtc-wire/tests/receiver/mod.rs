@@ -1,4 +1,4 @@
-//! The stream parser of the device.
+//! Tests of the stream parser of the device.
 
 mod bounds;
 mod held;

@@ -1,4 +1,4 @@
-//! Tests of the device's stream parser, each of which is a sequence of bytes, silences and events.
+//! Tests of the stream parser of the device; each test is a sequence of bytes, silences and events.
 use jtc_wire::{
     Command, DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, HEADER, KNOWN_US, LinkEvent, Receiver,
     crc16, fixed,
@@ -6,12 +6,12 @@ use jtc_wire::{
 
 use super::{ON, receiver, segment};
 
-/// An event in a short form.
+/// Event in a short form.
 #[derive(Debug, PartialEq)]
 enum Received {
     Good(FrameType, usize),
     Bad(u8, FrameStatus, u16),
-    /// A run without a header.
+    /// Run of bytes without a header.
     Noise(FrameStatus, u16),
 }
 use FrameStatus::*;
@@ -27,7 +27,7 @@ impl Line {
         Line { receiver: receiver(), now: 1_000_000 }
     }
 
-    /// Sends all bytes at once and returns their events.
+    /// Sends all bytes in one call and returns their events.
     fn send(&mut self, bytes: &[u8]) -> Vec<Received> {
         self.now += 100;
         assert_eq!(self.receiver.push(self.now, bytes), bytes.len());
@@ -87,7 +87,7 @@ fn j03_several_frames_in_one_piece() {
 #[test]
 fn j02_the_longest_frame() {
     let mut line = Line::new();
-    // A frame before the longest one leaves too little space at the end of the buffer.
+    // A frame before the longest frame leaves too little space at the end of the buffer.
     assert_eq!(line.send(&ON), [GOOD_ON]);
     let frame = segment(1666);
     assert_eq!(line.send(&frame), [Good(FrameType::Trajectory, 59_990)]);
@@ -119,7 +119,8 @@ fn j05_frame_type() {
     }
 }
 
-/// This also covers D16 of the old device: a frame whose length its type cannot have is never executed, even if the CRC is right.
+/// The test also covers D16 of the old device: a frame whose length is not permitted for its type is never executed,
+/// even if the CRC is correct.
 #[test]
 fn j05_length_of_another_type() {
     let mut line = Line::new();
@@ -163,7 +164,7 @@ fn j05_gap() {
         line.send(piece);
     }
     assert_eq!(line.send(&ON), [GOOD_ON], "the frame was received in the loop");
-    // The type is not known yet.
+    // At this point, the type is still unknown.
     assert_eq!(line.send(&ON[..1]), []);
     assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
 }
@@ -181,7 +182,7 @@ fn j05_gap_seen_with_the_next_bytes() {
     }
 }
 
-/// D15 of the old device: a glitch of two bytes, and lengths of 0 and 1.
+/// D15 of the old device: a glitch of two bytes, and length fields of 0 and 1.
 #[test]
 fn j07_glitches() {
     let mut line = Line::new();
@@ -194,7 +195,7 @@ fn j07_glitches() {
 #[test]
 fn j03_a_false_header_costs_no_frame() {
     let mut line = Line::new();
-    // The header announces 59,990 bytes. The bytes that follow are taken as its body, until a gap.
+    // The header announces 59,990 bytes. The following bytes are treated as its body until a gap.
     assert_eq!(line.send(&[HEADER, 0x04, 0xEA, 0x56]), []);
     assert_eq!(line.send(&ON), []);
     assert_eq!(line.send(&fixed::STOP), []);
@@ -212,7 +213,7 @@ fn j03_a_false_header_that_fills_up_costs_no_frame() {
     assert!(received[1..].iter().all(|h| *h == GOOD_ON));
 }
 
-/// A frame with a lost byte is followed by the complete frame without a gap.
+/// A frame that lost a byte is followed, without a gap, by the complete frame.
 #[test]
 fn j03_a_lost_byte_costs_only_its_frame() {
     let frame = segment(10);
@@ -250,10 +251,11 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
 }
 
-/// A line becomes plain 2 s after an extension request. The time of a frame is that of its first byte, whatever its length is.
+/// A line becomes plain 2 s after an extension request. The time of its first byte counts as the time of a frame,
+/// whatever the length of the frame is.
 #[test]
 fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame() {
-    // Returns for each complete frame whether the line was plain.
+    // Returns a flag for each complete frame: true if the line was plain.
     let plain = |line: &mut Line, bytes: &[u8]| -> Vec<bool> {
         assert_eq!(line.receiver.push(line.now, bytes), bytes.len());
         let mut all = Vec::new();
@@ -272,11 +274,11 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
     for (after_us, is_plain) in
         [(0, false), (1_000, false), (KNOWN_US, false), (KNOWN_US + 1, true), (60_000_000, true)]
     {
-        // The request itself shows that its client knows the extensions.
+        // The request itself proves that its client knows the extensions.
         assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
         line.now += after_us;
         assert_eq!(plain(&mut line, &fixed::STOP), [is_plain], "{after_us} \u{b5}s");
-        // The first byte decides. A frame of 4.7 s at 115 200 Bd ends much later.
+        // The time of the first byte decides. A frame that takes 4.7 s at 115 200 Bd ends much later.
         assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
         line.now += after_us;
         let long = segment(1_500);
@@ -289,7 +291,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
             .collect();
         assert_eq!(all, [after_us + 4_000 > KNOWN_US]);
     }
-    // Requests that are damaged, cut off or only look like one have no effect; valid requests do.
+    // Damaged or cut-off requests, and bytes that only look like a request, have no effect; valid requests have an effect.
     for (bytes, shows) in [
         (&fixed::GET_INFO[..], true),
         (&fixed::DISABLE, true),
@@ -305,7 +307,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
         line.now += 10_000;
         assert_eq!(plain(&mut line, &fixed::STOP), [!shows], "{bytes:x?}");
     }
-    // The same after noise, and after other frames in the same piece.
+    // Like the check above, but after noise and after other frames in the same piece.
     let mut line = Line::new();
     let bytes =
         [&[7, 7, 0x9B][..], &fixed::STOP, &fixed::GET_INFO, &fixed::STOP, &segment(500), &ON].concat();

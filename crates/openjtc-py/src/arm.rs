@@ -1,4 +1,4 @@
-//! Arm: kinematics, masses, limits, gains, friction, named poses.
+//! Arm model: kinematics, masses, limits, gains, friction and named poses.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::array;
 use crate::error::{Failure, in_python};
 
-/// An arm as described by a file. The object does not change.
+/// Arm model that was loaded from a file. The object is immutable.
 #[pyclass(frozen, module = "openjtc")]
 pub(crate) struct Arm {
     pub inner: Arc<HostArm>,
@@ -27,7 +27,7 @@ impl Arm {
 
 #[pymethods]
 impl Arm {
-    /// Loads a TOML or URDF file. The content of the file shows which of the two it is.
+    /// Loads a TOML or URDF file. The content of the file determines which of the two formats is read.
     #[staticmethod]
     fn load(path: PathBuf) -> Result<Self, Failure> {
         Ok(Self::of(HostArm::load(&path)?))
@@ -39,7 +39,7 @@ impl Arm {
         Ok(Self::of(HostArm::parse(text)?))
     }
 
-    /// Imports a robot description. Values for missing data are proposed and marked.
+    /// Imports a robot description. For missing data, the import proposes values and marks them.
     #[staticmethod]
     #[pyo3(signature = (path, joints=None, tip=None))]
     fn import_urdf(path: PathBuf, joints: Option<Vec<String>>, tip: Option<String>) -> Result<Self, Failure> {
@@ -62,7 +62,7 @@ impl Arm {
         self.inner.joint_names.iter().map(String::as_str).collect()
     }
 
-    /// Named joint positions, rad.
+    /// Named poses: joint positions in rad.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let poses = PyDict::new(py);
@@ -111,7 +111,7 @@ impl Arm {
         self.inner.polynomial.as_ref().map(|all| array::wide(py, all))
     }
 
-    /// Inertia of each drive's rotor at the joint (6,), kg·m².
+    /// Inertia of the rotor of each drive, referred to the joint (6,), kg·m².
     #[getter]
     fn rotor_inertia<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.inner.config().joints.each_ref().map(|j| j.rotor_inertia))
@@ -129,13 +129,13 @@ impl Arm {
         PyArray1::from_slice(py, &self.inner.config().gravity)
     }
 
-    /// Notes on data of the file that was not used, filled in or proposed.
+    /// Notes on data of the file that was ignored, completed or proposed.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.inner.warnings.iter().map(ToString::to_string).collect()
     }
 
-    /// Returns the findings of `jtc arm check`: severity, what, why, next.
+    /// Returns the findings of `jtc arm check`: the severity, finding, reason and next step of each.
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let list = PyList::empty(py);
         for found in self.inner.check().findings {
@@ -147,17 +147,17 @@ impl Arm {
         Ok(list)
     }
 
-    /// Returns the arm as an arm file, TOML.
+    /// Returns the arm as the text of an arm file, TOML.
     fn to_toml(&self) -> String {
         self.inner.to_toml()
     }
 
-    /// Returns the arm as a robot description, URDF.
+    /// Returns the arm as the text of a robot description, URDF.
     fn to_urdf(&self) -> String {
         self.inner.to_urdf()
     }
 
-    /// Saves a pose in an arm file, and keeps the comments and the order of the file.
+    /// Saves a pose in an arm file, without changing the comments and the order of the file.
     #[staticmethod]
     #[pyo3(signature = (path, name, position, force=false))]
     fn save_pose(path: PathBuf, name: &str, position: &Bound<'_, PyAny>, force: bool) -> Result<(), Failure> {

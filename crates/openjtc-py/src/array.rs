@@ -1,5 +1,4 @@
-//! Converts numpy arrays to arrays of joints, and back. An array has one row per state and one column per joint, base
-//! to wrist.
+//! Converts numpy arrays to arrays of joint values, and back. An array has one row per state and one column per joint, base to wrist.
 
 use jtc_core::JOINTS;
 use jtc_host::error::Facts;
@@ -28,7 +27,7 @@ pub(crate) fn floats<'py>(
     })
 }
 
-/// Reads six finite numbers, base to wrist. `what` describes them in the error.
+/// Reads six finite numbers, base to wrist. `what` is the name of the numbers in the error.
 pub(crate) fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Failure> {
     let array = floats(value, what)?;
     let numbers = array.as_slice().ok().and_then(|all| <[f64; JOINTS]>::try_from(all).ok());
@@ -40,7 +39,7 @@ pub(crate) fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINT
     Ok(numbers)
 }
 
-/// Reads rows of six finite numbers. The flag is `true` for one row without a second dimension.
+/// Reads rows of six finite numbers. The flag is `true` if the value was a single row without a second dimension.
 pub(crate) fn rows(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<[f64; JOINTS]>, bool), Failure> {
     let array = floats(value, what)?;
     let shape = array.shape().to_vec();
@@ -83,7 +82,7 @@ pub(crate) fn wide<'py, const M: usize>(py: Python<'py>, rows: &[[f64; M]]) -> B
     flat.reshape([rows.len(), M]).unwrap_or_else(|_| PyArray2::zeros(py, [rows.len(), M], false))
 }
 
-/// Makes a (6,) array if the input was one row, else an (N, 6) array.
+/// Makes a (6,) array if the input was a single row, else an (N, 6) array.
 pub(crate) fn as_given<'py>(py: Python<'py>, rows: &[[f64; JOINTS]], one: bool) -> Bound<'py, PyAny> {
     match rows {
         [row] if one => PyArray1::from_slice(py, row).into_any(),

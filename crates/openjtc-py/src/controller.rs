@@ -1,4 +1,4 @@
-//! The real control code, one tick per call.
+//! The real control code of the board; each call runs one tick.
 
 use jtc_bus::{Format, Frame};
 use jtc_core::{BusState, Config};
@@ -12,38 +12,38 @@ use crate::arm::Arm;
 use crate::error::Failure;
 use crate::telemetry::Telemetry;
 
-/// Frame of the joint bus in the form of Python.
+/// Frame of the joint bus as Python passes it.
 pub(crate) type PyFrame<'py> = (u16, Bound<'py, PyBytes>);
 
 /// Outputs of a tick: frame for the bus, bytes for the host, safety output, and `true` if the watchdog reset the controller.
 type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool);
 
-/// Converts a frame of the joint bus from Python.
+/// Converts a joint bus frame from Python.
 pub(crate) fn frame(id: u32, data: &[u8]) -> Result<Frame, Failure> {
     Frame::received(id, Format::BUS, data).map_err(|error| Failure::usage(error.to_string()))
 }
 
-/// Converts a frame of the joint bus to Python.
+/// Converts a joint bus frame to Python.
 pub(crate) fn to_python<'py>(py: Python<'py>, frame: &Frame) -> PyFrame<'py> {
     (frame.id, PyBytes::new(py, frame.data()))
 }
 
-/// Returns the settings of a controller for an arm, and the stored image of the arm. Without an arm, returns the settings of a
-/// new controller.
+/// Returns the controller settings for an arm, and the image of the arm for the memory of the controller. Without an arm,
+/// returns the settings of a new controller and no image.
 pub(crate) fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failure> {
     let Some(arm) = arm else { return Ok((Config::avena(), None)) };
     let image = arm.image().map_err(|error| Failure::usage(error.to_string()))?;
-    // With an image, the controller reads all data from the image, like on a board. Without an image, it only has the limits and waits
-    // for parameters.
+    // With an image, the controller reads all data from the image, as on a board. Without an image, the controller has only the limits
+    // and waits for parameters.
     Ok(if image.is_some() { (Config::avena(), image) } else { (arm.config(), None) })
 }
 
-/// Controller on its board. Time advances only with its ticks.
+/// Controller on its board. The time of the board advances only when a tick runs.
 #[pyclass(module = "openjtc._native")]
 pub(crate) struct Controller {
     board: Board,
     now_us: u64,
-    /// Level of the safety output pin. A missing tick does not change it.
+    /// Level of the safety output pin. If a tick is missing, the level does not change.
     safety_output: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Dynamics and kinematics of an arm, for many states in one call.
+//! Dynamics and kinematics of an arm; each call handles many states.
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use crate::arm::Arm;
 use crate::array;
 use crate::error::Failure;
 
-/// Payload from Python: mass, centre of mass, inertia.
+/// Payload as Python passes it: mass, centre of mass, inertia.
 pub(crate) type PayloadNumbers = (f64, [f64; 3], [f64; 6]);
 
-/// Makes a payload, or returns an error if it is not physically consistent.
+/// Makes a payload; returns an error if the values are not physically consistent.
 pub(crate) fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failure> {
     let Some((mass, com, inertia)) = numbers else { return Ok(Payload::NONE) };
     let payload = Payload { mass, com, inertia };
@@ -25,7 +25,7 @@ pub(crate) fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failur
     Ok(payload)
 }
 
-/// Dynamics of one arm. The object does not change.
+/// Dynamics of one arm. The object is immutable.
 #[pyclass(frozen, module = "openjtc._native")]
 pub(crate) struct Dynamics {
     arm: Arc<HostArm>,
@@ -56,7 +56,7 @@ impl Dynamics {
         })
     }
 
-    /// Computes joint torques of the rigid bodies.
+    /// Computes the joint torques of the rigid-body model.
     fn inverse<'py>(
         &self,
         py: Python<'py>,
@@ -69,7 +69,7 @@ impl Dynamics {
         Ok(array::as_given(py, &torques, states.one))
     }
 
-    /// Computes joint accelerations. `rotors`: include the rotor inertias of the arm.
+    /// Computes joint accelerations. If `rotors` is set, the torques include the rotor inertias of the arm.
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -91,7 +91,7 @@ impl Dynamics {
         Ok(array::as_given(py, &torques, states.one))
     }
 
-    /// Computes mass matrices without rotors.
+    /// Computes mass matrices without rotor inertias.
     fn mass_matrix<'py>(
         &self,
         py: Python<'py>,
@@ -102,7 +102,7 @@ impl Dynamics {
         shaped(py, matrices.as_flattened().as_flattened(), states.one, states.count, &[JOINTS, JOINTS])
     }
 
-    /// Computes poses of the six joint frames and the flange, 4×4 each.
+    /// Computes the poses of the six joint frames and of the flange, as 4×4 matrices.
     fn frames<'py>(
         &self,
         py: Python<'py>,
@@ -114,7 +114,7 @@ impl Dynamics {
         shaped(py, flat, states.one, states.count, &[JOINTS + 1, 4, 4])
     }
 
-    /// Computes poses of the flange, 4×4 each.
+    /// Computes poses of the flange, as 4×4 matrices.
     fn forward_kinematics<'py>(
         &self,
         py: Python<'py>,
@@ -136,7 +136,7 @@ impl Dynamics {
         shaped(py, jacobians.as_flattened().as_flattened(), states.one, states.count, &[6, JOINTS])
     }
 
-    /// Computes joint positions for poses of the flange. Each is the solution that is nearest to `near`.
+    /// Computes joint positions for poses of the flange. Each result is the solution that is nearest to `near`.
     fn inverse_kinematics<'py>(
         &self,
         py: Python<'py>,
@@ -182,7 +182,7 @@ impl Dynamics {
         Ok(array::matrix(py, &all).into_any())
     }
 
-    /// Computes the friction torques at these velocities that the controller compensates.
+    /// Computes the friction torques that the controller compensates at these velocities.
     fn friction<'py>(
         &self,
         py: Python<'py>,
@@ -223,11 +223,11 @@ impl Dynamics {
     }
 }
 
-/// Arguments of many states: each argument has one row for every state, or one row for all states.
+/// Arguments for many states: each argument has one row for every state, or a single row for all states.
 struct States<const K: usize> {
     columns: [Vec<JointVec>; K],
     count: usize,
-    /// `true` if every argument was one row without a second dimension.
+    /// `true` if every argument was a single row without a second dimension.
     one: bool,
 }
 
@@ -244,7 +244,7 @@ impl<const K: usize> States<K> {
         Ok(Self { columns, count, one: shapes.iter().all(|(_, _, one)| *one) })
     }
 
-    /// Computes a value for each state while other Python threads run.
+    /// Computes a value for each state; other Python threads can run meanwhile.
     fn map<T: Send>(&self, py: Python<'_>, of: impl Fn([&JointVec; K]) -> T + Sync) -> Vec<T> {
         py.detach(|| {
             (0..self.count).map(|k| of(self.columns.each_ref().map(|column| pick(column, k)))).collect()
@@ -257,7 +257,7 @@ fn pick<T>(rows: &[T], k: usize) -> &T {
     if let [row] = rows { row } else { &rows[k] }
 }
 
-/// Returns the common number of states of these arguments.
+/// Returns the number of states, which must be the same for all arguments.
 fn common<const K: usize>(shapes: [(&'static str, usize, bool); K]) -> Result<usize, Failure> {
     let many = shapes.iter().find(|(_, _, one)| !one);
     let Some(&(first, count, _)) = many else { return Ok(1) };
@@ -270,7 +270,7 @@ fn common<const K: usize>(shapes: [(&'static str, usize, bool); K]) -> Result<us
     }
 }
 
-/// Makes an array of `count` values of the shape `inner`. If `one` is set, the array has no first dimension.
+/// Makes an array of `count` values of the shape `inner`. If `one` is set, the array does not have the first dimension.
 fn shaped<'py>(
     py: Python<'py>,
     flat: &[f64],
@@ -292,7 +292,7 @@ fn homogeneous(pose: &Pose) -> [[f64; 4]; 4] {
     [x, y, z, [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Reads poses from 4×4 matrices. The flag is `true` for one matrix without a third dimension.
+/// Reads poses from 4×4 matrices. The flag is `true` if the value was a single matrix without a third dimension.
 fn poses(value: &Bound<'_, PyAny>) -> Result<(Vec<Pose>, bool), Failure> {
     let array = array::floats(value, "pose")?;
     let shape = array.shape().to_vec();

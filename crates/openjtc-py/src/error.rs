@@ -1,4 +1,4 @@
-//! Errors of the libraries as Python exceptions, with all their facts.
+//! Library errors as Python exceptions, with all their details.
 
 use std::ops::{Deref, DerefMut};
 
@@ -7,7 +7,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Failure that becomes an exception in Python.
+/// Failure that is raised as an exception in Python.
 #[derive(Clone, Debug)]
 pub struct Failure(host_kit::Failure);
 
@@ -17,7 +17,7 @@ impl Failure {
         Self(host_kit::Failure::of(error))
     }
 
-    /// Makes a failure of a kind.
+    /// Makes a failure of the given kind.
     pub fn new(kind: ErrorKind, code: &'static str, message: impl ToString) -> Self {
         Self(host_kit::Failure::new(kind, code, message))
     }
@@ -27,7 +27,7 @@ impl Failure {
         Self(host_kit::Failure::usage(message))
     }
 
-    /// Makes a failure for a request that a check refused before any action.
+    /// Makes a failure for a request that a check refused before any action was started.
     pub fn refused(code: &'static str, message: impl ToString, next: impl Into<Next>) -> Self {
         Self::new(ErrorKind::Refused, code, message).next(next)
     }
@@ -37,7 +37,7 @@ impl Failure {
         Self::new(ErrorKind::Fault, code, message).next(next)
     }
 
-    /// Sets the next step that helps.
+    /// Sets the next step that is proposed to the user.
     pub fn next(self, next: impl Into<Next>) -> Self {
         Self(self.0.next(next))
     }
@@ -74,7 +74,7 @@ impl<E: Diagnose> From<E> for Failure {
     }
 }
 
-/// Returns a next step in terms of Python. Commands of `ucom` stay as they are typed.
+/// Returns a next step in which commands are replaced by Python calls. Commands of `ucom` are not replaced.
 pub(crate) fn in_python(next: &Next) -> String {
     let text = next.sentence(FrontEnd::Python);
     if text.contains("`ucom ") { text.replace('`', "") } else { text }

@@ -21,7 +21,7 @@ mod wire;
 
 use pyo3::prelude::*;
 
-/// Compiled part of the package `openjtc`; users import the Python modules.
+/// Compiled part of the package `openjtc`; users import the Python modules instead.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -1,4 +1,4 @@
-//! Flight recorder: every tick of the last seconds before the first error, replayed.
+//! Log of the flight recorder: every tick of the last seconds before the first error, which can be replayed.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use crate::error::Failure;
 use crate::run::Samples;
 
-/// Log that was read from a controller.
+/// Flight recorder log that was read from a controller.
 #[pyclass(frozen, module = "openjtc._native")]
 pub(crate) struct FlightLog {
     account: Account,
@@ -23,25 +23,25 @@ impl FlightLog {
 
 #[pymethods]
 impl FlightLog {
-    /// Timeline in words, beginning with the first failure.
+    /// Timeline as text, beginning with the first failure.
     #[getter]
     fn story(&self) -> Vec<String> {
         self.account.story.lines()
     }
 
-    /// Number of ticks, and number of ticks that the replay with the same program reproduced bit for bit.
+    /// Number of ticks in the log, and number of ticks that the replay with the same program reproduced bit for bit.
     #[getter]
     fn replayed(&self) -> (usize, usize) {
         (self.account.replayed.ticks.len(), self.account.replayed.same)
     }
 
-    /// State of the recorder: recording, or the reason why it has stopped.
+    /// State of the recorder: recording, or the reason why the recorder has stopped.
     #[getter]
     fn state(&self) -> &'static str {
         self.account.log.state.name()
     }
 
-    /// Returns a sample for each tick.
+    /// Returns one sample for each tick.
     fn samples(&self) -> Samples {
         crate::robot::samples_of(&self.account)
     }

@@ -1,5 +1,4 @@
-//! Range checks of numbers from Python: a number out of range gives an error with value and limit, and is never changed
-//! silently.
+//! Range checks of numbers from Python. A number out of range gives an error with value and limit; a number is never changed silently.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -8,7 +7,7 @@ use host_kit::Facts;
 
 use crate::error::Failure;
 
-/// Returns the number if it is in this range, else an error. `what` and `unit` describe the number in the error.
+/// Returns the number if it is in this range, else an error. `what` and `unit` are the name and the unit of the number in the error.
 pub(crate) fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) -> Result<f64, Failure> {
     if range.contains(&value) {
         return Ok(value);
@@ -27,8 +26,8 @@ pub(crate) fn seconds(value: f64, most: f64, what: &str) -> Result<Duration, Fai
     within(value, 0.0..=most, what, "s").map(Duration::from_secs_f64)
 }
 
-/// Returns a timeout from seconds. A negative number means no wait. A number that is too large for the clock means a
-/// wait without limit.
+/// Converts seconds to a timeout. A negative number gives a timeout of zero. If the number is too large for the
+/// clock, the wait has no limit.
 pub(crate) fn timeout(value: f64, what: &str) -> Result<Duration, Failure> {
     if value.is_nan() {
         return seconds(value, f64::INFINITY, what);

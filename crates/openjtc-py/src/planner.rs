@@ -1,4 +1,4 @@
-//! Planning of motions from poses and waypoints, and the check that guards each upload.
+//! Planning of motions from poses and waypoints, and the check that every trajectory must pass before upload.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::run::Samples;
 use crate::trajectory::Trajectory;
 use crate::{array, json};
 
-/// Converts a verdict to plain values, with refusals and warnings in words.
+/// Converts the result of the trajectory check to plain values, with refusals and warnings as text.
 pub(crate) fn verdict<'py>(py: Python<'py>, verdict: &Verdict) -> PyResult<Bound<'py, PyAny>> {
     let all = json::plain(py, verdict)?;
     all.set_item("ok", verdict.is_ok())?;
@@ -53,7 +53,7 @@ impl Plan {
         PyArray1::from_slice(py, &self.planned.waypoint_times)
     }
 
-    /// Returns the time spans in which a joint is at a limit.
+    /// Returns the time intervals in which a joint is at a limit.
     fn binding<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
         json::plain(py, &self.planned.binding)
     }
@@ -67,7 +67,7 @@ impl Plan {
         verdict(py, &self.planned.verdict)
     }
 
-    /// Returns the commanded values of each point, with the torques.
+    /// Returns the commanded values of each point, including the torques.
     fn samples(&self) -> Samples {
         let Planned { binding, notes, .. } = &self.planned;
         Samples::of_plan(self.info.clone(), self.samples.clone(), binding.clone(), notes.clone())
@@ -89,7 +89,7 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    /// Returns the blend of the call, or else the planner's blend.
+    /// Returns the blend that was passed to the call, or else the blend of the planner.
     fn blend(&self, given: Option<f64>) -> Result<f64, Failure> {
         given.map_or(Ok(self.blend), |blend| distance("blend", blend))
     }
@@ -140,7 +140,7 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     )))
 }
 
-/// Returns the torque margin of the call (%), or the default.
+/// Returns the torque margin that was passed to the call (%), or else the default.
 pub(crate) fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
     let percent = given.unwrap_or(MARGIN_PCT);
     margin_in_range(percent)?;
@@ -172,14 +172,14 @@ impl Planner {
         Ok(Self { arm, config, speed, blend, blend_m, line, jerk, temperature, margin_pct })
     }
 
-    /// Plans from one position at rest to another one.
+    /// Plans a motion between two positions; the arm is at rest at both.
     fn to(&self, py: Python<'_>, start: &Bound<'_, PyAny>, to: &Bound<'_, PyAny>) -> PyResult<Plan> {
         let target = Target::Joints(array::joints(to, "to")?);
         let start = array::joints(start, "start")?;
         self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
     }
 
-    /// Plans from a position at rest to a pose of the flange: x y z (m), roll pitch yaw (rad).
+    /// Plans a motion from a position at rest to a pose of the flange: x y z (m), roll pitch yaw (rad).
     fn to_flange(
         &self,
         py: Python<'_>,
@@ -193,8 +193,8 @@ impl Planner {
         self.plan(py, |planner| Ok(planner.to_target(&self.arm.model, &start, &target, self.line)?))
     }
 
-    /// Plans through positions (N, 6). `blend` (rad) replaces the planner's blend. `times` are in s from the first position; NaN: as soon
-    /// as the limits allow.
+    /// Plans a motion through positions (N, 6). `blend` (rad) replaces the blend of the planner. `times` are in s from the first
+    /// position; NaN means that the position is reached as soon as the limits allow.
     #[pyo3(signature = (positions, blend=None, times=None))]
     fn through(
         &self,
@@ -221,7 +221,7 @@ impl Planner {
         self.plan(py, |planner| Ok(HostPlanner { blend, ..planner.clone() }.through(&waypoints)?))
     }
 
-    /// Plans through the waypoints of a file, CSV or JSON.
+    /// Plans a motion through the waypoints of a CSV or JSON file.
     fn through_file(
         &self,
         py: Python<'_>,
@@ -234,14 +234,14 @@ impl Planner {
         self.waypoints(py, file, blend)
     }
 
-    /// Plans through the waypoints in the text of a CSV or JSON file.
+    /// Plans a motion through the waypoints in the text of a CSV or JSON file.
     fn through_text(&self, py: Python<'_>, text: &str, blend: Option<f64>, degrees: bool) -> PyResult<Plan> {
         let file = WaypointFile::parse(text).map_err(Failure::from)?;
         let file = if degrees { file.in_degrees().map_err(Failure::from)? } else { file };
         self.waypoints(py, file, blend)
     }
 
-    /// Checks a trajectory. If `start` is given, it is the start position of the arm.
+    /// Checks a trajectory. If `start` is set, the motion starts at this position of the arm.
     #[pyo3(signature = (trajectory, start=None))]
     fn check<'py>(
         &self,
@@ -275,8 +275,7 @@ fn example_text(name: &str) -> Result<String, Failure> {
     })
 }
 
-/// Reduces positions (N, 6) to waypoints. Every dropped position is within a tolerance (rad) of the straight lines
-/// between the waypoints.
+/// Reduces positions (N, 6) to waypoints. Every removed position is within a tolerance (rad) of the straight lines between the waypoints.
 #[pyfunction]
 fn thinned<'py>(
     py: Python<'py>,
@@ -292,7 +291,7 @@ fn thinned<'py>(
     Ok(array::matrix(py, &kept.into_iter().map(|i| rows[i]).collect::<Vec<_>>()))
 }
 
-/// Registers the classes and functions.
+/// Registers the classes and functions in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Planner>()?;
     module.add_class::<Plan>()?;

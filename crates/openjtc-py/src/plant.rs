@@ -1,4 +1,4 @@
-//! Simulated arm with its drives, for a controller that is written in Python.
+//! Simulated arm with its drives, for controllers that are written in Python.
 
 use jtc_bus::{Answer, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::JOINTS;
@@ -11,19 +11,19 @@ use crate::error::Failure;
 use crate::simulated::{SimulatedArm, pass};
 use crate::simulator::truth;
 
-/// Boot time of the drives, ms. This time is long enough to fill the averaging window of their speed with samples.
+/// Boot time of the drives, ms. In this time, enough samples arrive to fill the averaging window of the drive speed.
 const BOOT_MS: u32 = 12;
-/// Longest time until the drives are enabled, ms.
+/// Maximum time until the drives are enabled, in ms.
 const BRING_UP_MS: u64 = 2_000;
 
-/// Arm with drives, or the arm alone.
+/// Arm with drives, or arm without drives.
 #[pyclass(module = "openjtc._native")]
 pub(crate) struct Plant {
     config: SimConfig,
     plant: SimPlant,
     drives: bool,
     ticks: u64,
-    /// Last reports of the drives.
+    /// Latest reports of the drives.
     reports: [JointReport; JOINTS],
 }
 
@@ -34,7 +34,7 @@ impl Plant {
     fn new(py: Python<'_>, arm: SimulatedArm<'_>, drives: bool) -> Result<Self, Failure> {
         let mut config = SimConfig { support: Support::Brakes, gripper: false, ..arm.config()? };
         for drive in &mut config.drives {
-            // Shortens the boot and the alignment of simulated motors.
+            // Shortens the boot and alignment times of simulated motors.
             *drive = DriveConfig { boot_ms: BOOT_MS, first_enable_ms: 1, ..*drive };
         }
         let plant = SimPlant::new(&config);
@@ -43,7 +43,7 @@ impl Plant {
         Ok(new)
     }
 
-    /// Restarts the arm at rest at `position`, with its drives just enabled.
+    /// Restarts the simulation with the arm at rest at `position` and the drives just enabled.
     fn reset(&mut self, py: Python<'_>, position: &Bound<'_, PyAny>) -> Result<(), Failure> {
         let position = array::joints(position, "position")?;
         for (joint, (q, (low, high))) in position.iter().zip(&self.config.arm.stops).enumerate() {
@@ -72,7 +72,7 @@ impl Plant {
         self.ticks
     }
 
-    /// Positions that the drives have reported last, or without drives the true positions.
+    /// Joint positions in the latest reports of the drives, or the true positions if there are no drives.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.measured(|report| report.position, self.plant.truth().q))
@@ -94,7 +94,7 @@ impl Plant {
         truth(py, self.plant.truth(), what)
     }
 
-    /// Flags of the drives that carry their joints.
+    /// Flags of the drives that hold their joints.
     #[getter]
     fn enabled(&self) -> Vec<bool> {
         let states = self.plant.node_states();
@@ -107,7 +107,7 @@ impl Plant {
         self.reports.iter().map(|report| report.errors.into()).collect()
     }
 
-    /// Largest torques of the drives, N·m.
+    /// Maximum torques of the drives, N·m.
     #[getter]
     fn torque_max<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.config.arm.torque_ceiling)
@@ -129,7 +129,7 @@ impl Plant {
         self.ticks += 1;
     }
 
-    /// Sends a request to the drives, and stores their answers to moves.
+    /// Sends a request to the drives, and stores their answers to Move frames.
     fn ask(&mut self, request: &Request) {
         let mut answers = Vec::new();
         self.plant.receive(self.ticks * 1_000, &request.emit(), &mut answers);
@@ -143,7 +143,7 @@ impl Plant {
         }
     }
 
-    /// Configures and enables the drives in the same way as the controller. Brakes hold the arm until then.
+    /// Configures and enables the drives in the same way as the controller does. Until then, brakes hold the arm.
     fn bring_up(&mut self) -> Result<(), Failure> {
         if !self.drives {
             return Ok(());
@@ -156,12 +156,12 @@ impl Plant {
             let states = self.plant.node_states();
             let all = |state: NodeState| states[..JOINTS].iter().all(|each| *each == state);
             if all(NodeState::ENABLED) {
-                // These values are the measurement from which the first step begins.
+                // The first step begins from these measured values.
                 self.ask(&Request::zero_torque(false));
                 self.ticks = 0;
                 return Ok(());
             }
-            // At most one frame per millisecond is sent, like on the real bus.
+            // At most one frame per millisecond is sent, as on the real bus.
             if all(NodeState::INIT) && !configured {
                 self.ask(&configure);
                 configured = true;

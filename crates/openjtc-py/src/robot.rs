@@ -1,4 +1,4 @@
-//! Connection to a controller: one thread runs the session, and the Python threads send jobs to it.
+//! Connection to a controller: a single thread runs the session, and the Python threads send jobs to this thread.
 
 mod commands;
 pub(crate) mod motion;
@@ -34,11 +34,11 @@ use shared::{Asked, Wish};
 use worker::{Waited, Worker, lock};
 use worker_state::{Simulated, Target, Way, WorkerState};
 
-/// Interval of the checks for the next status of a motion.
+/// Interval at which a waiting call checks for the next status of a motion.
 const LOOK: Duration = Duration::from_millis(2);
 /// Longest jog, s.
 const JOG_MAX: f64 = 600.0;
-/// Longest recording of teaching, s.
+/// Maximum duration of a teaching recording, in s.
 const TEACH_MAX: f64 = 3600.0;
 
 /// Connection of `openjtc.Robot`.
@@ -84,13 +84,13 @@ impl Link {
         self.worker.call(py, job)
     }
 
-    /// Returns `true` while a requested run is not over; the connection's thread then answers no queries.
+    /// Returns `true` until a requested run has ended; meanwhile the thread of the connection does not answer queries.
     fn is_running(&self) -> bool {
         self.worker.shared.is_running() && !self.worker.is_closed()
     }
 
-    /// Sends a request to the current or next run, which executes it when the arm moves. Without a run, the request goes directly to the
-    /// controller.
+    /// Sends a request to the current or next run, which executes the request when the arm moves. If there is no run, the request is
+    /// sent directly to the controller.
     fn wish(
         &self,
         py: Python<'_>,
@@ -167,13 +167,13 @@ impl Link {
         self.worker.is_closed()
     }
 
-    /// Returns the number of Stops. The next Stop discards every earlier request.
+    /// Returns the number of Stops so far. The next Stop discards every earlier request.
     fn asked(&self) -> u64 {
-        // In a forked process the number does not matter, because each request is refused.
+        // In a forked process this number has no effect, because each request is refused.
         self.worker.now().unwrap_or_default()
     }
 
-    /// Discards all earlier requests and stops the motion of this connection, without waiting.
+    /// Discards all earlier requests and stops the motion of this connection. Does not wait for standstill.
     fn halt(&self) {
         self.worker.halt();
     }
@@ -208,7 +208,7 @@ impl Link {
         options.begin(slf, Course::To { target, line, margin_pct })
     }
 
-    /// Moves to a pose. `flange`: x y z (m), roll pitch yaw (rad) in the base frame.
+    /// Moves to a pose. `flange` is x y z (m) and roll pitch yaw (rad) in the base frame.
     #[pyo3(signature = (flange, line, margin, options))]
     fn move_to_flange(
         slf: &Bound<'_, Self>,
@@ -242,7 +242,7 @@ impl Link {
 
     fn speed(&self, py: Python<'_>) -> PyResult<f64> {
         let shared = &self.worker.shared;
-        // During a run the thread does not answer queries, but the run publishes the speed.
+        // During a run the thread does not answer queries, so the run publishes the speed.
         while self.is_running() {
             if let Some(speed) = *lock(&shared.speed) {
                 return Ok(speed);
@@ -265,7 +265,7 @@ impl Link {
         })
     }
 
-    /// Jogs at these velocities (rad/s) for this time; returns the position at rest (rad).
+    /// Jogs at these velocities (rad/s) for this time, and returns the position at rest (rad).
     fn jog(&self, py: Python<'_>, velocity: &Bound<'_, PyAny>, seconds: f64) -> PyResult<[f64; JOINTS]> {
         let velocity = array::joints(velocity, "velocity")?;
         let time = number::seconds(seconds, JOG_MAX, "seconds")?;
@@ -279,13 +279,14 @@ impl Link {
         self.worker.call_always(py, WorkerState::hold)
     }
 
-    /// Records the positions of the hand-led arm for this time (s). `take_taught` returns them, even after an interrupted recording.
+    /// Records the joint positions for this time (s), while the operator guides the arm by hand. `take_taught` returns
+    /// the positions, even if the recording was interrupted.
     fn record_teaching(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = number::seconds(seconds, TEACH_MAX, "seconds")?;
         self.call(py, move |state, asked| state.record_teaching(time, asked))
     }
 
-    /// Returns times (s) and positions (rad) that were recorded since the last call.
+    /// Returns the times (s) and positions (rad) that were recorded since the last call.
     fn take_taught<'py>(&self, py: Python<'py>) -> (Vec<f64>, Bound<'py, numpy::PyArray2<f64>>) {
         let taught = std::mem::take(&mut *lock(&self.worker.shared.taught));
         let (times, rows): (Vec<f64>, Vec<[f64; JOINTS]>) = taught.into_iter().unzip();
@@ -296,7 +297,7 @@ impl Link {
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let shared = &self.worker.shared;
         let before = shared.seen();
-        // During a run the thread does not answer queries, but the run publishes each status.
+        // During a run the thread does not answer queries, so the run publishes each status.
         while self.is_running() {
             if shared.seen() != before
                 && let Some(status) = *lock(&shared.status)
@@ -314,7 +315,7 @@ impl Link {
         queries::status(py, &status, stop)
     }
 
-    /// Waits until the arm is held with all drives enabled, at most `seconds` (s).
+    /// Waits at most `seconds` (s) until the arm is held with all drives enabled.
     fn wait_ready(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let longest = number::timeout(seconds, "timeout")?;
         self.call(py, move |state, asked| {

@@ -1,4 +1,4 @@
-//! Results of a run: samples as arrays, figures, report.
+//! Results of a run: samples as arrays, performance figures, and the report.
 
 use std::path::PathBuf;
 
@@ -64,7 +64,7 @@ impl Samples {
 
 type Of = fn(&JointSample) -> f64;
 
-/// Columns of joints, by the names that Python gives them.
+/// Columns with joint values, by the names that Python uses.
 const COLUMNS: [(&str, Of); 13] = [
     ("set_position", |j| j.set_position),
     ("set_velocity", |j| j.set_velocity),
@@ -103,7 +103,7 @@ impl Samples {
         self.notes.clone()
     }
 
-    /// First failure, in one line.
+    /// Text of the first failure, one line.
     #[getter]
     fn failure(&self) -> Option<String> {
         self.broken.as_ref().map(RunFailure::headline)
@@ -113,7 +113,7 @@ impl Samples {
         self.samples.len()
     }
 
-    /// Returns each column as an array: (N,), or (N, 6) for values of joints. An unknown value is NaN.
+    /// Returns each column as an array of shape (N,), or (N, 6) for joint values. Unknown values are NaN.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         all.set_item("time", PyArray1::from_iter(py, self.samples.iter().map(|s| s.time_s)))?;
@@ -131,18 +131,18 @@ impl Samples {
         self.samples.iter().map(|sample| sample.state.name()).collect()
     }
 
-    /// Returns figures: recorded_s, executed_s, samples, and the figures of each joint.
+    /// Returns the performance figures: recorded_s, executed_s, samples, and the figures of each joint.
     fn summary<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
         let summary = py.detach(|| Digest::of(&self.samples).summary(&self.info));
         json::plain(py, &summary)
     }
 
-    /// Returns the report: one page that opens offline.
+    /// Returns the report: a single HTML page that can be opened offline.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| html(&self.input(&Digest::of(&self.samples))))
     }
 
-    /// Writes a recording. The file ending selects MCAP or CSV.
+    /// Writes a recording. The file extension selects MCAP or CSV.
     #[pyo3(signature = (path, overwrite=false))]
     fn write(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Failure> {
         if path.exists() && !overwrite {

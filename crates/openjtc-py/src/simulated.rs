@@ -1,4 +1,4 @@
-//! Settings of a simulated arm from Python.
+//! Settings that Python passes for a simulated arm.
 
 use jtc_core::JOINTS;
 use jtc_host::trajectory::Loaded;
@@ -10,11 +10,11 @@ use crate::controller::of_arm;
 use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
 
-/// Relative errors of masses and frictions, and factors instead of random errors, from Python.
+/// Model errors as Python passes them: relative errors of masses and frictions, and factors instead of random errors.
 type ErrorNumbers = (f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>);
 
-/// Arguments of `openjtc.sim`. `model_error` has the errors of mass and friction, and the factors of the masses and
-/// frictions.
+/// Arguments of `openjtc.sim`. `model_error` contains the relative errors of mass and friction, and the factors for
+/// the masses and frictions.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct SimulatedArm<'py> {
@@ -29,7 +29,7 @@ pub(crate) struct SimulatedArm<'py> {
 }
 
 impl SimulatedArm<'_> {
-    /// Makes the configuration of the simulation, including the settings of the controller and its stored arm.
+    /// Makes the configuration of the simulation, including the controller settings and the stored arm.
     pub(crate) fn config(&self) -> Result<SimConfig, Failure> {
         let arm = self.arm.as_ref().map(|arm| &*arm.get().inner);
         let mut config = match arm {
@@ -41,7 +41,7 @@ impl SimulatedArm<'_> {
         config.arm.payload = payload(self.payload)?;
         config.model_error = ModelError::NONE;
         if let Some((mass, friction, mass_factors, friction_factors)) = self.model_error {
-            // With a share above 1, random masses could be negative.
+            // If a relative error were above 1, random masses could be negative.
             if let Some(bad) = [mass, friction].iter().find(|share| !(0.0..=1.0).contains(*share)) {
                 return Err(Failure::usage(format!(
                     "model_error: relative error {bad} is out of range (0 to 1)"
@@ -80,7 +80,7 @@ impl SimulatedArm<'_> {
     }
 }
 
-/// Returns an error for the first number that is out of range, with its joint.
+/// Returns an error for the first number that is out of range, with the number of its joint.
 fn in_range(what: &str, numbers: &[f64; JOINTS], (low, high): (f64, f64), unit: &str) -> Result<(), Failure> {
     match (1..).zip(numbers).find(|(_, number)| !(low..=high).contains(*number)) {
         None => Ok(()),
@@ -93,7 +93,7 @@ fn in_range(what: &str, numbers: &[f64; JOINTS], (low, high): (f64, f64), unit: 
 /// Simulated time between two checks for signals (Ctrl-C), ms.
 const SLICE_MS: u64 = 1_000;
 
-/// Advances the simulation by `ms` milliseconds, without the GIL.
+/// Advances the simulation by `ms` milliseconds without holding the GIL.
 pub(crate) fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send) -> PyResult<()> {
     let mut left = ms;
     while left > 0 {
@@ -105,7 +105,7 @@ pub(crate) fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send
     Ok(())
 }
 
-/// Parses the support of the arm while its drives are not enabled.
+/// Parses the kind of support that carries the arm while its drives are not enabled.
 pub(crate) fn support(name: &str) -> Result<Support, Failure> {
     Ok(match name {
         "brakes" => Support::Brakes,
@@ -129,7 +129,7 @@ pub(crate) fn faults(text: &str) -> Result<FaultPlan, Failure> {
         .map_err(|error| Failure::usage(error.to_string()).next("`jtc help faults` lists kinds and keys"))
 }
 
-/// Makes the path of a hand that leads the arm.
+/// Makes the path along which a simulated hand guides the arm.
 pub(crate) fn hand(points: Vec<[f64; JOINTS]>, step_s: f64) -> Result<HandPath, Failure> {
     HandPath::new(points, step_s).ok_or_else(|| {
         Failure::usage(format!(

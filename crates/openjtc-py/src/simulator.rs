@@ -1,4 +1,4 @@
-//! Simulated system: host line, controller, joint bus, drives, arm.
+//! Simulated system: line to the host, controller, joint bus, drives and arm.
 
 use jtc_core::JOINTS;
 use jtc_sim::{SimConfig, Truth, World};
@@ -12,9 +12,9 @@ use crate::error::Failure;
 use crate::simulated::{SimulatedArm, faults, hand, pass, support};
 use crate::telemetry::Telemetry;
 
-/// Inputs of the controller in a millisecond: frames, bytes of the host, acknowledged, bus-off, safety input, status free, ticked.
+/// Inputs of the controller in one millisecond: frames, bytes of the host, acknowledged, bus-off, safety input, status free, ticked.
 type PyInputs<'py> = (Vec<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool, bool, bool, bool);
-/// Outputs: frame, bytes to the host, safety output.
+/// Outputs of the controller in one millisecond: frame, bytes to the host, safety output.
 type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool);
 
 /// Simulated system with a controller.
@@ -90,7 +90,7 @@ impl Simulator {
         }
     }
 
-    /// Number of bytes of the host that have not reached the controller yet.
+    /// Number of host bytes that have not reached the controller yet.
     #[getter]
     fn unsent(&self) -> usize {
         self.world.host_write_pending()
@@ -116,12 +116,12 @@ impl Simulator {
         self.world.safety_output()
     }
 
-    /// Returns the frames on the joint bus in the last millisecond.
+    /// Returns the frames that were on the joint bus in the last millisecond.
     fn bus_frames<'py>(&self, py: Python<'py>) -> Vec<PyFrame<'py>> {
         self.world.bus_frames().iter().map(|timed| to_python(py, &timed.frame)).collect()
     }
 
-    /// Returns the events: time in s and text.
+    /// Returns the events of the simulation: the time in s and the text of each.
     fn events(&self) -> Vec<(f64, String)> {
         let entries = self.world.log().entries();
         entries.map(|entry| (entry.time_us as f64 * 1e-6, entry.event.to_string())).collect()
@@ -140,7 +140,7 @@ impl Simulator {
         Ok(dict)
     }
 
-    /// Returns inputs and outputs of the controller in the last millisecond; `None` without `watch`.
+    /// Returns the inputs and outputs of the controller in the last millisecond; `None` if `watch` is not set.
     fn exchange<'py>(&self, py: Python<'py>) -> Option<(PyInputs<'py>, PyOutputs<'py>)> {
         let exchange = self.world.exchange()?;
         let frames = exchange.bus.iter().map(|frame| to_python(py, frame)).collect();

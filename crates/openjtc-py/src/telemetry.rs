@@ -5,12 +5,12 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// Values of one tick of the controller. Arrays have six numbers, base to wrist.
+/// Values of one tick of the controller. Each array has six numbers, in the order from base to wrist.
 #[pyclass(frozen, module = "openjtc._native", eq)]
 pub(crate) struct Telemetry(pub CoreTelemetry);
 
 impl PartialEq for Telemetry {
-    /// Compares bit for bit.
+    /// Compares all values bit for bit.
     fn eq(&self, other: &Self) -> bool {
         self.bits() == other.bits()
     }
@@ -30,7 +30,7 @@ impl Telemetry {
         bits.extend(errors.to_le_bytes());
         bits.extend(records_lost.to_le_bytes());
         for joint in joints {
-            // Every field is listed, so that the compiler reports a new one that is missing here.
+            // All fields are listed, so that the compiler reports a new field that is missing here.
             let JointTelemetry {
                 set_position,
                 set_velocity,
@@ -95,7 +95,7 @@ impl Telemetry {
         self.of(py, |joint| joint.set_acceleration)
     }
 
-    /// Positions that were commanded for the time of the measurement, rad. The control law compares the measurement with them.
+    /// Commanded positions for the time of the measurement, in rad. The control law compares the measured positions with these positions.
     #[getter]
     fn due_position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.due_position)
@@ -119,13 +119,13 @@ impl Telemetry {
         self.of(py, |joint| joint.temperature)
     }
 
-    /// Torques of the model (inverse dynamics and rotors), N·m.
+    /// Torques of the model (inverse dynamics and rotors), in N·m.
     #[getter]
     fn torque_model<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_model)
     }
 
-    /// Proportional parts of the torques, N·m.
+    /// Proportional terms of the torques, in N·m.
     #[getter]
     fn torque_p<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_p)
@@ -149,8 +149,7 @@ impl Telemetry {
         self.of(py, |joint| joint.torque_friction)
     }
 
-    /// Other torques, N·m: torques that smooth the transition after a change of state, and payload and braking torques
-    /// in teaching.
+    /// Other torques, in N·m: the torques that smooth a change of state, and the payload and braking torques in Teaching.
     #[getter]
     fn torque_other<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_other)
@@ -180,13 +179,13 @@ impl Telemetry {
         self.0.trajectory.name()
     }
 
-    /// Place on the trajectory, ms.
+    /// Time on the trajectory, in ms.
     #[getter]
     fn point(&self) -> u32 {
         self.0.point
     }
 
-    /// True if a pause or stop brakes with the full torque.
+    /// True if a Pause or Stop brakes with the full torque.
     #[getter]
     fn braking(&self) -> bool {
         self.0.braking
@@ -204,14 +203,13 @@ impl Telemetry {
         self.0.joints.iter().map(|joint| joint.internal).collect()
     }
 
-    /// True for joints whose position and velocity were measured for this tick. The values of the other joints are
-    /// predicted.
+    /// For each joint, true if its position and velocity were measured for this tick. The values of the other joints are predicted.
     #[getter]
     fn fresh(&self) -> Vec<bool> {
         self.0.joints.iter().map(|joint| joint.fresh).collect()
     }
 
-    /// States of the drives, in words.
+    /// States of the drives, as text.
     #[getter]
     fn drives(&self) -> Vec<&'static str> {
         self.0.joints.iter().map(|joint| joint.state.name()).collect()
@@ -223,7 +221,7 @@ impl Telemetry {
         self.of(py, JointTelemetry::position_error)
     }
 
-    /// Returns the exact bits of all values. Two equal ticks have equal bytes.
+    /// Returns the exact bits of all values. If two ticks are equal, their bytes are equal.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.bits())
     }

@@ -1,4 +1,4 @@
-//! Trajectory: points of six joints at a fixed step.
+//! Trajectory: positions, velocities and accelerations of six joints at a constant time step.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,14 +13,14 @@ use crate::arm::Arm;
 use crate::array;
 use crate::error::Failure;
 
-/// A trajectory: points at a fixed step, `step_ms` (ms). The object does not change.
+/// Trajectory: points with a constant time step, `step_ms` (ms). The object is immutable.
 ///
 /// `time` (N,) is in s and `duration` in s; `position`, `velocity` and `acceleration` (N, 6) are in rad, rad/s and rad/s², one column per
 /// joint, base to wrist.
 #[pyclass(frozen, module = "openjtc")]
 pub(crate) struct Trajectory {
     pub inner: Arc<HostTrajectory>,
-    /// Notes on data that was derived, resampled or left out by the reader.
+    /// Notes on data that the reader derived, resampled or omitted.
     notes: Vec<String>,
 }
 
@@ -74,7 +74,7 @@ impl Trajectory {
         Ok(Self::of(HostTrajectory { step_ms, points: points.collect() }))
     }
 
-    /// Loads a file of any form that `jtc traj run` reads.
+    /// Loads a file in any format that `jtc traj run` reads.
     #[staticmethod]
     #[pyo3(signature = (path, arm=None, degrees=false))]
     fn load(py: Python<'_>, path: PathBuf, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
@@ -106,7 +106,7 @@ impl Trajectory {
         self.inner.duration_s()
     }
 
-    /// Notes on data that was derived, resampled or left out by the reader.
+    /// Notes on data that the reader derived, resampled or omitted.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
@@ -137,12 +137,12 @@ impl Trajectory {
         self.channel(py, |point| point.acceleration)
     }
 
-    /// Returns the same path at another speed, 1 to 100 % of its own.
+    /// Returns the trajectory on its path at another speed, 1 to 100 % of the original speed.
     fn at_speed(&self, percent: f64) -> Result<Self, Failure> {
         Ok(Self::of(plan::at_speed(&self.inner, percent)?))
     }
 
-    /// Returns the trajectory as CSV with all digits, in the form that `jtc traj run` reads.
+    /// Returns the trajectory as CSV with all digits, in the format that `jtc traj run` reads.
     fn to_csv(&self) -> String {
         self.inner.to_exact_csv()
     }

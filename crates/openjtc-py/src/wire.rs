@@ -1,4 +1,4 @@
-//! Makes and reads frames of the host's line and of the joint bus.
+//! Makes and reads frames of the line to the host and of the joint bus.
 
 use jtc_bus::{Answer, GripperReport, JOINTS, JointReport, NODES, NodeState, Request, Scale};
 use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX, settings};
@@ -50,8 +50,7 @@ fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes
     Ok(PyBytes::new(py, &emitted(&command)?))
 }
 
-/// Makes the frames of an arm's parameters: friction, model and gains. The gains come last, because the controller
-/// waits for them.
+/// Makes the frames of the arm parameters: friction, model and gains. The gains are the last frame, because the controller waits for them.
 #[pyfunction]
 fn encode_parameters<'py>(py: Python<'py>, arm: &Arm) -> Result<Vec<Bound<'py, PyBytes>>, Failure> {
     let set = arm.inner.parameter_set();
@@ -115,7 +114,7 @@ fn encode_payload(py: Python<'_>, numbers: PayloadNumbers) -> Result<Bound<'_, P
     Ok(PyBytes::new(py, &bytes[..length]))
 }
 
-/// Reads the statuses in the bytes of a controller.
+/// Reads the statuses in the bytes that a controller sent.
 #[pyclass(module = "openjtc._native")]
 struct StatusReader {
     receiver: StatusReceiver,
@@ -128,7 +127,7 @@ impl StatusReader {
         Self { receiver: StatusReceiver::new() }
     }
 
-    /// Returns the statuses that these bytes complete, oldest first.
+    /// Returns the statuses that are completed by these bytes, oldest first.
     fn feed<'py>(&mut self, py: Python<'py>, bytes: &[u8]) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let mut rest = bytes;
         let mut found = Vec::new();
@@ -161,7 +160,7 @@ fn status_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-/// Reads the controller's request to the nodes from a frame: its kind and its numbers.
+/// Reads a request of the controller to the nodes from a frame: its kind and its numbers.
 #[pyfunction]
 fn bus_request<'py>(
     py: Python<'py>,
@@ -194,7 +193,7 @@ fn node(node: u8, below: usize) -> Result<u8, Failure> {
     Err(Failure::usage(format!("node: {node} is out of range (0 to {})", below - 1)))
 }
 
-/// Makes a joint's answer to a move.
+/// Makes the answer of a joint to a Move frame.
 #[pyfunction]
 #[pyo3(name = "bus_joint_answer")]
 #[allow(clippy::too_many_arguments, reason = "the numbers of a frame; Python has them as keywords")]
@@ -224,7 +223,7 @@ fn joint_answer(
     Ok(to_python(py, &answer.emit(Scale::CURRENT)))
 }
 
-/// Makes the gripper's answer to a move.
+/// Makes the answer of the gripper to a Move frame.
 #[pyfunction]
 #[pyo3(name = "bus_gripper_answer")]
 fn gripper_answer(py: Python<'_>, pump: bool, part: bool, state: u8, errors: u8) -> PyFrame<'_> {
@@ -233,7 +232,7 @@ fn gripper_answer(py: Python<'_>, pump: bool, part: bool, state: u8, errors: u8)
     to_python(py, &Answer::Gripper(report).emit(Scale::CURRENT))
 }
 
-/// Makes a node's answer to a request for a state.
+/// Makes the answer of a node to a request for its state.
 #[pyfunction]
 #[pyo3(name = "bus_state_answer")]
 fn state_answer(py: Python<'_>, number: u8, state: u8) -> Result<PyFrame<'_>, Failure> {
@@ -241,7 +240,7 @@ fn state_answer(py: Python<'_>, number: u8, state: u8) -> Result<PyFrame<'_>, Fa
     Ok(to_python(py, &answer.emit(Scale::CURRENT)))
 }
 
-/// Makes a node's answer to a configuration.
+/// Makes the answer of a node to a configuration.
 #[pyfunction]
 #[pyo3(name = "bus_configured_answer")]
 fn configured_answer(py: Python<'_>, number: u8, accepted: bool) -> Result<PyFrame<'_>, Failure> {
@@ -249,7 +248,7 @@ fn configured_answer(py: Python<'_>, number: u8, accepted: bool) -> Result<PyFra
     Ok(to_python(py, &answer.emit(Scale::CURRENT)))
 }
 
-/// Registers the functions and the class.
+/// Registers the functions and the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<StatusReader>()?;
     module.add_function(wrap_pyfunction!(encode_command, module)?)?;

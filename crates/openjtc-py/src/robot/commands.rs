@@ -14,12 +14,12 @@ use super::worker::lock;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
 
-/// Longest wait from a Stop to standstill. The arm needs 0.5 s, or 1 s if it brakes with full torque (J-33).
+/// Maximum time from a Stop to standstill. The arm needs 0.5 s, or 1 s if it brakes with full torque (J-33).
 const STANDSTILL: Duration = Duration::from_secs(5);
-/// Time after the last sample of a recording after which teaching is considered ended.
+/// Time after the last recorded sample after which teaching counts as ended.
 const TAUGHT_NO_MORE: Duration = Duration::from_secs(1);
 
-/// Returns the error for a caller whose action was ended by a Stop.
+/// Returns the error for a caller whose action was interrupted by a Stop.
 pub(super) fn stopped(what: &str) -> Failure {
     Failure::fault(
         "stopped",
@@ -29,13 +29,13 @@ pub(super) fn stopped(what: &str) -> Failure {
 }
 
 impl WorkerState {
-    /// Stops the arm and waits for standstill. An arm that is already at rest is not an error. Also ends teaching, even if another
-    /// program has switched it on, because the caller wants the arm to be held.
+    /// Stops the arm and waits for standstill. It is not an error if the arm is already at rest. Also ends Teaching, even if
+    /// another program has enabled it, because the caller expects that the controller holds the arm.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
-        // The Stop is sent before any query, because it may reach the controller even on a line that returns no bytes.
+        // The Stop is sent before any query: it may reach the controller even if the line delivers no bytes to this program.
         let stopped = match self.session.stop() {
-            // The controller refuses the Stop if no motion is in progress.
+            // The controller refuses a Stop if no motion is in progress.
             Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
             done => done,
         };
@@ -58,7 +58,7 @@ impl WorkerState {
         held
     }
 
-    /// Like [`Self::stop`], but only for motion and teaching of this connection.
+    /// Like [`Self::stop`], but stops only the motion and teaching of this connection.
     pub(crate) fn rest(&mut self) -> Result<(), Failure> {
         if self.shared.moves() { self.stop() } else { self.hold() }
     }
@@ -72,18 +72,18 @@ impl WorkerState {
         Ok(())
     }
 
-    /// Sends a last Stop after a panic, without waiting for an answer.
+    /// Sends a last Stop after a panic. Does not wait for an answer.
     pub(crate) fn abandon(&mut self) {
         let port = self.session.port_mut();
         let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
         let due = [self.shared.moves(), self.teaching];
         for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
-            // An error is ignored, because no caller is left to report it to.
+            // An error is ignored, because there is no caller to report it to.
             let _ = port.write_all(frame);
         }
     }
 
-    /// Notes the end of the motion of this connection, if the last status shows it.
+    /// Records that the motion of this connection has ended, if the last status shows this.
     pub(crate) fn look(&mut self) {
         if !self.shared.moves() || !self.session.port().is_shown() {
             return;
@@ -94,7 +94,7 @@ impl WorkerState {
         }
     }
 
-    /// Jogs at these velocities (rad/s) for this time, then waits for rest. Returns the position at rest (rad).
+    /// Jogs at these velocities (rad/s) for this time, then waits for standstill. Returns the final position (rad).
     pub(crate) fn jog(
         &mut self,
         velocity: &[f64; JOINTS],
@@ -106,8 +106,7 @@ impl WorkerState {
         self.session.settle_for_jog_until(|| asked.is_halted())?;
         let end = self.session.now() + time;
         let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // However the jog has ended, the arm is brought to rest at once, without waiting for the controller's jog
-        // timeout.
+        // After the end of the jog, for whatever reason, the arm is stopped at once, without waiting for the jog timeout of the controller.
         let rested = self.session.jog_to_rest();
         if let Ok(Some(_)) = rested {
             self.shared.set_moves(false);
@@ -117,7 +116,7 @@ impl WorkerState {
                 rested?;
                 return Err(stopped("jogging ended early"));
             }
-            // A held stop is the reason why a jog was refused.
+            // If the controller is in a held stop, the held stop is the reason why it refused the jog.
             Err(_) if matches!(rested, Err(Error::State(StateError::HeldStop { .. }))) => {}
             jogged => jogged?,
         }
@@ -125,12 +124,12 @@ impl WorkerState {
         Ok(rested?.ok_or_else(still)?.positions())
     }
 
-    /// Starts teaching: the arm can be led by hand.
+    /// Starts Teaching: the operator can guide the arm by hand.
     pub(crate) fn teach(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.same_arm()?;
         self.session.ask_to_move()?;
         let before = self.teaching;
-        // The flag is set before the attempt, so that the end of the connection ends teaching in any case.
+        // The flag is set before the attempt, so that closing the connection ends Teaching in any case.
         self.teaching = true;
         let begun = self.session.teach_until(|| asked.is_halted());
         if let Err(Error::Link(
@@ -142,7 +141,7 @@ impl WorkerState {
         Ok(begun?)
     }
 
-    /// Records the positions of the hand-led arm for this time, or until a Stop.
+    /// Records the joint positions while the arm is guided by hand, for this time or until a Stop.
     pub(crate) fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
         let start = self.session.now();
         let mut last = start;

@@ -1,4 +1,4 @@
-//! A run of Python: its progress, its samples, and requests during the run.
+//! Run that Python requested: its progress, its samples, and requests during the run.
 
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -27,24 +27,24 @@ use super::worker::lock;
 use super::worker_state::{WorkerState, observe};
 use crate::error::Failure;
 
-/// Order for a run: the course and its options.
+/// Order for a run: the motion and its options.
 pub(crate) struct Order {
     pub course: Course,
     /// Name in recordings.
     pub name: String,
-    /// Moves the arm to the first point if it is elsewhere.
+    /// `true` to move the arm to the first point if the arm is at another position.
     pub approach: bool,
-    /// Speed, % of the trajectory's own speed, or of the limits for a move or an approach. `None`: the trajectory's own speed, or the
-    /// default speed of a move or an approach.
+    /// Speed, in % of the speed of the trajectory itself, or in % of the limits for a move or an approach. `None` selects the speed
+    /// of the trajectory itself, or the default speed of a move or an approach.
     pub speed: Option<f64>,
     /// Number of executions.
     pub repeat: u32,
-    /// The caller confirms that the controller's limits, gravity and rotor inertia are safe for the arm, although they
-    /// differ from the arm's.
+    /// `true` if the caller confirms that the limits, gravity and rotor inertia of the controller are safe for the
+    /// arm, although the values of the arm differ.
     pub accept_device_limits: bool,
-    /// Path of a recording, and `true` if an existing file is overwritten.
+    /// Path of a recording, and `true` to overwrite an existing file.
     pub record: Option<(PathBuf, bool)>,
-    /// Progress of the run, for other threads.
+    /// Progress of the run, which other threads can read.
     pub progress: Arc<Mutex<Progress>>,
 }
 
@@ -52,7 +52,7 @@ pub(crate) struct Order {
 pub(crate) struct Ran {
     /// `true` if Execute was sent to the controller.
     moved: bool,
-    /// "finished" or "stopped"; "fault" if there is a failure.
+    /// Outcome: "finished" or "stopped", or "fault" if there is a failure.
     pub outcome: &'static str,
     pub failure: Option<Failure>,
     pub broken: Option<RunFailure>,
@@ -72,8 +72,7 @@ impl Order {
 }
 
 impl WorkerState {
-    /// Executes an order. An error before the arm moves is returned as an error. An error during or after the motion is part of the
-    /// result.
+    /// Executes an order. An error before the motion is returned as an error. An error during or after the motion is part of the result.
     pub(crate) fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {
         let recording = order.record.as_ref();
         let mut recording =
@@ -175,7 +174,7 @@ impl WorkerState {
     }
 }
 
-/// Follower of a running run of Python.
+/// Observer of a run that Python requested.
 struct Follower<'a> {
     order: &'a Order,
     asked: &'a Asked,
@@ -201,7 +200,7 @@ impl Observer<AnyPort> for Follower<'_> {
     }
 
     fn failed(&mut self, error: Error) -> Failure {
-        // After a Stop, every other error is a consequence of the Stop.
+        // After a Stop, every other error is a result of the Stop.
         if self.asked.is_halted() { Error::Cancelled.into() } else { error.into() }
     }
 
@@ -271,7 +270,8 @@ impl Observer<AnyPort> for Follower<'_> {
     fn ended(&mut self, session: &mut Session<AnyPort>, leg: &Leg) -> Result<(), Failure> {
         observe(session, &self.shared);
         self.tape.pause();
-        // A request that was made at the last status has no effect. Its thread is told that the motion has ended.
+        // A request that was made at the last status has no effect. The thread that made the request receives the
+        // information that the motion has ended.
         self.waits = None;
         if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
             // The motion was stopped before it began.
@@ -285,8 +285,8 @@ impl Observer<AnyPort> for Follower<'_> {
             Ok(Outcome::Stopped(_)) => {
                 self.ran.outcome = "stopped";
                 if !self.asked.is_halted() {
-                    // Another program has stopped the arm. Waiting requests of this program are older than that Stop, so they are
-                    // also discarded.
+                    // Another program has stopped the arm. Waiting requests of this program are older than that Stop, so the run
+                    // discards them as well.
                     self.shared.halt();
                 }
             }
@@ -297,7 +297,7 @@ impl Observer<AnyPort> for Follower<'_> {
 }
 
 impl Follower<'_> {
-    /// Notes that the motion has ended with an error.
+    /// Records that the motion has ended with an error.
     fn broke(&mut self, error: &Error) {
         self.ran.outcome = "fault";
         let samples = self.tape.take();
@@ -309,8 +309,8 @@ impl Follower<'_> {
     }
 }
 
-/// Returns `true` if the arm may still move after this error: it is on its path, or it is paused and another program
-/// may resume it.
+/// Returns `true` if the arm may still move after this error: the arm is on its path, or it is paused and another
+/// program may resume the motion.
 fn may_move(session: &Session<AnyPort>, error: &Error) -> bool {
     let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
     matches!(error, Error::Motion(MotionError::LinkLost { .. }))
@@ -345,7 +345,7 @@ fn trajectory(
     Ok((planned.trajectory, planned.notes))
 }
 
-/// Returns a default speed in words.
+/// Returns a default speed as text.
 fn of_speed(what: &str, speed: MoveSpeed) -> Option<String> {
     speed.note("`speed=`").map(|words| format!("{what} {words}"))
 }

@@ -1,4 +1,4 @@
-//! Handle of a running motion, which Python threads can wait for.
+//! Handle of a running motion; Python threads can wait for the motion with it.
 
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex};
@@ -14,16 +14,16 @@ use crate::error::Failure;
 use crate::number;
 use crate::run::Samples;
 
-/// Interval and number of the checks if another thread has received the result.
+/// Check interval and number of checks after another thread has received the result.
 const LOOK: Duration = Duration::from_millis(2);
 const LOOKS: u32 = 50;
 
 /// Samples, and the error that ended the run.
 type Came = (Py<Samples>, Option<Py<PyAny>>);
-/// Samples and error, or the error that kept the motion from starting.
+/// Samples and error of the run, or the error that prevented the motion.
 type Over = Result<Came, Py<PyAny>>;
 
-/// A motion that was started.
+/// Motion that was started.
 #[pyclass(frozen, module = "openjtc._native")]
 pub(super) struct Motion {
     link: Py<Link>,
@@ -33,14 +33,14 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Passes the motion to the connection's thread. `asked`: number of Stops at the time of the request.
+    /// Passes the motion to the thread of the connection. `asked` is the number of Stops at the time of the request.
     pub(super) fn begin(link: &Bound<'_, Link>, order: Order, asked: u64) -> Result<Self, Failure> {
         let worker = &link.get().worker;
         let progress = Arc::clone(&order.progress);
         *lock(&progress) = Progress { phase: "waiting", ..Progress::default() };
         let pending = Pending::begin(&worker.shared);
         let of_run = Arc::clone(&progress);
-        // The guard moves with the job, so that a job that never starts is not counted as pending.
+        // The guard moves with the job, so that a job that never begins does not count as pending.
         let came = worker.ask(asked, move |state, asked| {
             let _pending = pending;
             let ran = state.run(&order, asked);
@@ -66,8 +66,8 @@ fn raised(py: Python<'_>, failure: Failure) -> Py<PyAny> {
 
 #[pymethods]
 impl Motion {
-    /// Returns the samples and the error that ended the motion; `None`: the motion is not over within this time (s). Every waiting thread
-    /// gets the result.
+    /// Returns the samples and the error that ended the motion; `None` if the motion does not end within this time (s). Every waiting
+    /// thread gets the result.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<Came>> {
         let longest = timeout.map(|seconds| number::timeout(seconds, "timeout")).transpose()?;
@@ -87,7 +87,7 @@ impl Motion {
                     Ok((Py::new(py, Samples::of_run(ran))?, error))
                 }
                 Waited::Came(Err(failure)) => Err(raised(py, failure)),
-                // Another thread has received the result and is about to store it.
+                // Another thread has received the result and stores it shortly.
                 Waited::Gone if looks < LOOKS => {
                     looks += 1;
                     worker.pass(py, LOOK)?;
@@ -100,7 +100,7 @@ impl Motion {
         }
     }
 
-    /// Returns phase, progress and total.
+    /// Returns the phase, the progress and the total.
     fn progress(&self) -> (&'static str, f64, f64) {
         let progress = *lock(&self.progress);
         (progress.phase, progress.done, progress.total)

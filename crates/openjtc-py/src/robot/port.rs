@@ -1,7 +1,7 @@
-//! Line to the controller with a gate: frames that are older than a Stop are not sent, and the Stop itself is sent at once.
+//! Line to the controller with a filter: frames that are older than a Stop are not sent, and the Stop itself is sent at once.
 //!
-//! All frames of all jobs are written in this module, and every wait for the controller reads in it. So only this module decides if a
-//! frame may still move the arm. A Stop is written as soon as a caller requests it, in the middle of any job.
+//! This module writes the frames of all jobs, and every wait for the controller reads through this module. Therefore only this module
+//! decides whether a frame may still move the arm. A Stop is written as soon as a caller requests it, even in the middle of a job.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,18 +14,18 @@ use jtc_wire::{FrameType, fixed};
 use super::shared::Shared;
 use super::worker::lock;
 
-/// Longest wait of a read before it checks for a requested Stop.
+/// Maximum duration of a read before it checks for a requested Stop.
 const LOOK: Duration = Duration::from_millis(10);
-/// Longest pause between two pieces of a frame. After a longer pause, the rest of the frame is not expected any more.
+/// Maximum time between two pieces of a frame. After a longer pause, the missing bytes of the frame are no longer expected.
 const PIECE: Duration = Duration::from_millis(50);
-/// Time within which the record of a Stop arrives. The record is only delayed by the status that is just being sent.
+/// Maximum time until the response record of a Stop arrives. Only the status that is being sent can delay the record.
 const RECORD: Duration = Duration::from_millis(200);
-/// Time, and number of statuses, after which the statuses show a started motion.
+/// Time and number of statuses after which the statuses show a motion that was started.
 const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
 /// Underlying line.
 pub(crate) enum Line {
-    /// A simulator. This variant is separate, so that disturbances of its arm can be applied during any job.
+    /// A simulator. This variant is separate, so that disturbances can be applied to the simulated arm during any job.
     Simulated(Box<SimPort>),
     /// A serial port or an agent.
     Other(Box<dyn Port>),
@@ -46,26 +46,26 @@ macro_rules! each_line {
     };
 }
 
-/// Line with its gate.
+/// Line with its filter.
 pub(crate) struct AnyPort {
     line: Line,
     shared: Arc<Shared>,
     /// Number of Stops at the time when the current request was made.
     at: u64,
-    /// Numbers of Stops that were handled: see [`Shared::stops`].
+    /// Numbers of handled Stops, in the form of [`Shared::stops`].
     done: (u64, u64),
-    /// Known Stops and Pauses of other programs.
+    /// Stops and Pauses of other programs that were already handled.
     foreign: Halts,
-    /// Number of missing bytes of the frame that is being written, and time of its last piece.
+    /// Number of missing bytes of the frame that is being written, and the time of its last piece.
     rest: (usize, Duration),
     /// Time of the last written Stop.
     stopped: Option<Duration>,
-    /// Time of the last written frame that moves the arm, and number of statuses until then.
+    /// Time of the last written frame that moves the arm, and the number of statuses before it.
     begun: (Duration, u64),
 }
 
 impl AnyPort {
-    /// Makes a line whose gate follows the requests in `shared`.
+    /// Makes a line whose filter uses the Stops in `shared`.
     pub(crate) fn new(line: Line, shared: Arc<Shared>) -> Self {
         Self {
             line,
@@ -89,12 +89,12 @@ impl AnyPort {
         self.at = at;
     }
 
-    /// Marks all Stops as handled. The caller itself writes the frame.
+    /// Marks all Stops as handled. The caller itself writes the Stop frame.
     pub(crate) fn take_over(&mut self) {
         self.done = self.shared.stops();
     }
 
-    /// Returns the remaining time within which the record of the last Stop may still arrive. The record must not be taken for the answer
+    /// Returns the remaining time in which the record of the last Stop may still arrive. The record must not be mistaken for the answer
     /// to a later frame.
     pub(crate) fn unsettled(&self) -> Option<Duration> {
         let left = (self.stopped? + RECORD).saturating_sub(self.now());
@@ -107,9 +107,9 @@ impl AnyPort {
         self.now() >= self.begun.0 + time && self.shared.seen() >= self.begun.1 + statuses
     }
 
-    /// Reads Stops and Pauses of other programs. A Stop voids all earlier requests of this connection, including waiting ones. A Pause
-    /// during a motion keeps waiting requests, because they follow only after the motion is resumed. At rest, a Pause voids requests like
-    /// a Stop.
+    /// Handles Stops and Pauses of other programs. A Stop cancels all earlier requests of this connection, including waiting requests. A
+    /// Pause during a motion does not cancel waiting requests, because they are executed only after the motion is resumed. At rest, a
+    /// Pause cancels requests in the same way as a Stop.
     fn take_foreign_halts(&mut self) {
         let now = each_line!(port, self => port.halts());
         if now == self.foreign {
@@ -122,8 +122,8 @@ impl AnyPort {
         }
     }
 
-    /// Handles a frame that the line withheld because of another program's Stop or Pause. Waiting requests are older than that, so they are
-    /// voided. If an Execute is withheld while a motion stays paused, they are not voided.
+    /// Handles a frame that the line withheld because of another program's Stop or Pause. Waiting requests are older than that Stop or
+    /// Pause, so they are cancelled. If an Execute is withheld while a motion remains paused, the waiting requests are not cancelled.
     fn withheld(&mut self, frame: &[u8], moved: bool) {
         self.take_foreign_halts();
         let stays_paused = moved && frame == fixed::EXECUTE;
@@ -132,7 +132,9 @@ impl AnyPort {
         }
     }
 
-    /// Writes a Stop after each one that must stop every motion, and after others while this connection moves the arm.
+    /// Writes a Stop frame for each new Stop that must stop every motion. For other Stops, a frame is written only
+    /// while this connection moves the arm. If a Stop concerns only this connection, the frame is written only
+    /// while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         let now = self.shared.stops();
@@ -141,7 +143,7 @@ impl AnyPort {
         }
         let due = now.1 != self.done.1 || self.shared.moves();
         if due && self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
-            // The Stop is not written yet, because existing devices would take it for a part of the frame.
+            // The Stop is not written yet, because existing devices would parse it as part of the unfinished frame.
             return Ok(());
         }
         self.done = now;
@@ -153,13 +155,13 @@ impl AnyPort {
         Ok(())
     }
 
-    /// Refuses a frame that moves the arm or starts teaching, if there was a Stop after its request.
+    /// Refuses a frame that moves the arm or starts Teaching, if a Stop came after the request for this frame.
     fn pass(&mut self, frame: &[u8]) -> Result<(), PortError> {
         let moves = frame == fixed::EXECUTE || is_jog(frame);
         if !moves && frame != fixed::TEACHING_MODE_ENABLE {
             return Ok(());
         }
-        // `moves` is set before the check, so that a Stop between the two finds a motion.
+        // `moves` is set before the check, so that a Stop between these two steps detects a motion.
         let moved_before = self.shared.moves();
         if moves {
             self.shared.set_moves(true);
@@ -181,7 +183,7 @@ impl AnyPort {
     }
 }
 
-/// Returns `true` for a jog with a velocity above 0; a jog with velocity 0 brings the joints to rest.
+/// Returns `true` for a jog with a velocity other than 0; a jog with velocity 0 brings the joints to rest.
 fn is_jog(frame: &[u8]) -> bool {
     match frame {
         [_, kind, _, _, velocities @ .., _, _] => {
@@ -220,7 +222,7 @@ impl Port for AnyPort {
         let whole = if self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
             self.rest.0
         } else {
-            // The length is known, because the first piece always contains the whole header.
+            // The length can be read, because the first piece always contains the complete header.
             length(bytes)
         };
         let written = each_line!(mut port, self => port.write_all(bytes));
@@ -248,8 +250,7 @@ impl Port for AnyPort {
         each_line!(mut port, self => port.take_denial())
     }
 
-    /// Asks for permission to move. The line compares Stops with the time of the request, not with the start of the
-    /// job.
+    /// Requests permission to move. The line compares Stops with the time of the request, not with the start time of the job.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         if self.shared.queue.stops() != self.at {

@@ -1,5 +1,5 @@
-//! Queries and changes other than motions: arm, settings, payload, errors, flight recorder. Also disturbances of a simulated
-//! arm.
+//! Queries and changes other than motions: arm, settings, payload, errors and flight recorder. This file also contains the
+//! disturbances of a simulated arm.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,10 +25,10 @@ use crate::run::Samples;
 use crate::trajectory::Trajectory;
 use crate::{array, json};
 
-/// Duration of the doctor's observation.
+/// Time for which the doctor observes the controller.
 const LOOK: Duration = Duration::from_millis(1500);
 
-/// Returns the measured joint positions (rad), or an error for a joint that is not measured.
+/// Returns the measured joint positions (rad); returns an error if a joint has no measurement.
 fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
     match Joint::ALL.into_iter().find(|joint| !is_measured(status, joint.index())) {
         Some(joint) => Err(StateError::NotMeasured { joint }),
@@ -36,8 +36,8 @@ fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
     }
 }
 
-/// Converts a status to plain values. Values that a joint does not report are NaN. `stop` is the present held stop, if the controller
-/// has reported it.
+/// Converts a status to plain values. Values that a joint does not report are NaN. `stop` is the current held stop, if the controller
+/// reports one.
 pub(super) fn status<'py>(
     py: Python<'py>,
     status: &Status,
@@ -68,12 +68,12 @@ pub(super) fn status<'py>(
 
 #[pymethods]
 impl Link {
-    /// Returns the controller's arm. If the controller cannot report it: the arm of the caller, or the built-in one.
+    /// Returns the arm of the controller. If the controller cannot report its arm, returns the arm of the caller or the built-in arm.
     fn arm(&self, py: Python<'_>) -> PyResult<Arm> {
         Ok(Arm::of(self.call(py, |state, _| state.device_arm())?))
     }
 
-    /// Sends a whole arm to the controller, and stores it in non-volatile memory if `store` is set.
+    /// Sends a complete arm to the controller; with `store`, the controller also stores the arm in non-volatile memory.
     fn push_arm(&self, py: Python<'_>, arm: &Arm, store: bool) -> PyResult<()> {
         let arm = Arc::clone(&arm.inner);
         self.call(py, move |state, asked| {
@@ -83,7 +83,7 @@ impl Link {
             } else if session.info()?.is_some() {
                 session.push_arm_until(&arm, || asked.is_halted(), |_| {})?;
             } else {
-                // A controller without extensions accepts only friction, gains and model of an arm.
+                // A controller without extensions accepts only the friction, gains and model of an arm.
                 let device = session.device_config()?;
                 let differences = arm.device_differences(&device);
                 if !differences.is_empty() {
@@ -97,7 +97,7 @@ impl Link {
         })
     }
 
-    /// Lets the controller use its built-in or stored friction, gains and arm model.
+    /// Requests that the controller uses its built-in or stored friction, gains and arm model.
     fn use_defaults(&self, py: Python<'_>) -> PyResult<()> {
         self.call(py, |state, _| Ok(state.session.use_defaults()?))
     }
@@ -113,7 +113,7 @@ impl Link {
         self.call(py, move |state, _| Ok(state.session.set_payload(&payload)?))
     }
 
-    /// Recovers to HoldPos. Returns the steps in words.
+    /// Recovers to HoldPos. Returns the steps as text.
     #[pyo3(signature = (arm=None, defaults=false, accept_device_limits=false))]
     fn recover(
         &self,
@@ -158,7 +158,7 @@ impl Link {
         self.call(py, move |state, _| Ok(state.session.gripper(pump)?))
     }
 
-    /// Returns the controller's identity; `None` without extensions.
+    /// Returns the identity of the controller; `None` if the controller has no extensions.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(info) = self.call(py, |state, _| Ok(state.session.info()?))? else { return Ok(None) };
         let all = PyDict::new(py);
@@ -174,7 +174,7 @@ impl Link {
         Ok(Some(all))
     }
 
-    /// Returns settings by name. A setting of joints is a list of six.
+    /// Returns settings by name. The value of a joint setting is a list of six numbers.
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = self.call(py, |state, _| Ok(state.session.settings()?))?;
         let all = PyDict::new(py);
@@ -191,8 +191,8 @@ impl Link {
         Ok(all)
     }
 
-    /// Writes settings given as (name, joint, value): either all of them, or none. The joint counts from 1; 0 means a
-    /// setting of the whole arm.
+    /// Writes settings that are passed as (name, joint, value): either all of them, or none. Joints are counted from
+    /// 1; 0 selects a setting of the whole arm.
     fn set_settings(&self, py: Python<'_>, values: Vec<(String, u8, f64)>) -> PyResult<()> {
         let mut given = Vec::new();
         for (name, joint, value) in values {
@@ -213,7 +213,7 @@ impl Link {
             if asked.is_halted() {
                 return Err(jtc_host::Error::Cancelled.into());
             }
-            // Held stops and encoder jumps only occur while drives have torque.
+            // Held stops and encoder jumps occur only while drives have torque.
             if seen.status.as_ref().is_some_and(labels::has_torque) {
                 seen.reactions = state.session.reactions();
             }
@@ -228,7 +228,7 @@ impl Link {
         Ok(all.into_any())
     }
 
-    /// Reads the flight recorder and replays it.
+    /// Reads the log of the flight recorder and replays it.
     fn fetch_log(&self, py: Python<'_>) -> PyResult<FlightLog> {
         let account = self.call(py, |state, asked| {
             let log = state.session.fetch_log_until(|| asked.is_halted(), |_, _| {})?;
@@ -242,7 +242,7 @@ impl Link {
         self.call(py, |state, _| Ok(state.session.clear_log()?))
     }
 
-    /// Checks a trajectory in the same way as a run, from the present position or from `start`.
+    /// Checks a trajectory in the same way as a run does, from the current position or from `start`.
     #[pyo3(signature = (trajectory, start=None, accept_device_limits=false))]
     fn check<'py>(
         &self,
@@ -271,7 +271,7 @@ impl Link {
         crate::planner::verdict(py, &verdict)
     }
 
-    /// Applies an event in the form of `jtc sim`: `push 3 12 0.5`.
+    /// Applies a disturbance in the notation of `jtc sim`, such as `push 3 12 0.5`.
     fn simulate(&self, event: &str) -> Result<(), Failure> {
         let event = TypedEvent::parse(event).map_err(|error| Failure::usage(error.to_string()))?;
         if let Some(TypedEvent::Push { joint, torque, seconds }) = event {
@@ -280,7 +280,7 @@ impl Link {
         Ok(())
     }
 
-    /// Leads the simulated arm by hand along a trajectory while it is taught.
+    /// Guides the simulated arm along a trajectory during Teaching, as an operator would do by hand.
     fn lead(&self, trajectory: &Trajectory) -> Result<(), Failure> {
         let trajectory = &trajectory.inner;
         let points = trajectory.points.iter().map(|point| point.position).collect();
@@ -289,7 +289,7 @@ impl Link {
         self.worker.touch(move |world| world.lead(path))
     }
 
-    /// Injects the faults of a fault file; their times count from the start of the simulation.
+    /// Injects the faults of a fault file; the fault times are counted from the start of the simulation.
     fn inject(&self, faults: &str) -> Result<(), Failure> {
         let plan =
             jtc_sim::FaultPlan::from_toml(faults).map_err(|error| Failure::usage(error.to_string()))?;
@@ -297,7 +297,7 @@ impl Link {
     }
 }
 
-/// Returns the samples of each tick, with the first failure.
+/// Returns the samples of all ticks, with the first failure.
 pub(crate) fn samples(account: &Account) -> Samples {
     Samples::of_log(account.info.clone(), account.replayed.samples(), account.failure.clone())
 }

@@ -12,14 +12,14 @@ use crate::error::Failure;
 /// Recording of one run.
 pub(super) struct Recording {
     path: PathBuf,
-    /// Temporary file that replaces `path` only at the end, so that an existing file stays until the new one is complete.
+    /// Temporary file that replaces `path` only at the end, so that an existing file remains until the new file is complete.
     aside: Option<PathBuf>,
     file: Option<File>,
     live: Option<LiveRecorder>,
 }
 
 impl Recording {
-    /// Opens the file before the arm moves. `overwrite`: replaces an existing file.
+    /// Opens the file before the arm moves. If `overwrite` is set, an existing file is replaced.
     pub(super) fn open(path: &PathBuf, overwrite: bool) -> Result<Self, Failure> {
         Format::of(path).map_err(|error| Failure::of(&error))?;
         let mut options = OpenOptions::new();
@@ -56,7 +56,7 @@ impl Recording {
         Ok(self.live.as_ref().map(LiveRecorder::sink))
     }
 
-    /// Completes the file if the run moved the arm along its trajectory. Otherwise removes the file. A file error becomes a note of the
+    /// Completes the file if the arm moved along its trajectory. Otherwise removes the file. A file error is added as a note to the
     /// finished run.
     pub(super) fn end(self, ran: Result<Ran, Failure>) -> Result<Ran, Failure> {
         let Self { path, aside, file, live } = self;

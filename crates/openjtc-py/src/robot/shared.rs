@@ -24,7 +24,7 @@ pub(crate) struct Wish {
     pub done: Sender<Result<(), Failure>>,
 }
 
-/// Progress of a motion.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
     /// Phase: "waiting", "approach", "upload", "motion"; empty after the end.
@@ -42,13 +42,13 @@ pub(crate) struct Shared {
     pub queue: Queue<WorkerState, ()>,
     /// Number of Stops that also stop the arm if another program moves it.
     stops_of_all: AtomicU64,
-    /// Number of requested runs that are not over.
+    /// Number of requested runs that have not ended.
     pending: AtomicUsize,
     /// `true` if this connection has started a motion whose end the controller has not reported yet.
     moves: AtomicBool,
     /// `true` if the thread must end.
     ended: AtomicBool,
-    /// `true` if the thread has ended by itself.
+    /// `true` if the thread has ended without a request.
     gone: AtomicBool,
     /// Number of statuses.
     seen: AtomicU64,
@@ -57,25 +57,25 @@ pub(crate) struct Shared {
     pub status: Mutex<Option<Status>>,
     /// Disturbances of a simulated arm, applied during any job.
     pub touches: Mutex<Vec<Touch>>,
-    /// Speed override that was last read or set.
+    /// Latest speed override that was read or set.
     pub speed: Mutex<Option<f64>>,
-    /// Times (s) and positions (rad) of the hand-led arm.
+    /// Times (s) and positions (rad) of the arm while it was guided by hand.
     pub taught: Mutex<Vec<(f64, [f64; JOINTS])>>,
 }
 
 impl Shared {
-    /// Cancels all earlier requests. The port stops the motion of this connection.
+    /// Cancels all earlier requests. The port then stops the motion of this connection.
     pub(crate) fn halt(&self) {
         self.queue.count_stop();
         self.queue.refuse_late();
     }
 
-    /// Announces a Stop that also stops the arm if another program moves it. The Stop itself must follow.
+    /// Announces a Stop that also stops the arm if another program moves it. The Stop itself must follow this call.
     pub(crate) fn will_stop_all(&self) {
         self.stops_of_all.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Returns the number of Stops, and the number of those that also stop the arm if another program moves it.
+    /// Returns the number of all Stops, and the number of Stops that also stop the arm if another program moves it.
     pub(crate) fn stops(&self) -> (u64, u64) {
         let all = self.queue.stops();
         (all, self.stops_of_all.load(Ordering::SeqCst))
@@ -86,7 +86,7 @@ impl Shared {
         self.ended.load(Ordering::SeqCst)
     }
 
-    /// Lets the thread end after its current request.
+    /// Ends the thread after its current request.
     pub(crate) fn end(&self) {
         self.ended.store(true, Ordering::SeqCst);
     }
@@ -99,7 +99,7 @@ impl Shared {
         self.moves.store(moves, Ordering::SeqCst);
     }
 
-    /// Returns `true` while a requested run is not over; the thread then answers no queries.
+    /// Returns `true` until every requested run has ended; meanwhile the thread does not answer queries.
     pub(crate) fn is_running(&self) -> bool {
         self.pending.load(Ordering::SeqCst) > 0
     }
@@ -122,7 +122,7 @@ impl Shared {
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Passes a request to the current run. Without a run, the result channel is dropped.
+    /// Passes a request to the current run. If there is no run, the result channel is dropped.
     pub(crate) fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {
@@ -131,7 +131,7 @@ impl Shared {
     }
 }
 
-/// Guard of a requested run, which exists until the run is over or abandoned.
+/// Guard of a requested run, which exists until the run has ended or was abandoned.
 pub(super) struct Pending(Arc<Shared>);
 
 impl Pending {
@@ -151,7 +151,7 @@ impl Drop for Pending {
     }
 }
 
-/// A request's own view of the Stops.
+/// View of the Stops for one request.
 #[derive(Clone)]
 pub(crate) struct Asked {
     shared: Arc<Shared>,
@@ -174,7 +174,7 @@ impl Asked {
         self.at
     }
 
-    /// Returns `true` if there was a Stop since the request.
+    /// Returns `true` if a Stop came after the request.
     pub(crate) fn is_halted(&self) -> bool {
         self.shared.queue.stops() != self.at
     }

@@ -1,7 +1,7 @@
-//! Thread that runs the session with a controller, and the calls that Python threads make to it.
+//! Thread that runs the session with a controller, and the calls from Python threads to this thread.
 //!
-//! The thread owns the session. Python threads put requests into its queue and wait without the interpreter's lock. During the wait they
-//! check for Ctrl-C, which stops the arm before the exception is raised.
+//! The thread owns the session. Python threads put requests into the queue of this thread and wait without the GIL. During the wait,
+//! they check for Ctrl-C. Ctrl-C stops the arm before the exception is raised.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -20,7 +20,7 @@ use crate::error::Failure;
 
 /// Interval at which a waiting thread checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest wait for standstill after a Stop; a second Ctrl-C ends the wait.
+/// Maximum wait for standstill after a Stop; a second Ctrl-C ends the wait.
 const STANDSTILL: Duration = Duration::from_secs(15);
 
 /// Locks a mutex, even after a panic, because the protected data is consistent after each statement.
@@ -31,16 +31,16 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Result of a wait.
 pub(super) enum Waited<T> {
     Came(T),
-    /// No result can arrive any more.
+    /// A result can no longer arrive.
     Gone,
-    /// No result arrived in this time.
+    /// The time has passed without a result.
     NotYet,
 }
 
 /// The connection's thread.
 pub(super) struct Worker {
     simulated: bool,
-    /// Process that opened the connection. A forked child does not have the thread.
+    /// Process that opened the connection. A forked child process does not have the thread.
     process: u32,
     /// Name of the port.
     pub port: String,
@@ -55,7 +55,7 @@ pub(super) fn closed() -> Failure {
 }
 
 impl Worker {
-    /// Starts the thread and connects in it.
+    /// Starts the thread, which then connects.
     pub(super) fn begin(py: Python<'_>, target: Target) -> PyResult<Self> {
         let shared = Arc::<Shared>::default();
         let simulated = matches!(target.way, Way::Simulated(_));
@@ -84,8 +84,8 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Puts a request that was made after `at` Stops, and returns the channel for its result. A later Stop refuses the request if it has
-    /// not begun.
+    /// Puts a request that was made after `at` Stops into the queue, and returns the channel for its result. If a later Stop comes
+    /// before the request begins, the request is refused.
     pub(super) fn ask<T: Send + 'static>(
         &self,
         at: u64,
@@ -94,7 +94,7 @@ impl Worker {
         let asked = Asked::after(&self.shared, at);
         self.put(at, move |state| {
             state.begin(&asked)?;
-            // The begin may have waited, and a Stop may have come.
+            // The call of `begin` may have waited, and a Stop may have come meanwhile.
             if asked.is_halted() {
                 return Err(jtc_host::Error::Cancelled.into());
             }
@@ -102,7 +102,7 @@ impl Worker {
         })
     }
 
-    /// Like [`Self::ask`], for requests that a Stop does not cancel, because they only read or end teaching.
+    /// Like [`Self::ask`], for requests that a Stop does not cancel, because they only read data or end Teaching.
     fn ask_always<T: Send + 'static>(
         &self,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
@@ -125,7 +125,7 @@ impl Worker {
         Ok(came)
     }
 
-    /// Requests a Stop. `job` has its turn before all other requests.
+    /// Requests a Stop. `job` is executed before all other requests.
     fn overtake<T: Send + 'static>(
         &self,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
@@ -138,14 +138,15 @@ impl Worker {
         Ok(came)
     }
 
-    /// Ends the wait of the thread for a request.
+    /// Wakes the thread that waits for a request.
     fn wake(&self) {
         if let Some(thread) = &*lock(&self.thread) {
             thread.thread().unpark();
         }
     }
 
-    /// Checks that the thread belongs to this process, not to its parent before a fork. In a forked process the locks may be held for ever.
+    /// Checks that the thread belongs to this process, not to its parent before a fork. In a forked process, the locks
+    /// may never be released.
     fn is_here(&self) -> Result<(), Failure> {
         if self.is_foreign() {
             return Err(closed()
@@ -160,14 +161,14 @@ impl Worker {
         Ok(self.shared.queue.stops())
     }
 
-    /// Cancels all earlier requests and stops the motion of this connection, without waiting.
+    /// Cancels all earlier requests and stops the motion of this connection. Does not wait for standstill.
     pub(super) fn halt(&self) {
         if !self.is_foreign() {
             self.shared.halt();
         }
     }
 
-    /// Stops the arm, even if another program moves it, and waits for standstill. Cancels all earlier requests.
+    /// Stops the arm, even if another program moves it, and waits for standstill. All earlier requests are cancelled.
     pub(super) fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.is_here()?;
         self.shared.will_stop_all();
@@ -175,7 +176,7 @@ impl Worker {
         Ok(self.wait(py, came)??)
     }
 
-    /// Puts a request and waits for its result.
+    /// Puts a request into the queue and waits for its result.
     pub(super) fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -195,7 +196,7 @@ impl Worker {
         Ok(self.wait(py, came)??)
     }
 
-    /// Waits without the interpreter's lock. Ctrl-C stops the arm, and the exception is raised after standstill.
+    /// Waits for a result without the GIL. Ctrl-C stops the arm, and the exception is raised after standstill.
     pub(super) fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
         match self.wait_for(py, &Mutex::new(came), None)? {
             Waited::Came(result) => {
@@ -207,7 +208,7 @@ impl Worker {
         }
     }
 
-    /// Like [`Self::wait`], for at most this time. Several threads may wait for the same result; exactly one receives it.
+    /// Like [`Self::wait`], but waits at most for this time. If several threads wait for one result, exactly one thread receives it.
     pub(super) fn wait_for<T: Send>(
         &self,
         py: Python<'_>,
@@ -239,18 +240,18 @@ impl Worker {
         }
     }
 
-    /// Waits for `time` while another thread works.
+    /// Sleeps for `time`; other threads can run meanwhile.
     pub(super) fn pass(&self, py: Python<'_>, time: Duration) -> PyResult<()> {
         py.detach(|| std::thread::sleep(time));
         self.look_for_signals(py)
     }
 
-    /// Checks for Ctrl-C and other signals whose handlers raise an exception. The arm is at rest before the exception is raised.
+    /// Checks for Ctrl-C and for other signals whose handlers raise an exception. The exception is raised after the arm is at rest.
     pub(super) fn look_for_signals(&self, py: Python<'_>) -> PyResult<()> {
         py.check_signals().inspect_err(|_| self.rest(py))
     }
 
-    /// Stops the motion of this connection and waits for standstill. A signal ends the wait. Cancels all earlier requests.
+    /// Stops the motion of this connection, cancels all earlier requests, and waits for standstill. If a signal arrives, the wait ends.
     pub(super) fn rest(&self, py: Python<'_>) {
         let Ok(came) = self.overtake(WorkerState::rest).map(Mutex::new) else { return };
         let end = Instant::now() + STANDSTILL;
@@ -281,7 +282,7 @@ impl Worker {
         if self.is_foreign() {
             return Ok(());
         }
-        // Before the Stop, so that no request can begin after it.
+        // The flag is set before the Stop, so that a request cannot begin after the Stop.
         self.shared.end();
         let came = self.overtake(WorkerState::rest)?;
         let rested = self.wait(py, came);
@@ -290,7 +291,7 @@ impl Worker {
             py.detach(|| std::thread::sleep(Duration::from_millis(2)));
             py.check_signals()?;
         }
-        // A panic of the thread was already reported in the thread.
+        // The thread itself has already reported its panic.
         let _ = thread.join();
         Ok(rested??)
     }
@@ -300,7 +301,7 @@ impl Worker {
         self.process != std::process::id()
     }
 
-    /// Returns `true` if the connection takes no more requests.
+    /// Returns `true` if the connection does not accept further requests.
     pub(super) fn is_closed(&self) -> bool {
         self.is_foreign() || self.shared.is_gone() || self.shared.has_ended()
     }
@@ -308,7 +309,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // Stops a motion that no caller follows any more. The thread ends after the motion.
+        // The motion is stopped, because there is no caller that supervises it. The thread ends after the motion.
         self.halt();
         self.shared.end();
         if !self.is_foreign() {
@@ -338,7 +339,7 @@ fn act<T: Send + 'static>(
     (Box::new(act), came)
 }
 
-/// Closes the queue when the thread ends, in whatever way, so that no caller waits for an answer without end.
+/// Closes the queue when the thread ends, for any reason, so that a caller does not wait forever for an answer.
 struct Closing(Arc<Shared>);
 
 impl Drop for Closing {
@@ -347,8 +348,8 @@ impl Drop for Closing {
     }
 }
 
-/// Does the requests one after the other. Reads statuses between them, so that the last status is always recent. At the end, does the
-/// Stops that wait, and stops a motion of this connection.
+/// Executes the requests in order. Reads statuses between requests, so that the last status is always recent. At the end, executes
+/// the waiting Stops and stops a motion of this connection.
 fn serve(state: &mut WorkerState) {
     let shared = Arc::clone(&state.shared);
     while !shared.has_ended() || shared.queue.stop_waits() {
@@ -370,6 +371,6 @@ fn serve(state: &mut WorkerState) {
         }
     }
     shared.queue.close();
-    // An error is ignored, because no caller is left to report it to.
+    // An error is ignored, because there is no caller to report it to.
     let _ = state.rest();
 }

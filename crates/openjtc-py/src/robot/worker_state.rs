@@ -1,4 +1,4 @@
-//! State of the worker: the port, its session, and the arm for the checks of motions.
+//! State of the worker thread: the port, its session, and the arm model for the motion checks.
 
 use std::cell::Cell;
 use std::path::PathBuf;
@@ -20,25 +20,25 @@ use super::shared::{Asked, Shared};
 use super::tape::Tape;
 use crate::error::Failure;
 
-/// Longest wait for a status while no job waits.
+/// Maximum wait for a status while there is no job.
 const IDLE: Duration = Duration::from_millis(10);
-/// Largest delay of a simulator that it makes up for. After a larger delay the missed time is skipped.
+/// Maximum delay that a simulator catches up. After a larger delay, the simulator skips the missed time.
 const BEHIND: Duration = Duration::from_millis(100);
 
 /// A simulated controller with its arm.
 pub(crate) struct Simulated {
     pub seed: u64,
-    /// Speed, times real time. `None`: as fast as possible, and time passes only while a caller waits.
+    /// Speed as a factor of real time. `None` means as fast as possible; simulated time then passes only while a caller waits.
     pub speed: Option<f64>,
     pub faults: FaultPlan,
-    /// Payload of the simulated arm; the controller does not know it.
+    /// Payload of the simulated arm that the controller does not know.
     pub payload: Payload,
 }
 
 /// Kind of connection.
 pub(crate) enum Way {
     Simulated(Box<Simulated>),
-    /// A serial port and its rate, or the agent that owns it.
+    /// Serial port and its bit rate, or the agent that owns this port.
     Serial {
         path: String,
         baud: u32,
@@ -52,7 +52,7 @@ pub(crate) enum Way {
 /// Target and credentials of a connection.
 pub(crate) struct Target {
     pub way: Way,
-    /// Arm that the caller gave.
+    /// Arm that the caller passed.
     pub arm: Option<Arc<Arm>>,
     /// Name that agents show to other clients.
     pub name: String,
@@ -63,21 +63,20 @@ pub(crate) struct Target {
 /// State of the worker.
 pub(crate) struct WorkerState {
     pub session: Session<AnyPort>,
-    /// Arm that the caller gave, or else the built-in arm. For a controller with extensions, the controller's own arm
-    /// is used.
+    /// Arm that the caller passed, or else the built-in arm. If the controller has extensions, its own arm is used instead.
     pub arm: Arc<Arm>,
-    /// `true` if the caller gave an arm.
+    /// `true` if the caller passed an arm.
     pub named: bool,
     pub shared: Arc<Shared>,
     pub tape: Rc<Tape>,
-    /// `true` if time passes by itself, like on a real controller.
+    /// `true` if time passes without calls, as on a real controller.
     time_passes: bool,
-    /// `true` if this connection switched teaching on, or may have done so.
+    /// `true` if this connection has enabled Teaching, or may have enabled it.
     pub teaching: bool,
 }
 
 impl WorkerState {
-    /// Connects. A simulator receives its parameters and holds its arm.
+    /// Connects. A simulated controller receives its parameters and then holds its arm.
     pub(crate) fn open(target: Target, shared: Arc<Shared>, asked: &Asked) -> Result<Self, Failure> {
         let arm = target.arm.clone().unwrap_or_else(|| Arc::new(Arm::avena()));
         let (tape, pace) = (Rc::<Tape>::default(), Rc::<Cell<Option<f64>>>::default());
@@ -99,7 +98,7 @@ impl WorkerState {
             state.bring_up(stored, asked)?;
             pace.set(speed);
         } else {
-            // Reports a silent controller here, not at the first motion.
+            // A controller that does not answer is reported here, not at the first motion.
             state.session.fresh_status()?;
         }
         Ok(state)
@@ -123,8 +122,8 @@ impl WorkerState {
         self.session.port().name()
     }
 
-    /// Begins a job. Frames that move the arm are sent until the next Stop. A late answer to an earlier Stop is not taken for an
-    /// answer to this job.
+    /// Begins a job. Frames that move the arm are sent until a Stop comes. A late answer to an earlier Stop is not mistaken for
+    /// an answer to this job.
     pub(crate) fn begin(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.session.port_mut().begin(asked.at());
         if let Some(time) = self.session.port().unsettled() {
@@ -133,12 +132,12 @@ impl WorkerState {
         Ok(())
     }
 
-    /// Returns `true` if time passes by itself, so that statuses arrive without a job.
+    /// Returns `true` if time passes without calls, so that statuses also arrive without a job.
     pub(crate) fn time_passes(&self) -> bool {
         self.time_passes
     }
 
-    /// Reads statuses while no job waits. The next job reports a lost line.
+    /// Reads statuses while there is no job. If the line is lost, the next job reports this.
     pub(crate) fn idle(&mut self) {
         match self.session.poll(IDLE) {
             Ok(_) => {}
@@ -146,8 +145,7 @@ impl WorkerState {
         }
     }
 
-    /// Returns the controller's arm. If the controller cannot report it, returns the arm of the caller, or the built-in
-    /// arm.
+    /// Returns the arm of the controller. If the controller cannot report its arm, returns the arm of the caller or the built-in arm.
     pub(crate) fn device_arm(&mut self) -> Result<Arm, Failure> {
         let mut arm = match self.session.info()? {
             None => return Ok((*self.arm).clone()),
@@ -159,7 +157,7 @@ impl WorkerState {
         Ok(arm)
     }
 
-    /// Like [`Self::device_arm`], for motions: returns an error if the caller's arm differs from the controller's.
+    /// Like [`Self::device_arm`], for motions: returns an error if the arm of the caller differs from the arm of the controller.
     pub(crate) fn arm_to_move(&mut self) -> Result<Arm, Failure> {
         let arm = self.device_arm()?;
         let differences = if self.named { self.arm.differences(&arm) } else { Vec::new() };
@@ -177,13 +175,13 @@ impl WorkerState {
         ))
     }
 
-    /// Returns an error if the caller's arm differs from the controller's.
+    /// Returns an error if the arm of the caller differs from the arm of the controller.
     pub(crate) fn same_arm(&mut self) -> Result<(), Failure> {
         if self.named { self.arm_to_move().map(drop) } else { Ok(()) }
     }
 }
 
-/// Opens a port to a simulated controller. The flag is `true` if the controller has the arm in its memory.
+/// Opens a port to a simulated controller. The flag is `true` if the arm is stored in the memory of the controller.
 fn simulator(
     simulated: Simulated,
     arm: &Arm,
@@ -196,7 +194,7 @@ fn simulator(
     let stored = image.is_some();
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored {
-        // The controller reads the arm from its memory, like on a board.
+        // The controller reads the arm from its memory, as on a board.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), image);
     }
     let Simulated { seed, faults, payload, .. } = simulated;
@@ -236,7 +234,7 @@ fn agent(url: &str, target: &Target) -> Result<Box<dyn Port>, Failure> {
     Ok(Box::new(AgentPort::open(url, &options)?))
 }
 
-/// Reads the operator's token from the file of this user's agent. Without a token the agent itself reports the refusal.
+/// Reads the token of the operator from the token file of the local agent. If there is no token, the agent itself reports the refusal.
 fn operator(file: &std::path::Path) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Tokens {
@@ -254,7 +252,7 @@ fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failu
     }
 }
 
-/// Publishes every status of the session from now on, in all procedures.
+/// From now on, publishes every status that the session receives in any procedure.
 pub(crate) fn observe(session: &mut Session<AnyPort>, shared: &Arc<Shared>) {
     let shared = Arc::clone(shared);
     session.observe(move |_, status| shared.publish(status));

@@ -1,4 +1,4 @@
-//! Alarms about running boards. Each alarm is raised once, as an error.
+//! Alarms that report problems of running boards. Each alarm is raised once, as an exception.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use ucom_host::session::{Change, SessionError};
 use super::shared::lock;
 use crate::error::Failure;
 
-/// Alarms that are not reported yet: boards that were lost or have left their control loops, and other failures.
+/// Alarms that were not raised yet: boards that were lost or have left their control loops, and other failures.
 #[derive(Default)]
 pub(super) struct Alarms(Mutex<Waiting>);
 
@@ -24,8 +24,8 @@ struct Waiting {
 }
 
 impl Alarms {
-    /// Notes a change of a board. `runs`: this session has started the control loop of the board. `master`: this session has started an
-    /// application.
+    /// Records a change of a board. `runs` is `true` if this session has started the control loop of the board. `master` is `true` if
+    /// this session has started an application.
     pub(super) fn changed(&self, change: Change, board: u8, (runs, master): (bool, bool)) {
         let mut waiting = lock(&self.0);
         match change {
@@ -36,11 +36,11 @@ impl Alarms {
         }
     }
 
-    /// Notes that another board has the same number as a running board, so that a command moves both boards.
+    /// Records that another board has the number of a running board, so that a command moves both boards.
     pub(super) fn number_shared(&self, board: u8, found: &[u16]) {
         let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
         let mut own = Failure::from(SessionError::from(Error::from(error)));
-        // A conflict that is found while the board runs is a fault, not a refusal.
+        // If the conflict is found while the board runs, it is a fault and not a refusal.
         own.kind = ErrorKind::Fault;
         self.add(own);
     }
@@ -50,8 +50,8 @@ impl Alarms {
         lock(&self.0).others.push_back(failure);
     }
 
-    /// Reports lost boards, and boards that have left their control loops, once. Later calls report the other failures
-    /// one after the other.
+    /// Reports lost boards, and boards that have left their control loops; each of them once. Later calls report the
+    /// other failures, one per call.
     pub(super) fn check(&self) -> Result<(), Failure> {
         let (lost, rebooted, left) = {
             let mut waiting = lock(&self.0);

@@ -1,4 +1,4 @@
-//! Chain of boards for Python: thin calls into the thread that owns its session.
+//! Chain of boards for Python; the methods call the thread that owns the session of the chain.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,7 +26,7 @@ use crate::error::Failure;
 use crate::json;
 
 type Object<'py> = PyResult<Bound<'py, PyAny>>;
-/// Board, name and value from Python.
+/// Board number, name and value as Python passes them.
 type Given = (Option<u8>, String, String);
 
 /// Year, month and day.
@@ -55,7 +55,7 @@ fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, Failure> {
 }
 
 impl Chain {
-    /// Reads a parameter file in the calling thread, because the session's thread must not wait for a disk.
+    /// Reads a parameter file in the calling thread, because the thread of the session must not wait for a disk.
     fn parameter_file(&self, py: Python<'_>, path: &Path) -> Result<ParameterFile, Failure> {
         let inventory = self.inventory_file.clone().unwrap_or_default();
         Ok(py.detach(|| ParameterFile::read(path, &inventory, |_| true)).map_err(SessionError::from)?)
@@ -120,7 +120,7 @@ impl Chain {
         &self.url
     }
 
-    /// Returns load, frame counts and time of the bus.
+    /// Returns the load, the frame counts and the time of the bus.
     fn bus<'py>(&self, py: Python<'py>) -> Object<'py> {
         plain(py, self.owner.shared.bus())
     }
@@ -144,7 +144,7 @@ impl Chain {
     fn init<'py>(&self, py: Python<'py>, renew: bool, force: bool, check: bool) -> Object<'py> {
         let after = self.owner.now()?;
         let file = self.inventory_file.as_deref();
-        // Read here, because the session's thread must not wait for a disk.
+        // The file is read here, because the thread of the session must not wait for a disk.
         let read = py.detach(|| file.filter(|file| file.exists()).map(Inventory::read).transpose());
         let listed = read.map_err(|e| Failure::usage(e.to_string()))?;
         let init = move |state: &mut _| procedures::init(state, listed, (renew, force, check));
@@ -286,7 +286,7 @@ impl Chain {
         self.owner.call_after(py, after, apply)
     }
 
-    /// Returns a reader of samples of boards from now on.
+    /// Returns a reader for the samples of boards that arrive after this call.
     fn samples(this: PyRef<'_, Self>, py: Python<'_>, boards: Option<&str>) -> PyResult<ChainSamples> {
         let boards = boards.map(self::boards).transpose()?;
         let listener = this.owner.call(py, move |state| {
@@ -326,7 +326,7 @@ impl Chain {
         let (second, profile) = (source(second), &self.profile);
         let any_date = date.0.is_none();
         let read = Read { raw, addresses, fill_gaps, name_target, date: date.0, today: date.1 };
-        // Read here, because the session's thread must not wait for a disk.
+        // The file is read here, because the thread of the session must not wait for a disk.
         let (image, second, date) = py.detach(|| read.read(&first, second.as_ref(), profile))?;
         let update = Update {
             boards: self::boards(boards)?,

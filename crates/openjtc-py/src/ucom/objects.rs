@@ -1,4 +1,4 @@
-//! Boards and findings as JSON, with the field names of the dataclasses of `openjtc.ucom`.
+//! Conversion of boards and findings to JSON, with the field names of the dataclasses of `openjtc.ucom`.
 
 use serde_json::{Value, json};
 use ucom::{BoardInfo, Profile, Status};
@@ -8,7 +8,7 @@ use ucom_host::master::io::{Kind, ParValue, short};
 use ucom_host::master::{BoardSeen, Master, state_name};
 use ucom_host::session::{Known, name_of};
 
-/// Converts a board with its answer to PC_INFO.
+/// Converts a board and its answer to PC_INFO.
 pub(super) fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: Option<&Inventory>) -> Value {
     let application = info.has_application();
     let status: Vec<&str> =
@@ -25,7 +25,7 @@ pub(super) fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: O
     })
 }
 
-/// Like [`info`], with its description.
+/// Like [`info`], but includes the description of the board.
 pub(super) fn board(seen: &BoardSeen, profile: &Profile, inventory: Option<&Inventory>) -> Value {
     let mut value = info(seen.number, &seen.info, profile, inventory);
     value["description"] = json!(seen.description.as_deref().unwrap_or_default());
@@ -37,7 +37,7 @@ pub(super) fn boards(seen: &[BoardSeen], profile: &Profile, inventory: Option<&I
     seen.iter().map(|one| board(one, profile, inventory)).collect()
 }
 
-/// Returns findings in words. Commands in them are written as a user types them.
+/// Returns the findings as text. Commands in the text are written as a user types them.
 pub(super) fn texts(findings: &[impl ToString]) -> Vec<String> {
     findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
 }
@@ -79,7 +79,7 @@ fn signal(index: usize, text: &str, signal: &Signal) -> Value {
     })
 }
 
-/// Converts words of a buffer to pairs of name and value, in the order of the buffer. null: the value is not known.
+/// Converts the words of a buffer to pairs of name and value, in the order of the buffer. A value is null if it is unknown.
 pub(super) fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     let pair = |(index, key): (usize, String)| {
         let word = words.get(index).copied().flatten();
@@ -89,7 +89,7 @@ pub(super) fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     known.keys(kind).into_iter().enumerate().map(pair).collect()
 }
 
-/// Like [`named`], for outputs whose words are all known.
+/// Like [`named`], for outputs: all words are known.
 pub(super) fn outputs(known: &Known, words: &[u16]) -> Value {
     named(known, Kind::So, &words.iter().copied().map(Some).collect::<Vec<_>>())
 }

@@ -1,4 +1,4 @@
-//! Operator of the session: turns bus activity into events, samples and alarms, even in the middle of a procedure.
+//! Operator of the session: converts bus activity to events, samples and alarms, even during a procedure.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use super::shared::{Halt, Shared};
 /// State that the owner's thread keeps between turns.
 #[derive(Default)]
 struct Local {
-    /// `true` after the Stop at the session's end was sent.
+    /// `true` after the Stop at the end of the session was sent.
     end_sent: bool,
     now_us: u64,
 }
@@ -31,7 +31,7 @@ impl Hand {
         Self { shared, held, local: RefCell::default() }
     }
 
-    /// Reports a change of a running board: an event, and an alarm if the board was lost or left its loop by itself.
+    /// Reports a change of a running board as an event. Raises an alarm if the board was lost or left its loop without a command.
     pub(super) fn noticed(shared: &Shared, held: &Held, notice: &Notice, text: Option<&String>) {
         let Notice { board, change, time_s, .. } = *notice;
         let text = notice.text().or_else(|| text.cloned());
@@ -65,7 +65,7 @@ impl Operator for Hand {
                 }
                 return;
             }
-            // For running boards there is already another event.
+            // For running boards, another event already reports this.
             Event::Supervision { change: Supervision::UnknownRebooted { .. }, .. } => ("rebooted", None),
             Event::Supervision { .. } => return,
             Event::BoardError { board, .. } => ("error", Some(*board)),
@@ -94,8 +94,8 @@ impl Operator for Hand {
         let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
         let mut halts = self.shared.halts();
         if self.shared.has_ended() && !local.end_sent {
-            // The running request must undo its changes, perhaps on boards that do not answer. So the Stop is sent first, and
-            // no board continues to run in that time.
+            // The running request must undo its changes, possibly on boards that do not answer. Therefore the Stop is sent
+            // first, so that no board continues to run during this time.
             local.end_sent = true;
             halts.push(Halt::Started);
         }

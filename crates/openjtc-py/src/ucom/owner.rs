@@ -1,4 +1,4 @@
-//! Thread that owns a session: runs requests one after the other. A stop comes before all other requests.
+//! Thread that owns a session and runs requests in order. A stop is executed before all other requests.
 
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::JoinHandle;
@@ -24,7 +24,7 @@ enum Message<T> {
     Done(Result<T, Failure>),
 }
 
-/// Channel for the answers to a request.
+/// Channel that delivers the answers to a request.
 type Answers<T> = Mutex<mpsc::Receiver<Message<T>>>;
 
 /// Handle of the thread that owns a session.
@@ -40,7 +40,7 @@ impl Owner {
         let shared = Arc::new(Shared::default());
         let own = shared.clone();
         let thread = std::thread::spawn(move || {
-            // This guard ensures that no caller waits without end after a fault of this thread.
+            // This guard ensures that callers do not wait forever after a fault of this thread.
             let gone = Gone(&own);
             let mut state = WorkerState::new(own.clone(), config, link);
             match state.serve() {
@@ -58,8 +58,8 @@ impl Owner {
         Self { shared, thread: Mutex::new(Some(thread)), process: Process::this() }
     }
 
-    /// Sends a request and waits for its result without the GIL. Ctrl-C cancels the request, and stops everything that this session has
-    /// started.
+    /// Sends a request and waits for its result without holding the GIL. Ctrl-C cancels the request, and stops all boards that this
+    /// session has started.
     pub(super) fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -79,10 +79,10 @@ impl Owner {
         self.call_with(py, (Kind::Command, after), None, |state, _| act(state))
     }
 
-    /// Returns the number of the last Stop. A method that reads files before its request takes the number first, so that a Stop in that
-    /// time is not overlooked.
+    /// Returns the number of the last Stop. A method that reads files before its request must call this function first, so that a Stop
+    /// during the reading is detected.
     pub(super) fn now(&self) -> Result<u64, Failure> {
-        // In a forked process the lock of the queue may be held for ever.
+        // In a forked process, the lock of the queue may never be released.
         self.is_here()?;
         Ok(self.shared.queue.stops())
     }
@@ -108,7 +108,7 @@ impl Owner {
                 }),
                 Received::Nothing => Ok(()),
             };
-            // Signals are checked here as well, because reports may arrive without a gap.
+            // Signals are checked here as well, because reports may arrive without a pause.
             let result = reported.and_then(|()| py.check_signals());
             if let Err(error) = result {
                 self.shared.queue.cancel(|request| *request == id);
@@ -119,15 +119,15 @@ impl Owner {
         }
     }
 
-    /// Adds the result of each board to the exception that ended an update, because no report is returned.
+    /// Adds the result of each board to the exception that ended an update, because the update returns no report.
     fn add_outcomes(&self, py: Python<'_>, after: u64, error: &PyErr) {
         for text in self.shared.outcomes(after) {
-            // An error is ignored: exceptions have notes only since Python 3.11, and the events contain the same texts.
+            // Errors are ignored: exceptions have notes only since Python 3.11, and the events contain these texts, too.
             let _ = error.value(py).call_method1("add_note", (text,));
         }
     }
 
-    /// After a Ctrl-C, stops everything that this session has started, and waits for the end of the stop. Another Ctrl-C
+    /// After a Ctrl-C, stops all boards that this session has started, and waits for the end of the stop. Another Ctrl-C
     /// only ends the wait.
     pub(super) fn interrupted(&self, py: Python<'_>) {
         if !self.process.is_this() {
@@ -144,7 +144,7 @@ impl Owner {
         }
     }
 
-    /// Stops boards at once, in the middle of any request, then runs `act`.
+    /// Stops boards at once, even in the middle of a request, then runs `act`.
     pub(super) fn stop<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -156,7 +156,7 @@ impl Owner {
         loop {
             match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
-                // After a signal no further stop is needed here.
+                // If a signal arrives, another stop is not needed here.
                 _ => py.check_signals()?,
             }
         }
@@ -175,7 +175,7 @@ impl Owner {
         }
     }
 
-    /// Requests a Stop: the frames of `halt` go out at once, and `act` has its turn before all other requests.
+    /// Requests a Stop: the stop frames of `halt` are sent at once, and `act` runs before all other requests.
     fn overtake<T: Send + 'static>(
         &self,
         halt: Halt,
@@ -183,7 +183,7 @@ impl Owner {
     ) -> Answers<T> {
         let (id, act, answers) = self.request(|state, _| act(state));
         self.shared.queue.stop(id, act);
-        // After the current request is cancelled, so that it sends nothing after these frames.
+        // The current request is cancelled first, so that it sends nothing after these frames.
         self.shared.halt(halt);
         self.shared.queue.refuse_late();
         answers
@@ -204,7 +204,7 @@ impl Owner {
                 state.settle();
                 done
             });
-            // An error is ignored: a caller that has stopped waiting needs no answer.
+            // Errors are ignored, because a caller that has stopped waiting does not need an answer.
             let _ = sender.send(Message::Done(done));
         };
         self.shared.asked();
@@ -220,10 +220,10 @@ impl Owner {
         })
     }
 
-    /// Stops everything that this session has started, and releases the bus. Returns the boards whose stop is not certain.
+    /// Stops all boards that this session has started, and releases the bus. Returns the boards for which the stop is not certain.
     pub(super) fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         if !self.process.is_this() {
-            // A forked process does not have the thread, and the boards belong to its parent.
+            // A forked process does not have the thread, and the boards belong to the parent process.
             return Ok(Vec::new());
         }
         self.shared.end();
@@ -238,7 +238,7 @@ impl Owner {
             py.check_signals()?;
         }
         if let Some(thread) = lock(&self.thread).take() {
-            // A panic of that thread has been printed.
+            // A panic of that thread was already printed.
             drop(thread.join());
         }
         Ok(self.shared.take_left())
@@ -247,7 +247,7 @@ impl Owner {
 
 impl Drop for Owner {
     fn drop(&mut self) {
-        // The thread stops the started boards. The drop does not wait, because the caller may hold the GIL.
+        // The thread stops the started boards. The destructor does not wait, because the caller may hold the GIL.
         self.shared.end();
     }
 }

@@ -1,4 +1,4 @@
-//! Procedures of a chain. The functions call `ucom-host` in the same order as the command `ucom`.
+//! Procedures of a chain of boards. The functions call `ucom-host` in the same order as the `ucom` command does.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ use super::objects;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
 
-/// Time for which the doctor listens before it sends queries.
+/// Time for which the doctor listens to the bus before it sends queries.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// Returns the profile in a file, or the default profile. `on_lost` replaces the reaction to a lost board.
+/// Returns the profile that a file contains, or the default profile. `on_lost` replaces the reaction to a lost board.
 pub(super) fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Failure> {
     let mut profile = match path {
         None => Profile::default(),
@@ -48,12 +48,12 @@ pub(super) fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Prof
     Ok(profile)
 }
 
-/// Makes one failure from several findings.
+/// Combines several findings into one failure.
 fn findings(kind: ErrorKind, code: &'static str, texts: &[String], next: &'static str) -> Failure {
     Failure::new(kind, code, texts.join("; ")).next(next)
 }
 
-/// Queries all boards, without changing anything.
+/// Queries all boards and changes nothing.
 pub(super) fn scan(state: &mut WorkerState) -> Result<Value, Failure> {
     let report = match state.driver.run(Request::Scan)? {
         Outcome::Scan(report) => report,
@@ -71,8 +71,8 @@ pub(super) fn scan(state: &mut WorkerState) -> Result<Value, Failure> {
     }))
 }
 
-/// Resets and numbers the whole chain. `listed` is the present content of the inventory file. Returns the new inventory to the caller, who
-/// writes it, because a slow disk would delay the heartbeats here.
+/// Resets and numbers the whole chain. `listed` is the current content of the inventory file. Returns the new inventory; the caller writes
+/// it, because a slow disk would delay the heartbeats here.
 pub(super) fn init(
     state: &mut WorkerState,
     listed: Option<Inventory>,
@@ -109,7 +109,7 @@ pub(super) fn init(
     Ok((value, state.inventory.clone().filter(|_| report.is_ok())))
 }
 
-/// Reads the reports of boards about themselves.
+/// Reads the information that boards report about themselves.
 pub(super) fn info(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
     let mut all = Vec::new();
     for board in state.driver.numbers(boards)? {
@@ -119,7 +119,7 @@ pub(super) fn info(state: &mut WorkerState, boards: &Boards) -> Result<Value, Fa
     Ok(objects::boards(&all, &profile, state.inventory.as_ref()))
 }
 
-/// Converts boards with their status.
+/// Converts boards and their status.
 pub(super) fn numbered(state: &WorkerState, all: &[Numbered]) -> Value {
     let profile = state.driver.master.profile();
     all.iter().map(|(n, info)| objects::info(*n, info, &profile, state.inventory.as_ref())).collect()
@@ -174,7 +174,7 @@ pub(super) fn status(
     Ok(numbered(state, &all))
 }
 
-/// Resets boards into the exloader with programming enabled (PC_XRESET).
+/// Resets boards so that they enter the exloader with programming enabled (PC_XRESET).
 pub(super) fn xreset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let all = state.driver.change_each(&numbers, |board| Request::XReset { board, force })?;
@@ -182,8 +182,8 @@ pub(super) fn xreset(state: &mut WorkerState, boards: &Boards, force: bool) -> R
     Ok(numbered(state, &all))
 }
 
-/// Resets boards (PC_RESET), all at once or one by one. Returns the low bytes of the flash numbers of the boards that
-/// have reported.
+/// Resets boards (PC_RESET), either all at once or one after the other. Returns the low byte of the flash number of
+/// each board that sent a report.
 pub(super) fn reset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
     let targets: Vec<Option<u8>> = match boards {
         Boards::All => vec![None],
@@ -232,7 +232,7 @@ pub(super) fn repair(
     }
 }
 
-/// Listens, sends queries if they cannot do harm, and reports the findings.
+/// Listens to the bus, sends queries if they cannot disturb it, and reports the findings.
 pub(super) fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
     let seen = state.driver.examine(LISTEN)?;
     let profile = state.driver.master.profile();
@@ -243,7 +243,7 @@ pub(super) fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
     }))
 }
 
-/// Reads the image of a board's application, with the same bytes that were sent to the board.
+/// Reads the image file of the board application, as the bytes that are sent to the board.
 pub(super) fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
     let image = Image::read(path, &ImageOptions::default()).map_err(|e| Failure::usage(e.to_string()))?;
     Ok(image.into_bytes().into())

@@ -1,4 +1,4 @@
-//! Recording of the bus to a file: the session's bus passes frames to a separate thread that may wait for a disk.
+//! Recording of the bus to a file: the bus of the session passes its frames to a separate thread, which may wait for a disk.
 
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -15,10 +15,10 @@ use ucom_host::session::{Prompt, Recorder};
 use super::shared::Process;
 use crate::error::Failure;
 
-/// Interval at which recorded frames are written to the file.
+/// Interval at which the recorded frames are written to the file.
 const FLUSH: Duration = Duration::from_secs(1);
 
-/// Time of the session in µs, time since 1970 in ns, and a frame.
+/// Session time in µs, time since 1970 in ns, and the frame.
 struct Taken(u64, u64, CanFrame);
 
 /// Destination of frames during a recording.
@@ -35,13 +35,13 @@ impl Sink {
     }
 }
 
-/// Wrapper of a bus that copies frames to a recording. Its waits are short.
+/// Wrapper of a bus that copies frames to a recording. The waits of this wrapper are short.
 pub(super) struct Tap {
     bus: Prompt,
     sink: Sink,
     start: Instant,
-    /// Wall-clock time of the start. Later times are computed from it, so that the times in a file never go back after a
-    /// change of the clock.
+    /// Wall-clock time of the start. Later times are computed from this time, so that the times in a file never decrease
+    /// when the clock is changed.
     began_at: Duration,
 }
 
@@ -55,7 +55,7 @@ impl Tap {
         if let Some(sender) = &*self.sink.0.lock().unwrap_or_else(PoisonError::into_inner) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
-            // An error is ignored: on a full disk the writer has ended, and reports the error itself.
+            // An error is ignored: if the disk is full, the writer has ended and reports the error itself.
             let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
         }
     }
@@ -85,8 +85,7 @@ impl CanBus for Tap {
     }
 }
 
-/// Result of a recording: number of written frames, and number of frames that were left out, because the format cannot
-/// hold their protocol.
+/// Result of a recording: number of written frames, and number of omitted frames, whose protocol the format cannot store.
 type Written = Result<(u64, u64), RecordingError>;
 
 /// A recording that is being written.
@@ -98,7 +97,7 @@ pub(super) struct ChainRecording {
 }
 
 impl ChainRecording {
-    /// Begins a recording. The file ending selects its format.
+    /// Begins a recording. The file extension selects the format.
     pub(super) fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
@@ -149,7 +148,7 @@ impl ChainRecording {
 
 impl Drop for ChainRecording {
     fn drop(&mut self) {
-        // An error is ignored, because no caller is left to report it to.
+        // An error is ignored, because there is no caller to report it to.
         let _ = self.finish();
     }
 }
@@ -178,7 +177,7 @@ fn write(mut recorder: Recorder, taken: &Receiver<Taken>) -> Written {
 
 #[pymethods]
 impl ChainRecording {
-    /// Ends the recording. Returns the numbers of written and left-out frames; None if it has ended before.
+    /// Ends the recording. Returns the numbers of written and omitted frames; None if the recording has already ended.
     fn end(&self, py: Python<'_>) -> Result<Option<(u64, u64)>, Failure> {
         py.detach(|| self.finish())
     }

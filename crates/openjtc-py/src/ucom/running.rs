@@ -1,4 +1,4 @@
-//! Starts applications and control loops, with their initial values, and stops them.
+//! Starts applications and control loops with their initial values, and stops them.
 
 use serde_json::{Value, json};
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
@@ -16,7 +16,7 @@ pub(super) fn start(state: &mut WorkerState, boards: &Boards, force: bool) -> Re
     let all = state.starting(&numbers, |state| {
         state.driver.change_each(&numbers, |board| Request::Start { board, force })
     })?;
-    // The signal names of the boards are read. A failure does not undo the start.
+    // The signal names of the boards are read. If this fails, the start is not undone.
     numbers.iter().for_each(|board| drop(state.known(*board)));
     Ok(numbered(state, &all))
 }
@@ -37,17 +37,17 @@ pub(super) fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failur
     let numbers = state.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
-    // With `all`, every board of the parameter file must be present.
+    // If `all` boards are selected, every board of the parameter file must be present.
     let meant = |n: u8| run.boards == Boards::All || numbers.contains(&n);
     let file = run.file.take().map(|file| file.of_boards(meant));
-    // The identities of the boards are checked first, because this does not need a started application.
+    // The identities of the boards are checked first, because this check does not need a started application.
     if let Some(file) = &file {
         file.identities(&mut state.driver)?;
     }
     let begin = |session: &mut Session, cache: &Cache| {
         let mut prepared = Prepared::default();
         let started = begin(session, cache, &numbers, &run, file.as_ref(), &mut prepared);
-        // The failed procedure itself has undone its steps. Only the preparation must be undone here.
+        // The failed procedure has already undone its own steps. Only the preparation must still be undone here.
         let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
         Ok((report, prepared))
     };
@@ -58,8 +58,8 @@ pub(super) fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failur
     state.runs(&numbers);
     for board in numbers.iter().filter(|_| run.texts) {
         let change = AdminChange { debug: Some(true), ..Default::default() };
-        // The boards already run, perhaps with enabled outputs. If this returned an error, the caller would believe
-        // that they are stopped.
+        // The boards already run, perhaps with enabled outputs. If an error were returned here, the caller would
+        // assume that the boards are stopped.
         if let Err(error) = state.driver.run(Request::Admin { board: *board, change, force: true }) {
             state.driver.note(format!("board {board} possibly sends no texts: {error}"));
         }
@@ -96,8 +96,8 @@ fn begin(
     }
 }
 
-/// Enables the outputs of running boards, or makes them safe. The command for safe outputs is sent to each board, even if
-/// another board fails.
+/// Enables the outputs of running boards, or switches them to the safe state. The command for the safe state is sent to
+/// each board, even if another board fails.
 pub(super) fn outputs(state: &mut WorkerState, boards: &Boards, active: bool) -> Result<(), Failure> {
     let numbers = match boards {
         Boards::All => state.held.borrow().running().iter().copied().collect(),
@@ -118,7 +118,7 @@ pub(super) fn outputs(state: &mut WorkerState, boards: &Boards, active: bool) ->
     Ok(())
 }
 
-/// Returns a failure that lists all boards whose result is not certain.
+/// Returns a failure that lists all boards whose result is uncertain.
 fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failure> {
     let numbers: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
     let Some((board, error)) = failed.into_iter().next() else { return Ok(()) };
@@ -128,7 +128,7 @@ fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failur
     Err(own)
 }
 
-/// Stops each selected board; `all` means boards that answer and boards that this session has started.
+/// Stops each selected board. `all` selects the boards that answer and the boards that this session has started.
 pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
     let was_master = state.driver.master.is_master();
     let wanted = match boards {
@@ -136,7 +136,7 @@ pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -
             let mut wanted = state.started();
             match state.driver.numbers_to_stop(&Boards::All) {
                 Ok(found) => wanted.extend(found),
-                // A board without a number does not run.
+                // A board without a number cannot be running.
                 Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) if !wanted.is_empty() => {}
                 Err(error) => return Err(error.into()),
             }

@@ -1,4 +1,4 @@
-//! Stream of outputs of boards.
+//! Stream of board outputs.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,10 +14,10 @@ use super::shared::Listener;
 use crate::error::Failure;
 use crate::json;
 
-/// Time without outputs after which it is certain that no control loop runs on the bus.
+/// Time without outputs after which no control loop can be running on the bus.
 const SILENCE: Duration = Duration::from_secs(3);
 
-/// Reader of the outputs of boards, one set after the other.
+/// Reader that returns the outputs of boards, one set per call.
 #[pyclass(frozen, module = "openjtc._native")]
 pub(super) struct ChainSamples {
     pub chain: Py<Chain>,
@@ -26,13 +26,13 @@ pub(super) struct ChainSamples {
 
 #[pymethods]
 impl ChainSamples {
-    /// Returns the next sample. None: no sample arrives within `patience` seconds.
+    /// Returns the next sample. None means that no sample arrived within `patience` seconds.
     fn next<'py>(&self, py: Python<'py>, patience: Option<f64>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let chain = self.chain.get();
         let since = Instant::now();
         let patience = patience.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
         loop {
-            // A waiting reader restarts the deadline in the same way as a call.
+            // While a reader waits, the deadline is restarted as by a call.
             chain.owner.shared.asked();
             let left = patience.map_or(LOOK, |patience| patience.saturating_sub(since.elapsed()));
             let sample = py.detach(|| self.listener.next(left.min(LOOK)));

@@ -1,4 +1,4 @@
-//! State that the session's thread shares with its callers: requests, events and readers of samples.
+//! State that the thread of the session shares with its callers: requests, events and readers of samples.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -15,12 +15,12 @@ use super::alarms::Alarms;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
 
-/// Largest number of stored events, newest last.
+/// Maximum number of stored events; the newest event is the last one.
 const EVENTS_MAX: usize = 4096;
-/// Largest number of samples that wait for their reader.
+/// Maximum number of samples that wait for their reader.
 const SAMPLES_MAX: usize = 65_536;
 
-/// Kind of events with the result of an update for a board.
+/// Kind of the events that contain the update result of a board.
 pub(super) const UPDATED: &str = "updated";
 
 /// Control loops that must end before any other frame is sent.
@@ -31,7 +31,7 @@ pub(super) enum Halt {
     Started,
 }
 
-/// All outputs of a board at one time.
+/// Set of all outputs of a board at one time.
 pub(super) struct Sample {
     pub known: Arc<Known>,
     pub snapshot: Snapshot,
@@ -41,7 +41,7 @@ pub(super) struct Sample {
 pub(super) struct Listener {
     /// Boards whose samples are read.
     pub boards: BTreeSet<u8>,
-    /// Waiting samples, and number of dropped samples.
+    /// Samples that wait for the reader, and number of dropped samples.
     waiting: Mutex<(VecDeque<Sample>, u64)>,
     arrived: Condvar,
 }
@@ -67,7 +67,7 @@ impl Listener {
 /// State that the thread shares with its callers.
 #[derive(Default)]
 pub(super) struct Shared {
-    /// Requests to the thread, each with its number.
+    /// Requests to the thread; each request has a number.
     pub queue: Queue<WorkerState, u64>,
     /// Reason why the queue is closed.
     closed: Mutex<Option<Failure>>,
@@ -78,14 +78,14 @@ pub(super) struct Shared {
     pub alarms: Alarms,
     listeners: Mutex<Vec<Weak<Listener>>>,
     asked_at: Mutex<Option<Instant>>,
-    /// Boards that the session has started. The list can be read even after its thread has ended.
+    /// Boards that the session has started. The list can be read even after the thread of the session has ended.
     started: Mutex<Vec<u8>>,
-    /// Boards whose stop is not certain.
+    /// Boards for which the stop is not certain.
     not_stopped: Mutex<Vec<u8>>,
     seen: Mutex<Value>,
 }
 
-/// Locks a mutex, even after a panic of a thread, because the data is never left half changed.
+/// Locks a mutex, even after a panic of a thread, because the protected data is always consistent.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -99,11 +99,11 @@ fn stopped() -> Failure {
     failure(ErrorKind::Fault, "cancelled", "the call was cancelled by a stop before it began", "")
 }
 
-/// Process that created an object. A forked child has the memory of its parent, but none of its threads.
+/// Process that created an object. A forked child process has the memory of its parent, but none of its threads.
 pub(super) struct Process(u32);
 
 impl Process {
-    /// Returns the present process.
+    /// Returns the current process.
     pub(super) fn this() -> Self {
         Self(std::process::id())
     }
@@ -135,7 +135,7 @@ impl Shared {
         self.ended.store(true, Ordering::Relaxed);
     }
 
-    /// Requests that control loops end before any other frame is sent.
+    /// Requests that these control loops end before any other frame is sent.
     pub(super) fn halt(&self, halt: Halt) {
         lock(&self.halts).push(halt);
     }
@@ -145,27 +145,27 @@ impl Shared {
         *lock(&self.started) = boards;
     }
 
-    /// Reports all started boards as not stopped, after a fault of the thread.
+    /// Reports all started boards as possibly not stopped, after a fault of the thread.
     pub(super) fn all_left(&self) {
         self.left(std::mem::take(&mut *lock(&self.started)));
     }
 
-    /// Sets the boards whose stop is not certain at the end of the session.
+    /// Sets the boards for which the stop is not certain at the end of the session.
     pub(super) fn left(&self, boards: Vec<u8>) {
         *lock(&self.not_stopped) = boards;
     }
 
-    /// Takes the boards whose stop is not certain.
+    /// Removes and returns the boards for which the stop is not certain.
     pub(super) fn take_left(&self) -> Vec<u8> {
         std::mem::take(&mut *lock(&self.not_stopped))
     }
 
-    /// Returns `true` after [`Self::end`].
+    /// Returns `true` after a call of [`Self::end`].
     pub(super) fn has_ended(&self) -> bool {
         self.ended.load(Ordering::Relaxed)
     }
 
-    /// Takes the control loops that must end now.
+    /// Removes and returns the control loops that must end now.
     pub(super) fn halts(&self) -> Vec<Halt> {
         std::mem::take(&mut *lock(&self.halts))
     }
@@ -189,14 +189,14 @@ impl Shared {
         lock(&self.events).0
     }
 
-    /// Returns events with higher numbers, oldest first.
+    /// Returns the events with higher numbers than `after`, oldest first.
     pub(super) fn events(&self, after: u64) -> Value {
         self.asked();
         let events = lock(&self.events);
         events.1.iter().filter(|event| event["number"].as_u64() > Some(after)).cloned().collect()
     }
 
-    /// Returns the results of updates since this event.
+    /// Returns the results of updates that came after this event.
     pub(super) fn outcomes(&self, after: u64) -> Vec<String> {
         let events = self.events(after);
         let of_updates = events.as_array().into_iter().flatten().filter(|event| event["kind"] == UPDATED);
@@ -208,14 +208,14 @@ impl Shared {
         *lock(&self.seen) = value;
     }
 
-    /// Returns load and frame counts of the bus.
+    /// Returns the load and the frame counts of the bus.
     pub(super) fn bus(&self) -> Value {
         self.asked();
         lock(&self.seen).clone()
     }
 
-    /// Reports that running boards were stopped because no call came within the deadline. `not_stopped` lists the boards whose stop is
-    /// not certain.
+    /// Reports that running boards were stopped because no call came within the deadline. `not_stopped` contains the boards for which
+    /// the stop is not certain.
     pub(super) fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
         let mut text =
             format!("no call was made to the chain for {} s: its boards are stopped", deadline.as_secs_f64());
@@ -228,7 +228,7 @@ impl Shared {
         self.alarms.add(failure(ErrorKind::Fault, "deadline", &text, next));
     }
 
-    /// Restarts the deadline. Called at a request, and after the end of a request.
+    /// Restarts the deadline. This function is called when a request arrives and after a request ends.
     pub(super) fn asked(&self) {
         *lock(&self.asked_at) = Some(Instant::now());
     }
@@ -238,7 +238,7 @@ impl Shared {
         lock(&self.asked_at).map_or(Duration::ZERO, |at| at.elapsed())
     }
 
-    /// Returns each waiting alarm as an error, once.
+    /// Returns each waiting alarm once, as an error.
     pub(super) fn check(&self) -> Result<(), Failure> {
         self.asked();
         self.alarms.check()
@@ -266,7 +266,7 @@ impl Shared {
         lock(&self.listeners).push(Arc::downgrade(listener));
     }
 
-    /// Takes the next request and runs it.
+    /// Removes the next request from the queue and runs it.
     pub(super) fn take(&self, state: &mut WorkerState) -> bool {
         let Some(turn) = self.queue.take() else { return false };
         state.quiet();
@@ -276,7 +276,7 @@ impl Shared {
         true
     }
 
-    /// Returns the reason why the queue is closed. `None`: the queue is open.
+    /// Returns the reason why the queue is closed. `None` means that the queue is open.
     pub(super) fn gone(&self) -> Option<Failure> {
         lock(&self.closed).clone()
     }

@@ -1,4 +1,4 @@
-//! Simulated chain in this process. A socketcand server on this computer lets other programs join its bus.
+//! Simulated chain of boards in this process. Other programs can join its bus through a socketcand server on this computer.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use ucom_sim::{ChainConfig, ChainServer, ChainSim, Fault};
 use super::shared::Process;
 use crate::error::Failure;
 
-/// Longest wait between two checks for outside requests.
+/// Maximum wait between two checks for requests of other programs.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Options of a simulation.
@@ -27,7 +27,7 @@ pub(super) struct Simulation {
     pub seed: u64,
 }
 
-/// Simulated chain that runs in a thread until its last owner is dropped.
+/// Simulated chain that runs in a separate thread until its last owner is dropped.
 pub(super) struct Simulated {
     url: String,
     boards: usize,
@@ -38,7 +38,7 @@ pub(super) struct Simulated {
 }
 
 impl Simulated {
-    /// Starts the chain at a free port of this computer.
+    /// Starts the chain on a free port of this computer.
     pub(super) fn start(simulation: Simulation) -> Result<Self, Failure> {
         let Simulation { profile, chain, boards, faults, seed } = simulation;
         let config = match &chain {
@@ -73,7 +73,7 @@ impl Simulated {
                 Ok(server) => server,
                 Err(error) => return drop(ready.send(Err(error.to_string()))),
             };
-            // The receiver still waits, so sending cannot fail.
+            // The receiver still exists, so sending cannot fail.
             let _ = ready.send(Ok(server.url()));
             while !end.load(Ordering::Relaxed) {
                 lines.try_iter().for_each(|line| server.fault(&line));
@@ -86,17 +86,17 @@ impl Simulated {
         Ok(Self { url, boards, faults, ended, thread, process: Process::this() })
     }
 
-    /// Returns the URL of its bus.
+    /// Returns the URL of the bus of the chain.
     pub(super) fn url(&self) -> &str {
         &self.url
     }
 
-    /// Ends the chain and waits for its thread.
+    /// Ends the chain and waits until its thread has ended.
     fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(thread) = thread.filter(|_| self.process.is_this()) {
-            // A panic of that thread has been printed.
+            // A panic of that thread was already printed.
             drop(thread.join());
         }
     }

@@ -31,7 +31,7 @@ pub(super) struct Read {
     pub addresses: Option<String>,
     pub fill_gaps: bool,
     pub name_target: bool,
-    /// Requested year, month and day; `None`: today.
+    /// Requested year, month and day; `None` means the current date.
     pub date: Option<(u16, u8, u8)>,
     pub today: (u16, u8, u8),
 }
@@ -43,7 +43,7 @@ pub(super) struct Update {
     pub second: Option<UpdateImage>,
     /// Flash date in the format of the profile.
     pub date: u16,
-    /// `true` if the caller gave no date.
+    /// `true` if the caller did not pass a date.
     pub any_date: bool,
     pub flash_number: Option<u16>,
     pub expect_program_id: Option<u16>,
@@ -58,7 +58,7 @@ pub(super) struct Update {
 }
 
 impl Read {
-    /// Reads the image, or the images of both cycles if there are two, and the flash date in the format of the profile.
+    /// Reads the image, or both images if each cycle has its own. Also returns the flash date in the format of the profile.
     pub(super) fn read(
         &self,
         first: &Source,
@@ -119,7 +119,7 @@ fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, Failure
     Ok(image.into())
 }
 
-/// Returns the advice for an invalid image file. The advice never skips a check of the file's content.
+/// Returns the advice for an invalid image file. The advice never suggests to skip a check of the file content.
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
@@ -141,7 +141,7 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash number that each board must have. The number comes from the caller, or else from the inventory.
+/// Returns the flash number that each board must have. The flash number comes from the caller, or else from the inventory.
 fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {
@@ -153,7 +153,7 @@ fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<U
             }
         };
     }
-    // A single board can be selected by its number alone. Several boards need an inventory.
+    // A single board can be selected by its board number alone. To update several boards, an inventory is required.
     if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &state.inventory) {
         return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
     }
@@ -177,7 +177,7 @@ fn not_listed(state: &WorkerState, board: u8) -> Failure {
     own
 }
 
-/// Returns the selected boards. `all` means boards that answer and boards of the inventory, so that a missing board is reported.
+/// Returns the selected boards. `all` selects the boards that answer and the boards of the inventory, so that a missing board is reported.
 fn numbers(state: &mut WorkerState, boards: &Boards) -> Result<Vec<u8>, Failure> {
     let mut numbers = state.driver.numbers(boards)?;
     if let (Boards::All, Some(inventory)) = (boards, &state.inventory) {
@@ -227,7 +227,7 @@ pub(super) fn update(
     }
 }
 
-/// Adds an event with the result of each board, in case no caller receives the report.
+/// Adds an event with the result of each board, in case the report does not reach a caller.
 fn note_outcomes(state: &WorkerState, report: &UpdateReport) {
     let time_s = state.driver.now_us() as f64 * 1e-6;
     for one in report.boards.iter().filter(|_| !report.dry_run) {

@@ -1,4 +1,4 @@
-//! Inputs, outputs and parameters of boards by name.
+//! Access to inputs, outputs and parameters of boards by name.
 
 use std::collections::BTreeSet;
 
@@ -29,7 +29,8 @@ pub(super) fn signals(state: &mut WorkerState, boards: &Boards) -> Result<Value,
     Ok(all.into())
 }
 
-/// Sets an input, or a parameter if no input has this name or `buffer` selects it. Returns the sent value in the signal's unit.
+/// Sets an input. Sets a parameter if no input has this name or if `buffer` selects the parameters. Returns the value
+/// that was sent, in the unit of the signal.
 pub(super) fn set(
     state: &mut WorkerState,
     board: u8,
@@ -51,7 +52,8 @@ pub(super) fn set(
     note_rounded(&state.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = state.driver.now_us();
     let boards = state.driver.master.boards();
-    // The inputs of a running board are repeated, so a lost frame has no effect. A board without power does not run.
+    // The inputs of a running board are sent repeatedly, so a lost frame has no effect. If a board has no power, its
+    // control loop does not run.
     let runs = state.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
@@ -75,15 +77,15 @@ pub(super) fn set(
     Ok(signal.map_or(Value::Null, |signal| signal.json(word.word)))
 }
 
-/// Returns outputs with their age, inputs and parameters of boards. Queries unknown signal names.
+/// Returns the outputs with their age, the inputs and the parameters of boards. Signal names that are not known are queried.
 pub(super) fn values(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let numbers = with_names(state, &numbers, *boards == Boards::All)?;
     numbers.into_iter().map(|board| of_board(state, board)).collect()
 }
 
-/// Returns the boards whose signal names are known, and caches the names. With `all`, skips boards whose applications are not started.
-/// Returns an error if no board is left.
+/// Returns the boards whose signal names are known, and stores the names in the cache. If `all` boards are selected, boards whose
+/// applications are not started are skipped. Returns an error if no board remains.
 pub(super) fn with_names(
     state: &mut WorkerState,
     boards: &[u8],
@@ -115,7 +117,7 @@ pub(super) fn running(state: &mut WorkerState) -> Result<Value, Failure> {
         if known.is_some_and(|known| known.names.dimensions().so == 0) {
             continue;
         }
-        // Reports the reason first, if it is known.
+        // The reason is reported first, if it is known.
         state.shared.check()?;
         return Err(no_value(board, "outputs", one["age_s"].as_f64()));
     }
@@ -130,7 +132,7 @@ fn of_board(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
     let followed = held.followed.outputs(&state.driver.master, now_us);
     let followed =
         followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
-    // If this session does not run the board, another program does.
+    // If this session does not run the board, another program runs it.
     let other =
         || held.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
     let last = followed.or_else(other);
@@ -146,8 +148,8 @@ fn of_board(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
     }))
 }
 
-/// Returns a value by its name. This is an output of a board that sends outputs, else an input, else a parameter. Returns an error
-/// for an outdated output.
+/// Returns a value by its name. The value is an output if the board sends outputs, else an input, else a parameter. Returns an
+/// error for an outdated output.
 pub(super) fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Value, Failure> {
     let known = state.known(board)?;
     let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
@@ -165,14 +167,14 @@ pub(super) fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Va
         Buffer::Par => "parameters",
     }];
     if buffer == Buffer::So && all["stale"] == json!(true) {
-        // Reports the reason first, if it is known.
+        // The reason is reported first, if it is known.
         state.shared.check()?;
         return Err(no_value(board, name, all["age_s"].as_f64()));
     }
     Ok(list[usize::from(index)][1].clone())
 }
 
-/// Returns the failure for missing or outdated outputs of a board. `what` is one output, or all outputs.
+/// Returns the failure for missing or outdated outputs of a board. `what` names one output, or all outputs.
 fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
     let (code, message) = match age_s {
         None => ("no-outputs", format!("board {board} has sent no outputs: no control loop runs")),
@@ -183,7 +185,7 @@ fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
         .with(Facts::default().at_board(board))
 }
 
-/// Returns the text of a parameter file: the values written last, and all other names as comments.
+/// Returns the text of a parameter file: the values that were written last, and the other names as comments.
 pub(super) fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Result<String, Failure> {
     let mut saved = Vec::new();
     for board in state.driver.numbers(boards)? {
@@ -213,7 +215,7 @@ pub(super) fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Resul
     Ok(params_text(&saved))
 }
 
-/// Checks a whole parameter file against the boards, then writes its parameters. Returns their number.
+/// Checks a complete parameter file against the boards, then writes its parameters. Returns their number.
 pub(super) fn apply_parameters(
     state: &mut WorkerState,
     file: &ParameterFile,
@@ -221,7 +223,7 @@ pub(super) fn apply_parameters(
     force: bool,
 ) -> Result<usize, Failure> {
     file.identities(&mut state.driver)?;
-    // Writing needs a started application. A dry run only needs the signal names.
+    // Parameters can only be written to a started application. A dry run needs only the signal names.
     let session = &mut state.session;
     let known = session.cache.all(&mut session.driver, &session.signals, &file.numbers(), |_| !dry_run)?;
     let checked =
@@ -238,7 +240,7 @@ pub(super) fn apply_parameters(
     Ok(all.iter().map(|p| p.words.len()).sum())
 }
 
-/// Reads the initial inputs that a board requests.
+/// Reads the initial inputs of a board.
 pub(super) fn initial_inputs(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
     let known = state.known(board)?;
     match state.driver.run(Request::InitialInputs { board })? {

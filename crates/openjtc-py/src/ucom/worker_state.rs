@@ -1,4 +1,4 @@
-//! Session in its thread, which executes the requests from Python.
+//! Session in its own thread, which executes the requests from Python.
 
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
@@ -15,25 +15,24 @@ use super::operator::Hand;
 use super::shared::Shared;
 use super::simulated::Simulated;
 
-/// Longest duration of a turn. A wait for the bus itself is shorter.
+/// Maximum duration of a turn. Waits for the bus itself are shorter.
 const TURN: Duration = Duration::from_millis(25);
 
-/// Longest wait for the first outputs of a board, which come every few milliseconds, µs.
+/// Maximum wait for the first outputs of a board, which arrive every few milliseconds, in µs.
 const FIRST_US: u64 = 500_000;
 
 /// Configuration of a session.
 pub(super) struct Config {
     /// Profile of how boards interpret the protocol.
     pub profile: Profile,
-    /// Meaning of the words of inputs, outputs and parameters.
+    /// Signal table: the meaning of the words of inputs, outputs and parameters.
     pub signals: SignalTable,
     /// Cache of signal names.
     pub cache: Cache,
-    /// Inventory of the chain, and its file.
+    /// Inventory of the chain and its file path.
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
-    /// Time without a call after which the session stops boards that it has started; `None`: the boards continue to
-    /// run.
+    /// Time without a call after which the session stops the boards that it has started; `None` means that the boards continue to run.
     pub deadline: Option<Duration>,
     /// Simulated chain that ends with the session.
     pub simulated: Option<Arc<Simulated>>,
@@ -44,11 +43,11 @@ pub(super) struct WorkerState {
     pub session: Session,
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
-    /// Records of images that updates wrote to boards.
+    /// Records of the images that updates have written to boards.
     pub records: FlashRecords,
     pub shared: Arc<Shared>,
     deadline: Option<Duration>,
-    /// Declared after the session, so that the simulated chain is dropped after the bus is closed.
+    /// This field is declared after the session, so that the simulated chain is dropped after the bus is closed.
     _simulated: Option<Arc<Simulated>>,
 }
 
@@ -73,7 +72,7 @@ impl WorkerState {
         let held: Rc<RefCell<Held>> = Rc::default();
         let hand = Hand::new(shared.clone(), Rc::clone(&held));
         let driver = Driver::new(profile, link, Box::new(hand), CleanupList::default());
-        // The cache is kept in memory, so that heartbeats and stops of this thread never wait for a disk.
+        // The cache is kept in memory, so that heartbeats and stops of this thread do not wait for a disk.
         let session = Session { driver, cache: cache.in_memory(), signals, held };
         let records = FlashRecords::new(inventory_file.clone());
         Self { session, inventory, inventory_file, records, shared, deadline, _simulated: simulated }
@@ -94,8 +93,8 @@ impl WorkerState {
         Ok(())
     }
 
-    /// Stops the boards if the program makes no call within the deadline. Heartbeats show only that this computer works, not that
-    /// the commanding program works.
+    /// Stops the boards if the Python program makes no call before the deadline. Heartbeats prove only that this computer works,
+    /// not that the Python program works.
     fn keep_deadline(&mut self) {
         if let Some(deadline) = self.deadline
             && self.shared.silence() >= deadline
@@ -122,7 +121,7 @@ impl WorkerState {
 
     /// Sends all frames of a request before the caller receives the result.
     pub(super) fn settle(&mut self) {
-        // The next turn reports a lost bus.
+        // If the bus is lost, the next turn reports this.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }

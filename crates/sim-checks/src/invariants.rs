@@ -1,4 +1,4 @@
-//! Invariants of every millisecond, and a checker that runs together with a simulation.
+//! Invariants that hold in every millisecond, and a checker that runs together with a simulation.
 use jtc_bus::{Joint, Request, Target};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::{ExecCommand, FrameType};
@@ -11,10 +11,10 @@ use motion::{MotionWatch, powered};
 
 use jtc_sim::{Moment, Worked, World};
 
-/// Ticks between two frames that replace Move.
+/// Minimum number of ticks between two frames that replace Move.
 const MOVES_BETWEEN: u32 = 3;
 
-/// Checker with its state from one millisecond to the next.
+/// Checker, including its state from the previous milliseconds.
 #[derive(Clone, Debug)]
 pub struct Invariants {
     state: ControllerState,
@@ -45,7 +45,7 @@ impl Default for Invariants {
 }
 
 impl Invariants {
-    /// Creates a checker for a simulation that has already been running. Its present state and motion count as permitted.
+    /// Creates a checker for a simulation that is already running. The current state and motion of the simulation count as permitted.
     pub fn joining(world: &World) -> Self {
         let t = world.telemetry();
         Self {
@@ -73,7 +73,7 @@ impl Invariants {
         }
         let telemetry = moment.telemetry;
         if telemetry.tick <= self.controller_ticks {
-            // The controller is new after a reset.
+            // After a reset, the controller starts from its initial state.
             *self = Self::default();
         }
         self.controller_ticks = telemetry.tick;
@@ -92,7 +92,7 @@ impl Invariants {
         Ok(())
     }
 
-    /// Notes the commands that permit a change.
+    /// Records the commands that permit a change of state.
     fn note_commands(&mut self, moment: &Moment<'_>) {
         const CLEAR_CURRENT: u8 = FrameType::ClearCurrentErrors as u8;
         const CLEAR_OCCURRED: u8 = FrameType::ClearOccurredErrors as u8;
@@ -133,7 +133,7 @@ impl Invariants {
         Ok(())
     }
 
-    /// Checks J-24, no motion without a command, and J-31, the index does not decrease.
+    /// Checks J-24 (no motion without a command) and J-31 (the point index does not decrease).
     fn states(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let telemetry = moment.telemetry;
         let (from, to) = (self.state, telemetry.state);
@@ -141,7 +141,7 @@ impl Invariants {
             return Err(Broken::LeftErrorAlone { to });
         }
         if to == ControllerState::Error {
-            // A command before the error permits no action after it.
+            // A command before the error does not permit an action after the error.
             self.execute = false;
             self.teach = false;
         } else {
@@ -162,7 +162,7 @@ impl Invariants {
         {
             return Err(Broken::TaughtAlone);
         }
-        // Stop ends the run and returns to the first point.
+        // A Stop ends the run and returns the index to the first point.
         let executing =
             (self.trajectory, telemetry.trajectory) == (TrajectoryState::Execute, TrajectoryState::Execute);
         let running = (from, to) == (ControllerState::Operate, ControllerState::Operate) && executing;
@@ -196,7 +196,7 @@ impl Invariants {
                 return Err(Broken::Torque { state, joint: Joint::ALL[joint], torque: torque[joint] });
             }
             let limit = moment.config.joints[joint].torque_max;
-            // The resolution of the bus may round up by one step.
+            // Due to the resolution of the bus, the torque may be rounded up by one step.
             if torque[joint].abs() > limit + 0.02 {
                 return Err(Broken::TorqueLimit { joint: Joint::ALL[joint], torque: torque[joint], limit });
             }

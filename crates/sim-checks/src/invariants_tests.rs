@@ -4,7 +4,7 @@ use jtc_core::{Config, Telemetry};
 use super::*;
 use jtc_sim::Truth;
 
-/// Controller that behaves correctly, tick by tick; each test adds one violation.
+/// Controller that behaves correctly, one tick per call; each test adds one violation.
 struct Script {
     checker: Invariants,
     telemetry: Telemetry,
@@ -113,7 +113,7 @@ fn j24_leaving_error_or_moving_without_a_command_is_found() {
         Some(Broken::ExecutionAlone { to: TrajectoryState::Execute })
     );
 
-    // A command before the error permits nothing after it.
+    // A command before the error does not permit an action after the error.
     let mut script = Script::new();
     script.exec(ExecCommand::Execute);
     assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Stop), None);
@@ -200,7 +200,7 @@ fn j22_a_wrong_safety_output_is_found() {
     ));
 }
 
-/// Returns a joint on the path at this speed; Stop is executed in the next tick.
+/// Returns a joint that moves on the path at this speed; Stop is executed in the next tick.
 fn stopped_at(speed: f64) -> Script {
     let mut script = Script::new();
     script.exec(ExecCommand::Execute);
@@ -212,7 +212,7 @@ fn stopped_at(speed: f64) -> Script {
 
 #[test]
 fn j33_a_stop_that_takes_too_long_is_found() {
-    // Set values that do not come to rest, and an arm that does not follow them.
+    // Set values that do not come to rest, and an arm that does not follow the set values.
     for (state, trajectory) in [
         (ControllerState::Operate, TrajectoryState::Execute),
         (ControllerState::HoldPos, TrajectoryState::Stop),
@@ -221,7 +221,7 @@ fn j33_a_stop_that_takes_too_long_is_found() {
         let found = (0..600).find_map(|ms| script.tick(state, trajectory).map(|broken| (ms, broken)));
         assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{trajectory:?}");
     }
-    // A stop that was commanded before it could be executed begins when the arm brakes.
+    // If a stop was commanded before it could be executed, it begins when the arm brakes.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     script.telemetry.braking = true;
@@ -264,7 +264,7 @@ fn j33_a_stop_that_ends_is_none_and_an_error_ends_it() {
 
     let mut script = stopped_at(0.3);
     assert!((0..600).all(|_| script.tick(ControllerState::Error, TrajectoryState::Null).is_none()));
-    // Without a command it may move without a time limit.
+    // Without a command, the arm may move without a time limit.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     assert!((0..600).all(|_| script.tick(ControllerState::Operate, TrajectoryState::Execute).is_none()));
@@ -284,14 +284,14 @@ fn j35_a_joint_that_races_is_found() {
         script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
     });
     assert_eq!(found, Some((6, Broken::Speed { joint: Joint::ALL[3], velocity: -1.01 * limit, ticks: 6 })));
-    // Predicted velocities neither add to the time nor end it.
+    // A predicted velocity neither increases nor resets the counted time.
     let mut script = fast();
     assert!((0..5).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
     script.telemetry.joints[3].fresh = false;
     assert!((0..4).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
     script.telemetry.joints[3].fresh = true;
     assert!(script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_some());
-    // Without torque, or if it is slower, the motion is not a violation.
+    // If the joint has no torque or is slower, the motion is not a violation.
     let mut script = fast();
     assert!((0..10).all(|_| script.tick(ControllerState::Error, TrajectoryState::Null).is_none()));
     let mut script = fast();
@@ -302,7 +302,7 @@ fn j35_a_joint_that_races_is_found() {
 #[test]
 fn j43_torque_that_stays_at_its_limit_is_found() {
     let limit = Config::avena().joints[0].torque_max;
-    // At the limit once in nine ticks, and once in ten.
+    // The torque is at the limit in every ninth tick, and in every tenth tick.
     for (period, allowed) in [(9, false), (10, true)] {
         let mut script = Script::new();
         let mut good = true;
@@ -324,7 +324,7 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
         script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
     });
     assert_eq!(found, Some((11, Broken::Saturated { joint: Joint::ALL[0], ticks: 11 })));
-    // A joint that was just enabled has a second to catch its load, and no time in Teaching.
+    // A joint that was just enabled has one second to catch its load, but no time in Teaching.
     for (state, last) in [(ControllerState::HoldPos, 1_000), (ControllerState::Teaching, 0)] {
         let mut script = Script::new();
         script.telemetry.joints[0].torque = limit;

@@ -1,5 +1,5 @@
-//! An arm that is lowered through a pose in which its shoulder carries much of its torque limit, and is stopped in this pose (J-33). For
-//! tests, and for the tables of docs/safety.md.
+//! Lowering of an arm through a pose in which its shoulder carries much of its torque limit. The arm is stopped in this pose (J-33). The
+//! module is used by tests, and for the tables of docs/safety.md.
 use jtc_core::{Config, ControllerState, JOINTS, Parameters, TrajectoryState};
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::ExecCommand;
@@ -8,32 +8,32 @@ use jtc_sim::{ModelError, Operator, OperatorError, SimConfig, Support, host};
 
 /// Joint that lowers the arm: the shoulder, which carries the largest load.
 pub const LOADED: usize = 1;
-/// Speed below which a joint counts as standing, rad/s.
+/// Speed below which a joint counts as being at rest, in rad/s.
 const STANDS: f64 = 0.01;
-/// The observation ends when the arm has stood for this time, ms, or
+/// Time at rest after which the observation ends, in ms.
 const STOOD_MS: u64 = 1_000;
-/// after this time, ms.
+/// Maximum duration of the observation, in ms.
 const LONGEST_MS: u64 = 10_000;
 
-/// Returns a pose with the arm in front of the shoulder; the shoulder may be between upright and nearly horizontal.
+/// Returns a pose with the arm in front of the shoulder; the shoulder angle may be between upright and nearly horizontal.
 fn pose(shoulder: f64) -> JointVec {
     [0.0, shoulder, 0.3, 0.0, 0.0, 0.0]
 }
 
-/// Returns the torque that holds the shoulder at an angle, N·m.
+/// Returns the holding torque of the shoulder at an angle, N·m.
 pub fn holding_torque(model: &ArmModel, shoulder: f64) -> f64 {
     let dynamics = Dynamics::new(model, Config::avena().gravity);
     dynamics.inverse(&pose(shoulder), &[0.0; JOINTS], &[0.0; JOINTS])[LOADED]
 }
 
-/// Returns the default arm with `mass` kg more at the centre of its last link.
+/// Returns the default arm with an additional mass of `mass` kg at the centre of its last link.
 pub fn with_payload(mass: f64) -> ArmModel {
     let mut model = Parameters::avena().model;
     model.links[JOINTS].mass += mass;
     model
 }
 
-/// Returns the angle of the shoulder, rad, at which its holding torque is `torque` (N·m).
+/// Returns the angle of the shoulder, in rad, at which its holding torque is `torque` (N·m).
 pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
     let (mut high, mut low) = (0.0, -1.4);
     for _ in 0..60 {
@@ -58,20 +58,20 @@ pub struct Lowering {
     pub speed: f64,
     /// Pause or Stop.
     pub command: ExecCommand,
-    /// Deviation of the true arm from `model`.
+    /// Deviation of the simulated arm from `model`.
     pub model_error: ModelError,
-    /// Support of the arm without torque.
+    /// Support that carries the arm when it has no torque.
     pub support: Support,
 }
 
 /// Result of a lowering.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Largest deviation of a joint from the start pose within half a second after every joint was enabled, rad.
+    /// Maximum deviation of a joint from the start pose, in rad, within half a second after all joints were enabled.
     pub sag: f64,
-    /// Time from the last byte of the command until the trajectory state has left Execute, ms.
+    /// Time from the last byte of the command until the trajectory state leaves Execute, in ms.
     pub commanded_ms: u64,
-    /// Time until no joint moves, ms.
+    /// Time until all joints are at rest, in ms.
     pub standing_ms: u64,
     /// State at the end.
     pub state: ControllerState,
@@ -81,24 +81,24 @@ pub struct Outcome {
     pub errors: u16,
     /// Internal errors of all joints at the end.
     pub joints: u16,
-    /// Largest distance of a joint from its position at the command, rad.
+    /// Maximum distance of a joint from its position at the time of the command, in rad.
     pub way: f64,
-    /// Highest true speed of a joint after the command, rad/s.
+    /// Maximum true speed of a joint after the command, in rad/s.
     pub peak: f64,
-    /// Largest position error of any joint until the trajectory state has left Execute, rad.
+    /// Maximum position error of all joints until the trajectory state leaves Execute, in rad.
     pub error: f64,
 }
 
 impl Lowering {
-    /// Creates a lowering of the default arm. The shoulder's torque limit is set so that holding it at the command takes
-    /// `share` of the limit.
+    /// Creates a lowering of the default arm. The torque limit of the shoulder is set so that the holding torque at the
+    /// command is `share` of the limit.
     pub fn at_share(share: f64, speed: f64) -> Self {
         let model = Parameters::avena().model;
         let shoulder = -0.9;
         Self { torque_max: holding_torque(&model, shoulder) / share, ..Self::new(model, shoulder, speed) }
     }
 
-    /// Creates a lowering of an arm that the controller knows, with the limit of the default arm, and a Stop.
+    /// Creates a lowering of an arm whose model the controller knows, with the default torque limit and a Stop as the command.
     pub fn new(model: ArmModel, shoulder: f64, speed: f64) -> Self {
         Self {
             known: model,
@@ -112,7 +112,7 @@ impl Lowering {
         }
     }
 
-    /// Returns the operator of a simulation that was just switched on, with the arm above the pose of the stop, on its stand or brakes.
+    /// Returns the operator of a simulation that was just switched on. The arm rests on its stand or brakes, above the pose of the stop.
     fn operator(&self, from: JointVec) -> Operator {
         let mut controller = Config::avena();
         controller.joints[LOADED].torque_max = self.torque_max;
@@ -128,7 +128,7 @@ impl Lowering {
 
     /// Lowers the arm and stops it.
     pub fn run(&self) -> Result<Outcome, OperatorError> {
-        // The speed in the middle of the quintic is 15/8 of the mean speed.
+        // In the middle of the quintic, the speed is 15/8 of the mean speed.
         let reach = 0.3;
         let seconds = 15.0 / 8.0 * 2.0 * reach / self.speed;
         let (from, to) = (pose(self.shoulder + reach), pose(self.shoulder - reach));

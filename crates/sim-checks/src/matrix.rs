@@ -1,5 +1,4 @@
-//! Fault matrix: the reaction of the controller to each fault in each state, and the number of ticks until the reaction, as a table for the
-//! docs.
+//! Fault matrix: a table for the docs that shows how the controller reacts to each fault in each state, and after how many ticks.
 use core::fmt;
 
 mod contact;
@@ -19,12 +18,12 @@ pub use contact::contact_table;
 pub use standstill::standstill_table;
 pub use stopping::stopping_table;
 
-/// Time for which a reaction is awaited, ms.
+/// Time for which a reaction is expected, in ms.
 const WATCH_MS: u64 = 600;
-/// Pose in which the arm is held, rad.
+/// Pose in which the arm is held, in rad.
 const START: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 
-/// States in which faults are injected. Start lasts a single tick.
+/// States in which faults are injected. The Start state lasts a single tick.
 const STATES: [ControllerState; 5] = [
     ControllerState::Init,
     ControllerState::HoldPos,
@@ -36,9 +35,9 @@ const STATES: [ControllerState; 5] = [
 /// Reaction to a fault in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
-    /// No reaction within the observed time.
+    /// No reaction occurred within the observed time.
     None,
-    /// Another state, or more errors in the same state.
+    /// The controller entered another state, or reported more errors in the same state.
     Change {
         /// New state.
         state: ControllerState,
@@ -46,9 +45,9 @@ pub enum Reaction {
         errors: u16,
         /// New internal errors of all joints.
         joints: u16,
-        /// `true` if the state is unchanged: `errors` and `joints` are then the added ones.
+        /// `true` if the state is unchanged; `errors` and `joints` then contain only the added errors.
         same: bool,
-        /// Tick of the reaction, counted from the fault; the controller can detect the fault in tick 1.
+        /// Number of the tick with the reaction, counted from the fault; the controller can detect the fault in tick 1.
         tick: u64,
     },
     /// The watchdog reset the controller.
@@ -100,19 +99,19 @@ fn words(errors: u16, joints: u16) -> Vec<&'static str> {
     [internal, &of(errors, &jtc), &of(joints, &joint)].concat()
 }
 
-/// Reason why the matrix cannot be made.
+/// Reason why the matrix could not be generated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MatrixError {
-    /// The state was not reached.
+    /// The simulation did not reach the state.
     Operator(OperatorError),
-    /// An invariant was broken.
+    /// An invariant was violated.
     Invariant(Violation),
-    /// The arm did not come to rest within the time of a pause or stop.
+    /// The arm did not come to rest within the time of a Pause or Stop.
     NoStop {
-        /// Time until the arm stood, ms; `None`: the stop ended in an error, or the motion did not begin.
+        /// Time until the arm was at rest, in ms; `None` if the stop ended in an error or the motion did not begin.
         ms: Option<u64>,
     },
-    /// The arm was released after a fault in which it can be held.
+    /// The arm was released after a fault that permits the controller to hold it.
     Released {
         /// State before.
         state: ControllerState,
@@ -149,8 +148,8 @@ impl From<OperatorError> for MatrixError {
     }
 }
 
-/// Cell of the matrix: the reaction, and the recovery of the arm after ClearCurrentErrors. If the parameters were lost, they are sent
-/// again.
+/// Cell of the matrix: the reaction, and how the arm recovers after ClearCurrentErrors. If the parameters were lost, the host sends
+/// them again.
 struct Cell {
     reaction: Reaction,
     back: Back,
@@ -164,7 +163,7 @@ enum Back {
     Never,
 }
 
-/// Returns the table as Markdown.
+/// Returns the fault matrix as a Markdown table.
 pub fn fault_matrix() -> Result<String, MatrixError> {
     let mut out = format!(
         "A cell shows the next state of the controller, the number of the tick in which it changes, and the reason. Tick 1 is the first\n\
@@ -221,12 +220,13 @@ fn worse(back: Back) -> u8 {
     }
 }
 
-/// Returns a frame that changes nothing.
+/// Returns a frame that has no effect.
 fn harmless() -> Vec<u8> {
     host::frame(FrameType::GripperControl, &[0; 4])
 }
 
-/// Returns a simulation whose controller is in `state`. `host_timeout_ms`: its host supervision (J-59), 0 for none.
+/// Returns a simulation whose controller is in `state`. `host_timeout_ms` is the timeout of the host supervision
+/// (J-59); 0 disables the supervision.
 fn world_in(
     state: ControllerState,
     support: Support,
@@ -240,13 +240,13 @@ fn config_for(support: Support, host_timeout_ms: u16) -> SimConfig {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     config.controller.host_timeout_ms = host_timeout_ms;
     for drive in &mut config.drives {
-        // The motor alignment would take seconds without any other event.
+        // The motor alignment would take seconds in which nothing else occurs.
         drive.first_enable_ms = 60;
     }
     config
 }
 
-/// Brings a controller to `state`.
+/// Starts a simulation and brings its controller to `state`.
 fn bring_to(config: SimConfig, state: ControllerState) -> Result<Operator, OperatorError> {
     let host_timeout_ms = config.controller.host_timeout_ms;
     let mut operator = Operator::new(config);
@@ -256,7 +256,7 @@ fn bring_to(config: SimConfig, state: ControllerState) -> Result<Operator, Opera
     }
     operator.bring_up()?;
     operator.run(200);
-    // A supervised host sends frames until the fault.
+    // If the host is supervised, it sends frames until the fault.
     let run = |operator: &mut Operator, ms: u64| {
         for _ in 0..ms / 50 {
             operator.run(50);
@@ -294,7 +294,7 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     let mut reaction = Reaction::None;
     for tick in 1..=WATCH_MS {
         if tick % 50 == 1 {
-            // A frame for faults of the line to act on; it changes nothing.
+            // This frame has no effect; faults of the line can damage it.
             operator.world.host_write(&harmless());
         }
         row.act.before(&mut operator, tick);
@@ -306,9 +306,9 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     Ok(Cell { reaction, back: recover(&mut operator, &mut watch, state)? })
 }
 
-/// Performs the steps of an operator that bring the arm into position hold.
+/// Performs the steps with which an operator returns the arm to position hold.
 fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -> Result<Back, MatrixError> {
-    // In Init and Error the controller waits for the host anyway.
+    // In Init and Error, the controller waits for the host even without the fault.
     let host_first = matches!(state, ControllerState::Init | ControllerState::Error);
     let held = |operator: &Operator| {
         matches!(
@@ -334,7 +334,7 @@ fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -
     Ok(Back::Never)
 }
 
-/// Values that are compared with those of the next tick.
+/// Values that are compared with the values of the next tick.
 struct Watch {
     invariants: Invariants,
     state: ControllerState,
@@ -368,7 +368,7 @@ impl Watch {
         Ok(Self { invariants, state: telemetry.state, errors: telemetry.errors, resets: 0 })
     }
 
-    /// Simulates a millisecond and returns the change in it. The end of a trajectory is not a reaction.
+    /// Simulates one millisecond and returns the change in this millisecond. The end of a trajectory is not a reaction.
     fn step(&mut self, operator: &mut Operator) -> Result<Option<Seen>, MatrixError> {
         operator.step();
         self.invariants.check(&operator.world).map_err(MatrixError::Invariant)?;

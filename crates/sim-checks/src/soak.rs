@@ -1,4 +1,4 @@
-//! Soak run: hours of virtual time with random commands and faults, with a check of every millisecond.
+//! Soak run: hours of simulated time with random commands and faults; every millisecond is checked.
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, JOINTS, JointConfig, JointTelemetry, TrajectoryState};
 use jtc_dynamics::JointVec;
@@ -10,11 +10,11 @@ use jtc_sim::{
     host::{self, Listener},
 };
 
-/// Step time of the paths, ms.
+/// Time step of the trajectories, in ms.
 pub const PATH_STEP_MS: u16 = 10;
 
-/// Returns a path of the soak run, drawn from the seed: from `from` (rad) to a near position and back. All paths pass the check of the host
-/// (`jtc traj check`), so a stop on them must end in time.
+/// Returns a random trajectory of the soak run that depends on the seed: from `from` (rad) to a near position and back. All trajectories
+/// pass the check of the host (`jtc traj check`), so a stop on them must end in time.
 pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let to = from.map(|q| (q + 1.2 * (rng.f64() - 0.5)).clamp(-1.4, 1.4));
@@ -26,21 +26,21 @@ pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
 pub struct SoakReport {
     /// Virtual time, s.
     pub seconds: f64,
-    /// Number of times that each state was entered.
+    /// Number of entries into each state.
     pub entered: [u64; 6],
-    /// Milliseconds in each state.
+    /// Time in each state, in ms.
     pub spent_ms: [u64; 6],
     /// Number of finished trajectories.
     pub finished: u64,
     /// Number of injected faults.
     pub faults: u64,
-    /// Milliseconds with a torque at its limit.
+    /// Time with a torque at its limit, in ms.
     pub limited_ms: u64,
-    /// Number of sent commands.
+    /// Number of commands that were sent.
     pub commands: u64,
     /// Counters of the simulation.
     pub statistics: Statistics,
-    /// Invariant that was broken, which ends the run.
+    /// Invariant that was violated; a violation ends the run.
     pub violation: Option<Violation>,
 }
 
@@ -87,14 +87,14 @@ pub struct Soak {
     report: SoakReport,
     state: ControllerState,
     trajectory: TrajectoryState,
-    /// Time of the next command, ms; the next field is that of the next fault.
+    /// Time of the next command, in ms; the next field is the time of the next fault.
     next_command: u64,
     next_fault: u64,
     now: u64,
 }
 
 impl Soak {
-    /// Creates a simulation that depends on the seed: model errors, drives, line rate, start pose.
+    /// Creates a simulation whose model errors, drives, line rate and start pose depend on the seed.
     pub fn new(seed: u64) -> Self {
         let mut rng = fastrand::Rng::with_seed(seed ^ 0x736F_616B);
         let mut config = SimConfig { seed, log_entries: 200, ..SimConfig::default() };
@@ -102,7 +102,7 @@ impl Soak {
         config.baud = [Some(115_200), Some(921_600), Some(3_000_000), None][rng.usize(0..4)];
         config.support = if rng.u8(0..8) == 0 { Support::None } else { Support::Brakes };
         config.gripper = true;
-        // Alignment times that leave time for other events.
+        // These alignment times are short, so that time remains for other events.
         let quick = rng.bool();
         let mut drive = if rng.u8(0..3) == 0 { DriveConfig::older() } else { DriveConfig::default() };
         drive.first_enable_ms = if quick { 300 } else { 4000 };
@@ -122,7 +122,7 @@ impl Soak {
         }
     }
 
-    /// Simulates `ms` milliseconds; returns false if an invariant was broken.
+    /// Simulates `ms` milliseconds; returns false if an invariant was violated.
     pub fn run(&mut self, ms: u64) -> bool {
         for _ in 0..ms {
             if self.report.violation.is_some() {
@@ -133,7 +133,7 @@ impl Soak {
         true
     }
 
-    /// Returns the report so far.
+    /// Returns the report of the run up to now.
     pub fn report(&self) -> SoakReport {
         SoakReport {
             seconds: self.now as f64 * 1e-3,
@@ -147,7 +147,7 @@ impl Soak {
         self.world.clear_log();
     }
 
-    /// Returns the simulation, to analyse a violation.
+    /// Returns the simulation, so that the caller can analyse a violation.
     pub fn world(&self) -> &World {
         &self.world
     }
@@ -181,7 +181,7 @@ impl Soak {
         }
     }
 
-    /// Sends a command: mostly one that makes sense in the present state, sometimes any.
+    /// Sends a command: usually a command that is useful in the current state, sometimes a random one.
     fn command(&mut self) {
         let waiting = self.world.host_write_pending() > 0;
         self.next_command = self.now + self.rng.u64(5..1500);
@@ -214,7 +214,7 @@ impl Soak {
         }
     }
 
-    /// Returns a trajectory from the present position to a near one and back.
+    /// Returns a trajectory from the current position to a near position and back.
     fn motion(&mut self) -> Vec<u8> {
         let from = self.world.telemetry().joints.map(|j| j.position);
         host::trajectory(&path(&from, self.rng.u64(..)), PATH_STEP_MS, 113).concat()
@@ -247,7 +247,7 @@ impl Soak {
             7 => host::frame(FrameType::FrictionTableUseDefault, &[]),
             8 => host::frame(FrameType::FrictionPolynomialUseDefault, &[]),
             _ => {
-                // A valid frame with a flipped bit.
+                // Valid frame in which one bit is flipped.
                 let mut bytes = host::exec(ExecCommand::Execute);
                 let at = rng.usize(0..bytes.len());
                 bytes[at] ^= 1 << rng.u8(0..8);
@@ -283,10 +283,10 @@ impl Soak {
             17 => FaultKind::SerialFlipped { probability: small },
             18 => FaultKind::SerialDelayed,
             19 => FaultKind::TickOverrun,
-            // Most pushes are weak, some are stronger than any torque limit.
+            // Most pushes are weak; some exceed every torque limit.
             _ => FaultKind::Push { joint, torque: PUSH_MAX * (2.0 * rng.f64() - 1.0).powi(3) },
         };
-        // Short and long ones.
+        // Half of the faults last less than 12 ms.
         let duration = if rng.bool() { rng.u64(1..12) } else { rng.u64(12..1500) };
         self.report.faults += 1;
         let fault = Fault { kind, trigger: Trigger::At(self.now), duration_ms: Some(duration) };

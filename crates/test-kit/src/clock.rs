@@ -1,9 +1,9 @@
-//! Time for benchmarks: processor time of this thread alone.
+//! Clock for benchmarks, which measures only the processor time of this thread.
 
 use std::time::Duration;
 
-/// Processor time of this thread. The clock stops while another program runs on the processor. Caches that other programs have
-/// filled still slow the thread down, so the smallest of many measurements is nearest to the true time.
+/// Processor time of this thread. The clock stops while the processor runs another program. Other programs still slow the
+/// thread down because they fill the caches, so the minimum of many measurements is nearest to the true time.
 #[derive(Clone, Copy, Debug)]
 pub struct CpuTime(Duration);
 
@@ -16,20 +16,20 @@ impl CpuTime {
         Self(Duration::new(seconds.unwrap_or_default(), ns.unwrap_or_default()))
     }
 
-    /// Returns the present time. Without a clock per thread, this is a monotonic clock of the computer.
+    /// Returns the present time. On systems without a clock per thread, this is a monotonic clock of the computer.
     #[cfg(not(unix))]
     pub fn now() -> Self {
         static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
         Self(BEGIN.get_or_init(std::time::Instant::now).elapsed())
     }
 
-    /// Returns the nanoseconds since then.
+    /// Returns the nanoseconds since this time.
     pub fn elapsed_ns(self) -> f64 {
         Self::now().0.saturating_sub(self.0).as_secs_f64() * 1e9
     }
 }
 
-/// Returns the nanoseconds of the shortest of `rounds` runs of `work`.
+/// Returns the duration, in nanoseconds, of the shortest of `rounds` runs of `work`.
 pub fn least_ns(rounds: usize, mut work: impl FnMut()) -> f64 {
     let mut least = f64::INFINITY;
     for _ in 0..rounds {
@@ -44,7 +44,7 @@ pub fn least_ns(rounds: usize, mut work: impl FnMut()) -> f64 {
 mod tests {
     use super::*;
 
-    /// The shortest time is returned, and a thread that sleeps uses no processor time.
+    /// The minimum is returned, and a sleeping thread uses no processor time.
     #[test]
     fn work_takes_time_and_sleep_does_not() {
         let mut rounds = 0;

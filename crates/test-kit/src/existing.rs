@@ -1,9 +1,9 @@
-//! Data of an existing arm, which do not belong to this project. The variable `OPENJTC_DATA` contains their
-//! directory. Tests that need the data are skipped if they are missing.
+//! Data of an existing arm, which is not part of this project. The environment variable `OPENJTC_DATA`
+//! contains the directory of the data. If the data is missing, tests that need the data are skipped.
 
 use std::path::{Path, PathBuf};
 
-/// Returns a file of the data. If it is missing, prints a line and returns `None`.
+/// Returns the content of a data file. If the file is missing, prints a line and returns `None`.
 pub fn file(name: &str) -> Option<PathBuf> {
     let directory = std::env::var("OPENJTC_DATA")
         .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
@@ -15,8 +15,8 @@ pub fn file(name: &str) -> Option<PathBuf> {
     there.then_some(path)
 }
 
-/// Returns positions, velocities and accelerations of a trajectory as they are sent to the controller: 19 integers
-/// per line, of which the first is the time.
+/// Returns the positions, velocities and accelerations of a trajectory file as the host sends them to the
+/// controller. The file has 19 integers per line, of which the first is the time.
 ///
 /// # Panics
 /// If the file has another form.

@@ -1,4 +1,4 @@
-//! Clients that take all connections of an agent. The agent must still answer a Stop.
+//! Clients that use all connections of an agent. The agent must still answer a Stop.
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -7,9 +7,9 @@ use std::time::Duration;
 use crate::http::Http;
 use crate::patience::until;
 
-/// Connections that a flood keeps open: more than an agent accepts.
+/// Number of connections that a flood keeps open; an agent accepts fewer.
 const CONNECTIONS: usize = 400;
-/// Number of Stops that are sent into each flood.
+/// Number of Stops that are sent during each flood.
 const STOPS: usize = 20;
 
 /// Behaviour of the clients of a flood.
@@ -17,14 +17,14 @@ struct Flood {
     what: &'static str,
     /// Bytes that each client sends at once.
     bytes: Vec<u8>,
-    /// Bytes that each client sends repeatedly after that.
+    /// Bytes that each client then sends repeatedly.
     drip: &'static [u8],
     /// `true` if the clients read the answers.
     reads: bool,
 }
 
-/// Checks that Stops of every kind are answered in every flood. `command` is a request that needs the lease; `stops`
-/// are requests that stop something and need no lease.
+/// Checks that the agent answers Stops of every kind during every flood. `command` is a request that needs the
+/// lease; `stops` are stop requests, which need no lease.
 pub fn stops_are_answered_in_every_flood(http: &Http, command: &str, stops: &[&str]) {
     for flood in floods(http, command) {
         answered_in(http, &flood, stops);
@@ -89,7 +89,7 @@ fn answered_in(http: &Http, flood: &Flood, stops: &[&str]) {
     let (over, opened) = (AtomicBool::new(false), AtomicUsize::new(0));
     std::thread::scope(|threads| {
         threads.spawn(|| keep_open(http, flood, &opened, &over));
-        // Ends the flood even if a Stop fails.
+        // This ends the flood even if a Stop fails.
         let _end = End(&over);
         until(format_args!("the flood of {}", flood.what), || opened.load(Ordering::Relaxed) >= CONNECTIONS);
         for n in 0..STOPS {
@@ -107,7 +107,7 @@ fn answered_in(http: &Http, flood: &Flood, stops: &[&str]) {
     });
 }
 
-/// Ends a flood when it is dropped.
+/// Guard that ends a flood when it is dropped.
 struct End<'a>(&'a AtomicBool);
 
 impl Drop for End<'_> {
@@ -116,7 +116,7 @@ impl Drop for End<'_> {
     }
 }
 
-/// Keeps `CONNECTIONS` connections open, and opens another one for each that is closed.
+/// Keeps `CONNECTIONS` connections open, and replaces each connection that is closed.
 fn keep_open(http: &Http, flood: &Flood, opened: &AtomicUsize, over: &AtomicBool) {
     let mut streams: Vec<TcpStream> = Vec::new();
     while !over.load(Ordering::Relaxed) {
@@ -125,7 +125,7 @@ fn keep_open(http: &Http, flood: &Flood, opened: &AtomicUsize, over: &AtomicBool
             let Ok(mut stream) = TcpStream::connect_timeout(&http.address, Duration::from_secs(1)) else {
                 break;
             };
-            // The connection may have been closed at once.
+            // The agent may have closed the connection at once.
             let _ = stream.set_nonblocking(true).and_then(|()| stream.write_all(&flood.bytes));
             streams.push(stream);
             opened.fetch_add(1, Ordering::Relaxed);

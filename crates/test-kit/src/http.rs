@@ -1,4 +1,4 @@
-//! Requests as any client can send them: plain HTTP, without code of this project.
+//! Requests that any client can send: plain HTTP, without code of this project.
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 
@@ -6,17 +6,17 @@ use serde_json::Value;
 
 use crate::patience::{LONGEST, Patience};
 
-/// An agent as seen from outside.
+/// Agent as a remote client sees it.
 #[derive(Clone, Debug)]
 pub struct Http {
-    /// Address at which it listens.
+    /// Address at which the agent listens.
     pub address: SocketAddr,
     /// The operator's token.
     pub operator: String,
 }
 
 impl Http {
-    /// Sends a request with these header lines; returns the status and the body of the answer.
+    /// Sends a request with these header lines, and returns the status and the body of the answer.
     pub fn ask(&self, request: &str, lines: &[&str]) -> (u16, String) {
         let head: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
         self.exchange(&format!("{request} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: 0\r\n\r\n"))
@@ -27,12 +27,12 @@ impl Http {
         self.ask(request, &[&format!("Host: {}", self.address)])
     }
 
-    /// Sends a request of an operator's program, with the key of its lease and a body, if any.
+    /// Sends a request with the operator's token and, if they are set, a lease key and a body.
     pub fn api(&self, request: &str, key: Option<&str>, body: Option<Value>) -> (u16, Value) {
         self.api_as(Some(&self.operator), request, key, body)
     }
 
-    /// Like [`Self::api`], with another token or none.
+    /// Like [`Self::api`], but with another token or without a token.
     pub fn api_as(
         &self,
         token: Option<&String>,
@@ -51,8 +51,7 @@ impl Http {
         (status, serde_json::from_str(&body).unwrap_or(Value::Null))
     }
 
-    /// Sends a request without a body, with this token or none; returns the status, the head and the bytes of the
-    /// answer.
+    /// Sends a request without a body, with this token or without a token. Returns the status, the head and the body bytes of the answer.
     pub fn bytes_as(&self, token: Option<&String>, request: &str) -> (u16, String, Vec<u8>) {
         let token = token.map_or(String::new(), |token| format!("Authorization: Bearer {token}\r\n"));
         let host = self.address;
@@ -74,15 +73,15 @@ impl Http {
     fn exchange_bytes(&self, request: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(LONGEST)).expect("a time");
-        // A rejected request may be closed before all of it is written.
+        // If the agent rejects a request, it may close the connection before the whole request is written.
         let _ = stream.write_all(request.as_bytes());
         let mut all = Vec::new();
         let _ = stream.read_to_end(&mut all);
         all
     }
 
-    /// Waits for the first event after number `after` that `is` the wanted one; returns its number and the event.
-    /// Checks that no number is left out.
+    /// Waits for the first event after number `after` for which `is` returns `true`, and returns its number and
+    /// the event. Checks that the event numbers have no gap.
     pub fn event(&self, after: u64, what: &str, is: impl Fn(&Value) -> bool) -> (u64, Value) {
         let (mut patience, mut last, mut seen) = (Patience::begin(), after, Vec::new());
         loop {
@@ -100,7 +99,7 @@ impl Http {
         }
     }
 
-    /// Reads the texts of a WebSocket, one after another, until `enough` returns `true`.
+    /// Reads text messages from a WebSocket until `enough` returns `true`.
     pub fn stream(&self, path: &str, mut enough: impl FnMut(Value) -> bool) {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(LONGEST)).expect("a time");
@@ -136,13 +135,13 @@ impl Http {
     }
 }
 
-/// Returns the status in the first line of an answer, or 0 if the line has none.
+/// Returns the status in the first line of an answer, or 0 if this line has no status.
 fn status(answer: &str) -> u16 {
     answer.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0)
 }
 
-/// Checks that all requests of other sites are rejected. Requests with unknown tokens are rejected as well, except a
-/// Stop or a Pause.
+/// Checks that the agent rejects all requests from other sites. The agent also rejects requests with unknown tokens,
+/// except a Stop or a Pause.
 pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
     let own = format!("Host: {}", http.address);
     let bearer = format!("Authorization: Bearer {}", http.operator);
@@ -154,7 +153,7 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         assert_eq!(http.ask(request, &[&rebound, &bearer]).0, 403, "{request}: a name that points here");
         let neighbour = format!("Origin: http://127.0.0.1:{}", port ^ 1);
         assert_eq!(http.ask(request, &[&own, &neighbour]).0, 403, "{request}: another program's page");
-        // A Stop from this computer needs no token.
+        // A Stop from this computer does not need a token.
         let refused = if ["POST /api/stop", "POST /api/pause"].contains(request) { 200 } else { 401 };
         for token in ["Bearer 0123456789abcdefghij", "Basic b3BlcmF0b3I6"] {
             assert_eq!(
@@ -165,15 +164,14 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         }
     }
     assert_eq!(http.get("GET /api/status").0, 200);
-    // Reading a state changes nothing, and an image or a link on a page cannot stop anything.
+    // Reading a state changes nothing, so an image or a link on a page cannot stop anything.
     assert_eq!(http.get("GET /api/stop").0, 405);
 }
 
-/// Checks that the dashboard pages are served to requests with one of the agent's names, and not to pages of another
-/// site.
+/// Checks that the agent serves the dashboard pages for requests with one of its names, but not for pages of another site.
 pub fn pages_are_the_agents_own(http: &Http) {
     let own = format!("Host: {}", http.address);
-    // A wrong token does not affect a page: the page asks for a token itself.
+    // A wrong token does not affect a page, because the page itself asks the user for a token.
     for lines in [&[own.as_str()][..], &[&own, "Authorization: Bearer 0123456789abcdefghij"]] {
         let (status, page) = http.ask("GET /", lines);
         assert!(status == 200 && page.to_lowercase().starts_with("<!doctype html"), "{status} {page}");
@@ -191,8 +189,7 @@ pub fn pages_are_the_agents_own(http: &Http) {
     assert_ne!(http.get("POST /").0, 200);
 }
 
-/// Checks that a page can pass the token for its socket together with the protocol, and that another site's page cannot
-/// use this.
+/// Checks that a page can pass the token for its socket in the protocol header, and that a page of another site cannot.
 pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
     let host = format!("Host: {}", http.address);
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
@@ -209,7 +206,7 @@ pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
     assert_eq!(asked(&http.operator, &[evil]), 403);
 }
 
-/// Checks that a page of another site gets no socket.
+/// Checks that a page of another site cannot open a socket.
 pub fn a_socket_of_another_site_is_refused(http: &Http, path: &str) {
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
     let host = format!("Host: {}", http.address);
@@ -225,11 +222,11 @@ pub fn tokens_cannot_be_tried_without_end(http: &Http) {
         (0..40).map(|n| http.ask("GET /api/status", &[&host, &format!("Authorization: Bearer {n:0>43}")]).0);
     assert!(answers.by_ref().take(20).all(|status| status == 401));
     assert!(answers.all(|status| status == 429));
-    // Clients with a valid token, and clients on this computer that need none, are not blocked.
+    // Clients with a valid token are not blocked, and neither are clients on this computer, which need no token.
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
-/// Checks that wrong tokens, in any form and number, never block a Stop from this computer and never grant access.
+/// Checks that wrong tokens of any form and number never block a Stop from this computer and never permit access.
 pub fn a_wrong_token_keeps_no_stop_away(http: &Http, stops: &[&str]) {
     let host = format!("Host: {}", http.address);
     let evil = "Origin: https://evil.example";
@@ -300,7 +297,7 @@ pub fn refused_requests_are_answered_shortly(http: &Http, command: &str) {
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
-/// Checks the command log of [`refused_requests_are_answered_shortly`], after the agent has ended.
+/// Checks the command log that [`refused_requests_are_answered_shortly`] has produced, after the agent has ended.
 pub fn refusals_cost_few_short_lines(log: &str) {
     let lines: Vec<Value> =
         log.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect();
@@ -341,8 +338,8 @@ pub fn idle_connections_are_closed(http: &Http) {
     assert!(!String::from_utf8_lossy(&rest).contains("200"));
 }
 
-/// Checks that at most 64 requests wait for an event at once: further requests are answered at once, and the waiting
-/// ones receive their event. `begin` begins the first job of the agent.
+/// Checks that at most 64 requests wait for an event at the same time. Further requests are answered at once, and
+/// the waiting requests receive their event. `begin` starts the first job of the agent.
 pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
     const MOST: usize = 64;
     const MORE: usize = 16;
@@ -351,7 +348,7 @@ pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
         let (http, answered) = (http.clone(), answered.clone());
         std::thread::spawn(move || {
             let (status, found) = http.api("GET /api/events?job=1&wait_s=8", None, None);
-            // The test may have failed meanwhile.
+            // The test may have failed in the meantime.
             let _ = answered.send((status, found["events"].as_array().map_or(0, Vec::len)));
         });
     }

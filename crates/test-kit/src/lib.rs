@@ -1,6 +1,6 @@
-//! Shared code of the tests and benchmarks of several crates: runs of the stored inputs of the fuzz targets on the
-//! stable toolchain; documents that show the output of commands; pages whose commands are run; the data of an
-//! existing arm; a clock; the timeouts of tests; and requests to agents.
+//! Shared code of the tests and benchmarks of several crates: runs of the stored fuzz inputs on the stable
+//! toolchain, documents with command output, pages whose commands are run, data of an existing arm, a clock, test
+//! timeouts, and requests to agents.
 #![forbid(unsafe_code)]
 
 pub mod clock;
@@ -16,8 +16,8 @@ pub mod written;
 use std::fs::read_dir;
 use std::path::{Path, PathBuf};
 
-/// Returns `true` for the line in which a command lists the variables in effect. Documents leave it out, because they
-/// show each variable next to the command that sets it.
+/// Returns `true` for the line in which a command lists the environment variables that affect it. Documents omit this
+/// line, because they show each variable next to the command that sets it.
 fn shows_variables(line: &str) -> bool {
     ["jtc: from the environment: ", "ucom: from the environment: "]
         .iter()
@@ -27,11 +27,11 @@ fn shows_variables(line: &str) -> bool {
 /// Body of a fuzz target; it panics if a property is violated.
 pub type Body = fn(&[u8]);
 
-/// A fuzz target: the name of its file in `fuzz/fuzz_targets`, and its body.
+/// Fuzz target: the name of its file in `fuzz/fuzz_targets`, and its body.
 pub type Target = (&'static str, Body);
 
-/// Runs each body over every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. The name of the file that
-/// runs is printed, so a failing test shows it.
+/// Runs each body on every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. The name of the current
+/// file is printed, so that the output of a failed test shows the file.
 ///
 /// # Panics
 /// If a body panics, if the target does not exist, or if no input is stored for it. Otherwise a misspelt name would
@@ -48,7 +48,7 @@ pub fn run_kept_inputs(targets: &[Target]) {
     }
 }
 
-/// Returns the stored inputs of a target in the order of their names.
+/// Returns the stored inputs of a target, sorted by name.
 fn kept_inputs(target: &str) -> Vec<PathBuf> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz"));
     let source = fuzz.join("fuzz_targets").join(target).with_extension("rs");

@@ -1,18 +1,18 @@
-//! Timeouts of tests. All tests wait equally long, and longer while the computer is slow.
+//! Timeouts of tests. All tests use the same timeout, which becomes longer while the computer is slow.
 use std::fmt::Display;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Time that a test waits on a computer that is never late.
+/// Timeout of a test on a computer without delays.
 const TIME: Duration = Duration::from_secs(60);
-/// Longest time that a test waits on any computer. Blocking reads use it as their timeout.
+/// Maximum timeout of a test on any computer. Blocking reads use this timeout.
 pub const LONGEST: Duration = Duration::from_secs(300);
-/// Time between two observations.
+/// Time between two checks of a condition.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Seconds that are added to the limit for each second that the waiting thread is late.
+/// Seconds that are added to the timeout for each second of delay of the waiting thread.
 const GROWTH: u32 = 4;
 
-/// Wait of a test. If the computer is late with the waiting thread, it is also late with the programs that the test waits for.
+/// Wait of a test for a condition. If the computer delays the waiting thread, it also delays the programs that the test waits for.
 #[derive(Debug)]
 pub struct Patience {
     begun: Instant,
@@ -25,14 +25,13 @@ impl Patience {
         Self { begun: Instant::now(), late: Duration::ZERO }
     }
 
-    /// Sleeps for 20 ms before the next observation. Panics with `missing` when the time has passed; `format_args!`
-    /// is formatted only then.
+    /// Sleeps for 20 ms before the next check. Panics with `missing` after the timeout; `format_args!` is formatted only in this case.
     #[track_caller]
     pub fn pause(&mut self, missing: impl Display) {
         self.wait(missing, std::thread::sleep);
     }
 
-    /// Like `pause`, but waits with `wait`, which blocks for at most the given time. Returns the result of `wait`.
+    /// Like `pause`, but waits by calling `wait`, which blocks for at most the time that is passed to it. Returns the result of `wait`.
     #[track_caller]
     pub fn wait<T>(&mut self, missing: impl Display, wait: impl FnOnce(Duration) -> T) -> T {
         let (waited, late) = (self.begun.elapsed(), self.late);
@@ -40,7 +39,7 @@ impl Patience {
         self.slice(wait)
     }
 
-    /// Receives the next value of a channel. Returns `None` when the time has passed or no sender is left.
+    /// Receives the next value of a channel. Returns `None` after the timeout, or if all senders were dropped.
     pub fn receive<T>(&mut self, from: &Receiver<T>) -> Option<T> {
         while self.begun.elapsed() < self.limit() {
             match self.slice(|time| from.recv_timeout(time)) {
@@ -63,7 +62,7 @@ impl Patience {
     }
 }
 
-/// Waits until `reached` returns `true`. Panics with `what` when the time has passed.
+/// Waits until `reached` returns `true`. Panics with `what` after the timeout.
 #[track_caller]
 pub fn until(what: impl Display, mut reached: impl FnMut() -> bool) {
     let mut patience = Patience::begin();

@@ -1,23 +1,23 @@
-//! Pages whose commands are run as a reader of the page would type them, and compared with the output that the page
-//! shows.
+//! Pages whose commands are run in the way in which a reader of the page types them. The test compares their output with the page.
 //!
-//! A page is followed from top to bottom in a separate folder. A comment of the page selects the program whose tests
-//! run its fenced blocks, for example `<!-- commands: jtc -->`. These are blocks of the kind `console` (commands after
-//! `$ `, output below) and `sh` (commands without output). Each command must succeed, unless the next one is
-//! `echo $?`, and must print the output on the page. A line `...` stands for any number of lines. A comment directly
-//! above a block gives options, separated by semicolons:
+//! A page is executed from top to bottom in a separate folder. A comment on the page selects the program whose tests
+//! run the fenced blocks of the page, for example `<!-- commands: jtc -->`. The blocks are of the kind `console`
+//! (commands after `$ `, output below) and `sh` (commands without output). Each command must succeed, unless the next
+//! command is `echo $?`, and must print the output on the page. A line `...` stands for any number of lines. A comment
+//! directly above a block gives options, separated by semicolons:
 //!
-//! - `not run: REASON`: left out, and counted with its reason.
+//! - `not run: REASON`: the block is skipped and counted with its reason.
 //! - `numbers vary`: numbers are not compared, except numbers of joints and boards.
-//! - `terminal: NAME`: typed in a terminal of its own; the last command keeps running. If the block shows no command,
-//!   the test waits until the terminal has printed these lines. With `Ctrl-C`, that program is interrupted first.
-//! - `in tests: WORDS`: options added to the last command, so that a test takes no longer than necessary.
+//! - `terminal: NAME`: the block is typed in a separate terminal; its last command keeps running. If the block shows
+//!   no command, the test waits until the terminal has printed these lines. With `Ctrl-C`, the program in this
+//!   terminal is interrupted first.
+//! - `in tests: WORDS`: these options are added to the last command, so that a test takes no longer than necessary.
 //! - `typed: NAME`: the lines of a `text` block are typed into the program that runs in that terminal.
-//! - `program: NAME`: another program than the page's runs it.
+//! - `program: NAME`: this program runs the block, instead of the program of the page.
 //!
-//! `/tmp/jtc` and other paths in `/tmp` are in the page's folder. A port that `in tests` gives to a program
-//! (`127.0.0.1:0`) replaces the port that the page shows. `UPDATE_DOCS=1` updates the page if the output of its
-//! commands has changed.
+//! `/tmp/jtc` and other paths in `/tmp` are mapped to the folder of the page. If `in tests` specifies a port
+//! for a program (`127.0.0.1:0`), this port replaces the port that the page shows. `UPDATE_DOCS=1` updates the
+//! page if the output of its commands has changed.
 
 mod blocks;
 mod compare;
@@ -32,19 +32,19 @@ pub use blocks::{Block, Kind, Step, blocks};
 use compare::same;
 use terminal::Terminal;
 
-/// Result of following a page.
+/// Result of running the commands of a page.
 #[derive(Debug, Default)]
 pub struct Followed {
-    /// Commands that were run.
+    /// Number of commands that were run.
     pub commands: usize,
-    /// Reasons of blocks that were not run.
+    /// Reasons why blocks were not run.
     pub left_out: Vec<String>,
     /// Differences between the page and the output.
     pub wrong: Vec<String>,
 }
 
-/// Follows every page that has blocks of this program, in parallel: README.md and those of docs/. `programs` is the
-/// folder of the program.
+/// Runs every page that has blocks of this program, in parallel: README.md and the pages of docs/. `programs` is
+/// the folder that contains the program.
 ///
 /// # Panics
 /// If a page differs from the output of its commands, with the first lines that differ of each block; if no page has
@@ -81,12 +81,12 @@ pub fn follow_all(program: &str, programs: &Path) {
     );
 }
 
-/// Follows one page, and updates it if `UPDATE_DOCS` is set.
+/// Runs the commands of one page, and updates the page if `UPDATE_DOCS` is set.
 pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
     let text = std::fs::read_to_string(page).expect("a page");
     let mut run = Run::new(programs, page);
     let mut new = text.clone();
-    // From the end to the beginning, so that earlier positions stay valid.
+    // The blocks are replaced from the end to the beginning, so that earlier positions remain valid.
     let mut changed = Vec::new();
     for block in blocks(&text).iter().filter(|block| block.program() == Some(program)) {
         if let Some(reason) = block.note("not run") {
@@ -102,25 +102,25 @@ pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
         if new != text {
             std::fs::write(page, new).expect("the page can be written");
         }
-        // A command that fails is an error on any page.
+        // On every page, a command that fails is an error.
         run.done.wrong.retain(|text| text.contains("exit code"));
     }
     std::mem::take(&mut run.done)
 }
 
-/// A page that is being followed.
+/// Page whose commands are being run.
 struct Run {
     folder: PathBuf,
     programs: PathBuf,
     terminals: BTreeMap<String, Terminal>,
     /// Terminals in which a program has replaced the shell.
     taken: BTreeSet<String>,
-    /// Texts of the page, and the real texts that replace them.
+    /// Texts on the page, and the real texts that replace them.
     places: Vec<(String, String)>,
     done: Followed,
 }
 
-/// Default terminal, for blocks without the option `terminal`.
+/// Default terminal for blocks without the option `terminal`.
 const OWN: &str = "";
 
 impl Run {
@@ -141,19 +141,19 @@ impl Run {
         self.terminals.entry(name.to_owned()).or_insert_with(new)
     }
 
-    /// Returns the real command for a command of the page.
+    /// Returns the real command for a command on the page.
     fn real(&self, shown: &str) -> String {
         self.places.iter().fold(shown.to_owned(), |text, (page, real)| text.replace(page, real))
     }
 
-    /// Returns the form of a printed line on the page.
+    /// Returns a printed line in the form in which the page shows it.
     fn on_page(&self, line: &str) -> String {
         let line =
             self.places.iter().rev().fold(line.to_owned(), |text, (page, real)| text.replace(real, page));
         line.trim_end().to_owned()
     }
 
-    /// Runs a block. Returns its steps with their output if the page shows other output.
+    /// Runs a block. Returns the steps of the block with their real output if the page shows other output.
     fn block(&mut self, block: &Block) -> Option<Vec<Step>> {
         if let Some(name) = block.note("typed") {
             for step in block.steps() {
@@ -164,7 +164,7 @@ impl Run {
         }
         let mut steps = block.steps();
         if steps.is_empty() {
-            // The page has no output yet.
+            // The page does not show the output yet.
             steps.push(Step { command: String::new(), shown: Vec::new() });
         }
         let name = block.note("terminal").unwrap_or(OWN).to_owned();
@@ -202,12 +202,12 @@ impl Run {
         changed.then_some(steps)
     }
 
-    /// Starts a program that keeps running, or waits for its later output. Returns the lines so far.
+    /// Starts a program that keeps running, or waits for later output of the program. Returns the lines that were printed so far.
     fn go_on(&mut self, block: &Block, name: &str, step: &Step) -> Vec<String> {
         let (varying, shown) = (block.says("numbers vary"), step.shown.clone());
         let starts = !step.command.is_empty();
         if starts {
-            // A program that still runs in this terminal is ended first.
+            // If a program still runs in this terminal, it is ended first.
             if !self.taken.insert(name.to_owned()) {
                 self.terminals.remove(name);
             }
@@ -219,7 +219,7 @@ impl Run {
             self.terminal(name).interrupt();
         }
         let Some(last) = shown.iter().rfind(|line| !line.is_empty()).cloned() else {
-            // The page has no output yet: take the lines that come within 6 s of each other.
+            // The page does not show the output yet: the test accepts all lines until 6 s pass without a line.
             let mut printed = Vec::new();
             while std::env::var_os("UPDATE_DOCS").is_some()
                 && let Some(line) = self.terminal(name).line(Duration::from_secs(6))
@@ -230,7 +230,7 @@ impl Run {
         };
         let places = std::cell::RefCell::new(self.places.clone());
         let is_last = |line: &str| {
-            // Port that the program was given instead of the page's.
+            // If the program uses another port than the page shows, the pair of ports is stored.
             if let (Some(port), Some(real)) = (port(&shown.join("\n")), port(line))
                 && starts
                 && port != real
@@ -248,7 +248,7 @@ impl Run {
         if starts {
             return printed;
         }
-        // Ignores the output before the first line that the page shows.
+        // The output before the first line that the page shows is ignored.
         let from = printed.iter().position(|line| same(&shown[..1], std::slice::from_ref(line), varying));
         printed[from.unwrap_or(0)..].to_vec()
     }
@@ -261,7 +261,7 @@ impl Drop for Run {
     }
 }
 
-/// Returns the first port of this computer in a text, with its colon.
+/// Returns the first port of this computer in a text, including the colon.
 fn port(text: &str) -> Option<String> {
     let (_, rest) = text.split_once("127.0.0.1:")?;
     let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
@@ -282,7 +282,7 @@ fn difference(block: &Block, step: &Step, printed: &[String]) -> String {
 mod tests {
     use super::*;
 
-    /// Follows a page in a file of its own.
+    /// Runs a page that is stored in a separate file.
     fn followed(name: &str, text: &str) -> Followed {
         let page = std::env::temp_dir().join(format!("{name}-{}.md", std::process::id()));
         std::fs::write(&page, text).expect("a file");

@@ -1,10 +1,10 @@
-//! Files that another thread or program writes.
+//! Functions for files that another thread or program writes.
 use std::path::Path;
 
 use crate::patience::Patience;
 
-/// Returns the whole text of a file as soon as it contains all of these words. The wait is needed because a log is
-/// written without waiting for the disk.
+/// Returns the complete text of a file as soon as the text contains all of these words. The wait is necessary,
+/// because the log is written without waiting for the disk.
 pub fn text_with(path: &Path, words: &[&str]) -> String {
     let mut patience = Patience::begin();
     loop {

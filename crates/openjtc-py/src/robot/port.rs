@@ -133,7 +133,6 @@ impl AnyPort {
     }
 
     /// Writes a Stop frame for each new Stop that must stop every motion. For other Stops, a frame is written only
-    /// while this connection moves the arm. If a Stop concerns only this connection, the frame is written only
     /// while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();

@@ -1,13 +1,13 @@
-//! Findings of the checker.
+//! Violations that the checker finds.
 use core::fmt;
 
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, TrajectoryState};
 
-/// Invariant that was broken.
+/// Invariant that was violated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Broken {
-    /// A torque was sent in a state without torque.
+    /// The controller sent a torque in a state without torque.
     Torque {
         /// State.
         state: ControllerState,
@@ -25,25 +25,25 @@ pub enum Broken {
         /// Limit, N·m.
         limit: f64,
     },
-    /// A number is NaN or infinite.
+    /// A value is NaN or infinite.
     NotFinite {
-        /// Name of the value.
+        /// Name of the kind of value.
         what: &'static str,
         /// Joint.
         joint: Joint,
     },
-    /// The controller left the error state, although the host had cleared no error.
+    /// The controller left the Error state although the host had not cleared the error.
     LeftErrorAlone {
-        /// State that was entered.
+        /// State that the controller entered.
         to: ControllerState,
     },
-    /// The controller entered Operate without Execute from the host.
+    /// The controller entered Operate although the host had not sent Execute.
     MovedAlone,
-    /// The controller entered Teaching without a command from the host.
+    /// The controller entered Teaching although the host had not sent the command.
     TaughtAlone,
-    /// The controller entered an execution state that only the host can cause.
+    /// The controller entered an execution state that only a host command may cause.
     ExecutionAlone {
-        /// State that was entered.
+        /// State that the controller entered.
         to: TrajectoryState,
     },
     /// The point index decreased within a run.
@@ -53,52 +53,52 @@ pub enum Broken {
         /// Now.
         to: u32,
     },
-    /// The controller sent no frame, although it had its tick and is not in Start.
+    /// The controller sent no frame in a tick, although it is not in Start.
     Silent {
         /// State.
         state: ControllerState,
     },
-    /// Frames that replace Move are too close together.
+    /// Two frames that replace Move are too close together.
     NoMove {
-        /// Ticks since the last such frame.
+        /// Number of ticks since the last such frame.
         ticks: u32,
     },
-    /// The first frame after an error is not Move with zero torque.
+    /// The first frame after an error is not a Move frame with zero torque.
     ErrorWithoutZero,
-    /// The controller requests Enable for a node in a state that does not need it.
+    /// The controller requests Enable for a node in a state that does not permit this.
     Enabled {
         /// State of the controller.
         state: ControllerState,
         /// Node.
         node: usize,
     },
-    /// The frame that was sent is not a frame of the protocol.
+    /// The controller sent a frame that the protocol does not define.
     UnknownFrame {
         /// Identifier.
         id: u16,
     },
-    /// A pause or stop took too long without an error (J-33).
+    /// A Pause or Stop took too long, and no error was reported (J-33).
     NoStop {
-        /// Ticks since the command.
+        /// Number of ticks since the command.
         ticks: u32,
     },
-    /// A joint with torque was too fast for too long (J-35).
+    /// A joint with torque exceeded its speed limit for too long (J-35).
     Speed {
         /// Joint.
         joint: Joint,
         /// Measured velocity, rad/s.
         velocity: f64,
-        /// Consecutive measurements above the limit.
+        /// Number of consecutive measurements above the limit.
         ticks: u16,
     },
-    /// A torque was too often at its limit, although the arm neither braked nor caught a load (J-43).
+    /// A torque was at its limit in too many ticks, although the arm was not braking and was not catching a load (J-43).
     Saturated {
         /// Joint.
         joint: Joint,
-        /// Ticks at the limit, of the last 100.
+        /// Number of ticks at the limit, of the last 100 ticks.
         ticks: u32,
     },
-    /// The safety output does not agree with the errors.
+    /// The level of the safety output does not match the errors.
     SafetyOutput {
         /// Level.
         level: bool,
@@ -107,10 +107,10 @@ pub enum Broken {
     },
 }
 
-/// Broken invariant with its time.
+/// Violated invariant and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
-    /// Time since the start, µs.
+    /// Time since the start, in µs.
     pub time_us: u64,
     /// Invariant.
     pub broken: Broken,

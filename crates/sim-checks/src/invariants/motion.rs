@@ -1,4 +1,4 @@
-//! Invariants of the arm's motion: a stop ends in time, no joint is too fast, and no torque stays at its limit.
+//! Invariants of the motion: a stop ends in time, a joint is never too fast, and a torque does not remain at its limit.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
@@ -6,38 +6,38 @@ use jtc_wire::ExecCommand;
 use super::broken::Broken;
 use jtc_sim::{Moment, Worked};
 
-/// Time in addition to the time of J-33, ms, in which the arm comes to rest after the commanded motion.
+/// Time, in ms, in addition to the time of J-33. In this time the arm comes to rest after the end of the commanded motion.
 const REST_MS: u32 = 20;
-/// Speed below which a joint counts as standing, rad/s.
+/// Speed below which a joint counts as being at rest, in rad/s.
 const STANDS: f64 = 0.02;
-/// Number of ticks in which torques at their limit are counted.
+/// Number of ticks over which the ticks with a torque at the limit are counted.
 const WINDOW: u32 = 100;
 
-/// State that the check keeps from one millisecond to the next.
+/// State of the check, which is kept from one millisecond to the next.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MotionWatch {
-    /// Ticks since a pause or stop was commanded on the path, until the arm stands.
+    /// Number of ticks since a Pause or Stop was commanded on the path, until the arm is at rest.
     stopping: Option<u32>,
-    /// `true` if a push has brought a torque to its limit since then.
+    /// `true` if a push has increased a torque to its limit since that command.
     overpowered: bool,
-    /// Per joint: consecutive measurements above the limit.
+    /// Number of consecutive measurements above the speed limit, for each joint.
     fast: [u16; JOINTS],
-    /// Per joint: ticks for which it has been enabled.
+    /// Number of ticks since each joint was enabled.
     enabled: [u16; JOINTS],
-    /// For each joint, as a mask: in which of the last ticks the torque was at its limit. Bit 0 is the last tick.
+    /// Bit mask for each joint: the recent ticks in which the torque was at its limit. Bit 0 is the last tick.
     saturated: [u128; JOINTS],
 }
 
 impl MotionWatch {
-    /// Checks a tick; `before` is the execution state of the tick before it.
+    /// Checks a tick; `before` is the execution state in the previous tick.
     pub(super) fn check(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         self.stop(moment, before)?;
         self.speed(moment)?;
         self.torque(moment)
     }
 
-    /// Checks J-33: the arm stands in time, unless an error removes the torque. If a push leaves too little of the torque limit to
-    /// brake, the arm has the time of an error.
+    /// Checks J-33: the arm comes to rest in time, unless an error removes the torque. If a push leaves too little of the torque
+    /// limit for braking, the limit is `braking_ms_max` instead of `stop_ms`.
     fn stop(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         let t = moment.telemetry;
         let ends = |worked: &Worked| {
@@ -53,7 +53,7 @@ impl MotionWatch {
         self.stopping = match self.stopping {
             _ if !powered || stands || executes_again => None,
             None => commanded.then_some(0),
-            // After its full time, only the other limits apply to an arm that is held and pushed.
+            // After `braking_ms_max`, only the other limits apply to an arm that is held and pushed.
             Some(ticks)
                 if self.overpowered && t.trajectory != TrajectoryState::Execute && ticks >= braking =>
             {
@@ -69,7 +69,7 @@ impl MotionWatch {
         }
     }
 
-    /// Checks J-35. Predicted velocities neither add to the time nor end it.
+    /// Checks J-35. A predicted velocity neither increases nor resets the counted time.
     fn speed(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let config = moment.config;
         for (joint, t) in moment.telemetry.joints.iter().enumerate() {
@@ -93,7 +93,7 @@ impl MotionWatch {
         Ok(())
     }
 
-    /// Checks J-43. Torques at the limit are allowed while a stop brakes, and while the load of a joint that was just enabled is caught.
+    /// Checks J-43. Torques at the limit are allowed while a stop brakes, and while a joint that was just enabled catches its load.
     fn torque(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let t = moment.telemetry;
         for joint in 0..JOINTS {
@@ -112,7 +112,7 @@ impl MotionWatch {
     }
 }
 
-/// Returns true if a joint that is pushed has its torque at its limit.
+/// Returns true if a joint is pushed and its torque is at its limit.
 fn overpowered(moment: &Moment<'_>) -> bool {
     (0..JOINTS).any(|j| moment.truth.outside[j] != 0.0 && at_limit(moment, j))
 }

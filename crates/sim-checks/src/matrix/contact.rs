@@ -7,17 +7,17 @@ use super::standstill::state_then;
 use super::{MatrixError, bring_to, config_for};
 use jtc_sim::{Fault, FaultKind, ModelError, Operator, Side, Support, Trigger, host};
 
-/// Observed time, ms: longer than the remainder of the motion.
+/// Observed time, in ms. The remainder of the motion takes less time.
 const WATCH_MS: u64 = 5_000;
-/// Duration of a push, ms; the next constant is its share of the largest push that a joint can hold.
+/// Duration of a push, in ms. The next constant is the push as a share of the largest push that a joint can hold.
 const PUSH_MS: u64 = 500;
 const PUSH_SHARE: f64 = 0.8;
-/// Wall of a joint: stiffness (N·m/rad), damping (N·m·s/rad), and distance, rad.
+/// Wall on the path of a joint: stiffness (N·m/rad), damping (N·m·s/rad) and distance (rad).
 const WALL: (f64, f64, f64) = (3_000.0, 20.0, 0.1);
-/// Plane at the flange: stiffness (N/m), damping (N·s/m), and distance, m.
+/// Plane across the path of the flange: stiffness (N/m), damping (N·s/m) and distance (m).
 const PLANE: (f64, f64, f64) = (20_000.0, 100.0, 0.05);
 
-/// External influences on the arm.
+/// External influence on the arm.
 #[derive(Clone, Copy)]
 enum Meets {
     /// Push on a joint.
@@ -26,15 +26,15 @@ enum Meets {
     Wall(Joint),
     /// Plane across the path of the flange.
     Plane,
-    /// Load that the controller does not know, kg.
+    /// Mass of a load that the controller does not know, in kg.
     Load(f64),
-    /// Load that the controller does not know, and that the arm drops after a second, kg.
+    /// Mass of a load that the controller does not know and that the arm drops after a second, in kg.
     Drops(f64),
-    /// Friction of all joints, as a factor of the controller's values.
+    /// Friction of all joints, as a factor of the values that the controller knows.
     Friction(f64),
-    /// Masses of all links, as a factor of the controller's values.
+    /// Masses of all links, as a factor of the values that the controller knows.
     Masses(f64),
-    /// Safety input that is low for 1 ms. The host clears the error after this number of ms.
+    /// Safety input that is low for 1 ms. The host clears the error after this number of milliseconds.
     Cleared(u64),
 }
 
@@ -52,7 +52,7 @@ impl Meets {
         }
     }
 
-    /// Returns the affected joint, if there is one.
+    /// Returns the index of the affected joint, if there is one.
     fn joint(self) -> Option<usize> {
         match self {
             Self::Push(joint) | Self::Wall(joint) => Some(joint.index()),
@@ -60,7 +60,7 @@ impl Meets {
         }
     }
 
-    /// Returns the model errors that are present from the start.
+    /// Returns the model errors, which are present from the start.
     fn model_error(self) -> ModelError {
         match self {
             Self::Friction(factor) => {
@@ -71,7 +71,7 @@ impl Meets {
         }
     }
 
-    /// Acts before the step of millisecond `ms`, counted from 1.
+    /// Applies the influence before the step of millisecond `ms`, counted from 1.
     fn before(self, operator: &mut Operator, ms: u64) {
         let q = operator.world.truth().q;
         let fault = match self {
@@ -106,7 +106,7 @@ fn load(mass: f64) -> FaultKind {
     FaultKind::Payload { mass, com: [0.0, 0.0, 0.05] }
 }
 
-/// Returns a push in the direction of gravity, N·m: 0.8 · (95 % of the joint's limit − 1.1 times its load).
+/// Returns the torque of a push in the direction of gravity, N·m: 0.8 · (95 % of the joint's limit − 1.1 times its load).
 fn push(operator: &Operator, joint: usize) -> f64 {
     let config = operator.world.config();
     let q = operator.world.truth().q;
@@ -115,7 +115,7 @@ fn push(operator: &Operator, joint: usize) -> f64 {
     -holds.signum() * PUSH_SHARE * left.max(0.0)
 }
 
-/// Returns a plane across the path of the flange, a little ahead of it.
+/// Returns a plane across the path of the flange, a short distance in front of the flange.
 fn plane(operator: &Operator) -> FaultKind {
     let config = operator.world.config();
     let truth = operator.world.truth();
@@ -133,21 +133,21 @@ fn plane(operator: &Operator) -> FaultKind {
 /// Result of the observation.
 struct Outcome {
     then: String,
-    /// Time of the first reaction, ms.
+    /// Time of the first reaction, in ms.
     found: Option<u64>,
     /// `true` if the motion was finished.
     ended: bool,
-    /// Largest deviation of the affected joint, or of any joint; and of the others; rad.
+    /// Maximum deviations, in rad: first of the affected joint (or of any joint), then of the other joints.
     way: [f64; 2],
-    /// Highest speed of a joint, rad/s.
+    /// Maximum speed of a joint, in rad/s.
     speed: f64,
-    /// Largest external torque on a joint, and the remaining one, N·m.
+    /// Maximum external torque on a joint, and the external torque at the end, in N·m.
     torque: [f64; 2],
-    /// Work of the arm against external forces, and of these forces on the arm, J.
+    /// Work of the arm against external forces, and work of these forces on the arm, in J.
     work: [f64; 2],
 }
 
-/// Returns the table as Markdown.
+/// Returns the reactions to external influences as a Markdown table.
 pub fn contact_table() -> Result<String, MatrixError> {
     let mut out = format!(
         "All rows use the default arm on drives without brakes. A push acts in the direction of gravity, with {} % of the torque that the joint\n\
@@ -189,7 +189,7 @@ fn outcome(meets: Meets, state: ControllerState) -> Result<Outcome, MatrixError>
     let config = jtc_sim::SimConfig { model_error: meets.model_error(), ..config_for(Support::Stand, 0) };
     let mut operator = bring_to(config, state)?;
     if state == ControllerState::HoldPos {
-        // After this time the controller knows the load.
+        // After this time, the controller has estimated the load.
         operator.run(3_000);
     }
     let from = operator.world.truth().q;

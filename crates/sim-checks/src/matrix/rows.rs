@@ -1,38 +1,38 @@
-//! Faults in the rows of the tables, and the reasons for cells without a reaction.
+//! Rows of the tables with their faults, and the reasons for cells without a reaction.
 use jtc_bus::{GRIPPER, Joint};
 use jtc_core::ControllerState;
 use jtc_wire::{FrameType, fixed};
 
 use jtc_sim::{Fault, FaultKind, Operator, Trigger, host};
 
-/// Ticks after which a lasting fault is removed.
+/// Number of ticks after which a lasting fault is removed.
 pub(super) const LASTING_MS: u64 = 300;
 /// Number of short frames before a Stop.
 const FLOOD: usize = 4_000;
 
-/// Action on the world.
+/// Action on the simulated world.
 #[derive(Clone, Copy)]
 pub(super) enum Act {
     /// Fault, with its duration in ms.
     Fault(FaultKind, u64),
     /// Fault, its duration in ms, and the tick in which the host's command to clear all errors is executed.
     Cleared(FaultKind, u64, u64),
-    /// Two faults at once, with their duration in ms.
+    /// Two faults at the same time, with their duration in ms.
     Both(FaultKind, FaultKind, u64),
     /// Every second tick is missed.
     EverySecondTick,
     /// The host resets the gripper.
     ResetGripper,
-    /// Frame of the host.
+    /// Frame that the host sends.
     Frame(&'static [u8]),
-    /// Frame directly after one byte of noise, every 6 ms.
+    /// Frame that follows one byte of noise, and a byte of noise every 6 ms.
     InNoise(&'static [u8]),
-    /// Frame after thousands of short ones, all in the same millisecond.
+    /// Frame that follows thousands of short frames in the same millisecond.
     Behind(&'static [u8]),
 }
 
 impl Act {
-    /// Acts before the step of tick `tick`, counted from 1.
+    /// Performs the action before the step of tick `tick`, counted from 1.
     pub(super) fn before(self, operator: &mut Operator, tick: u64) {
         let world = &mut operator.world;
         let trigger = Trigger::At(world.now_us() / 1000);
@@ -65,23 +65,23 @@ impl Act {
     }
 }
 
-/// Byte of noise; the worst one, because it begins a frame.
+/// Byte of noise. This value has the worst effect, because it begins a frame.
 const NOISE: u8 = jtc_wire::HEADER;
 
 /// Row of the fault matrix.
 pub(super) struct Row {
     pub name: &'static str,
     pub act: Act,
-    /// Silence of the host after which the controller reacts, ms (J-59); 0: none.
+    /// Silence of the host after which the controller reacts, in ms (J-59); 0 disables the reaction.
     pub host_timeout_ms: u16,
-    /// Reason for no reaction while the arm is held or moves.
+    /// Reason why there is no reaction while the arm is held or moves.
     held: Option<&'static str>,
-    /// Reason for no reaction in Init and Error.
+    /// Reason why there is no reaction in Init and Error.
     parked: Option<&'static str>,
 }
 
 impl Row {
-    /// Returns the text of a cell without a reaction; `None` if a reaction is expected.
+    /// Returns the text for a cell without a reaction; `None` if a reaction is expected.
     pub(super) fn quiet(&self, state: ControllerState) -> Option<String> {
         match state {
             ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => {
@@ -92,22 +92,22 @@ impl Row {
     }
 }
 
-/// Returns a row for a fault that has an effect in every state.
+/// Returns a row for a fault that causes a reaction in every state.
 const fn seen(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: None }
 }
 
-/// Returns a row for a fault that the error state has already latched, if it was caused by the safety input.
+/// Returns a row for a fault that is already latched in the Error state, if the safety input caused that state.
 const fn latched(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("latched") }
 }
 
-/// Returns a row for a fault that matters only to an arm with torque.
+/// Returns a row for a fault that causes a reaction only while the arm has torque.
 const fn powered(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("no torque") }
 }
 
-/// Returns a row for a fault that is tolerated in every state, with the reason.
+/// Returns a row for a fault that the controller tolerates in every state, with the reason.
 const fn borne(name: &'static str, act: Act, why: &'static str) -> Row {
     Row { name, act, host_timeout_ms: 0, held: Some(why), parked: Some(why) }
 }
@@ -116,7 +116,7 @@ const fn fault(kind: FaultKind) -> Act {
     Act::Fault(kind, LASTING_MS)
 }
 
-/// Joint for the faults of a single joint.
+/// Joint that the faults of a single joint affect.
 const MEANT: Joint = Joint::ALL[1];
 const SILENT: FaultKind = FaultKind::NodeSilent { node: MEANT.index() as u8 };
 const GLITCH: FaultKind = FaultKind::EncoderJump { joint: MEANT, rad: 0.3 };
@@ -194,7 +194,7 @@ pub(super) const ROWS: [Row; 40] = [
     borne("4,000 frames ClearOccurredErrors at once", Act::Behind(&[]), "bounded"),
 ];
 
-/// Commands that stop, which apply only to a motion.
+/// Stop commands, which apply only to a motion.
 pub(super) const STOPS: [(&str, Act); 6] = [
     ("Pause", Act::Frame(&fixed::PAUSE)),
     ("Stop", Act::Frame(&fixed::STOP)),

@@ -1,20 +1,21 @@
-//! Distance and speed of the arm after a fault in motion until it stands, with holding brakes and without.
+//! Distance and speed of the arm after a fault in motion until the arm is at rest, with and without holding brakes.
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 
 use super::rows::{Act, ROWS, STOPS};
 use super::{MatrixError, words, world_in};
 use jtc_sim::Support;
 
-/// Speed below which a joint counts as standing, rad/s.
+/// Speed below which a joint counts as being at rest, in rad/s.
 const STANDS: f64 = 2e-3;
-/// Time below this speed after which a joint counts as standing, ms.
+/// Time below this speed after which a joint counts as being at rest, in ms.
 const STANDS_MS: u64 = 50;
-/// Time after the fault, ms. If the motion still runs then, the fault has stopped nothing. The motion itself takes longer.
+/// Time after the fault at which the motion is checked, in ms. If the arm still executes the motion at that time, the
+/// fault did not stop it. Without a fault, the motion takes longer than this time.
 const WATCH_MS: u64 = 700;
-/// Longest observed time, ms.
+/// Maximum observed time, in ms.
 const LONGEST_MS: u64 = 10_000;
 
-/// Motion after the fault.
+/// Motion of the arm after the fault.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Motion {
     GoesOn,
@@ -32,7 +33,7 @@ impl core::fmt::Display for Motion {
     }
 }
 
-/// Returns the table as Markdown, with each fault of the matrix in Operate.
+/// Returns a Markdown table with the motion after each fault of the matrix in Operate.
 pub fn standstill_table() -> Result<String, MatrixError> {
     let mut out = String::from(
         "Each fault happens in the middle of a motion. A row shows the state of the controller when every joint is at rest, the\n\
@@ -47,7 +48,7 @@ pub fn standstill_table() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// Returns the rows of the commands that stop.
+/// Returns the table rows of the stop commands.
 pub(super) fn stop_lines() -> Result<String, MatrixError> {
     let mut out = String::new();
     for (name, act) in STOPS {
@@ -59,7 +60,7 @@ pub(super) fn stop_lines() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// Checks J-33, with 20 ms more for the commanded motion to come to rest.
+/// Checks J-33. Allows 20 ms more, in which the arm comes to rest after the commanded motion.
 pub(super) fn stood_in_time(motion: &Motion) -> Result<(), MatrixError> {
     match *motion {
         Motion::Stands { ms, .. } if ms <= 520 => Ok(()),
@@ -75,7 +76,7 @@ fn line(name: &str, act: Act, host_timeout_ms: u16) -> Result<String, MatrixErro
     Ok(format!("| {name} | {then} | {brakes} | {stand} |\n"))
 }
 
-/// Returns the state and the motion after `act`.
+/// Returns the state and the motion of the arm after `act`.
 fn motion(support: Support, act: Act, host_timeout_ms: u16) -> Result<(String, Motion), MatrixError> {
     let mut operator = world_in(ControllerState::Operate, support, host_timeout_ms)?;
     let from = operator.world.truth().q;
@@ -107,7 +108,7 @@ fn motion(support: Support, act: Act, host_timeout_ms: u16) -> Result<(String, M
     Ok((state_then(t.state, t.trajectory, t.errors, joints), motion))
 }
 
-/// Returns the state, the execution state if there is a path, and the errors.
+/// Returns the controller state, the execution state if there is a path, and the errors.
 pub(super) fn state_then(
     state: ControllerState,
     trajectory: TrajectoryState,

@@ -1,4 +1,4 @@
-//! Rows that apply only to a motion: commands that stop, on a bad line, near the torque limit, and with a payload.
+//! Rows that apply only to a motion: stop commands on a bad line, near the torque limit, and with a payload.
 use jtc_core::{ControllerState, Parameters};
 
 use super::MatrixError;
@@ -6,7 +6,7 @@ use super::standstill::{Motion, state_then, stood_in_time, stop_lines};
 use crate::lowering::{LOADED, Lowering, holding_torque, with_payload};
 use jtc_sim::Support;
 
-/// Holding torque of the shoulder as a share of its torque limit, speed (rad/s), and `true` if the torque suffices for stopping in time.
+/// Holding torque of the shoulder as a share of its torque limit, speed (rad/s), and `true` if the torque suffices to stop in time.
 const LOADS: [(f64, f64, bool); 6] = [
     (0.90, 0.2, true),
     (0.95, 0.2, true),
@@ -15,12 +15,12 @@ const LOADS: [(f64, f64, bool); 6] = [
     (1.02, 0.2, false),
     (1.02, 0.4, false),
 ];
-/// Masses of the payload, kg.
+/// Payload masses, in kg.
 const PAYLOADS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// Angle of the shoulder at which the arm with a payload is stopped, rad, and its speed, rad/s.
 const WITH_PAYLOAD: (f64, f64) = (-0.9, 0.3);
 
-/// Returns the table as Markdown.
+/// Returns the results of the stop commands as Markdown tables.
 pub fn stopping_table() -> Result<String, MatrixError> {
     let mut out = format!(
         "The times count from the last byte of the command. In the rows *at … % of the torque limit*, the shoulder (joint {}) moves down. The\n\
@@ -56,16 +56,17 @@ pub fn stopping_table() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// Results of a lowering, with holding brakes and without.
+/// Results of a lowering with and without holding brakes.
 struct Line {
     then: [String; 2],
     motion: [Motion; 2],
-    /// Larger sag of both, rad.
+    /// Maximum sag of both cases, in rad.
     sag: f64,
 }
 
 impl Line {
-    /// Runs a lowering. The arm must be held when it stands; if the torque `suffices`, it must stand in time.
+    /// Runs a lowering. The controller must hold the arm after it comes to rest. If the torque `suffices`, the arm must
+    /// come to rest in time.
     fn of(lowering: &Lowering, suffices: bool) -> Result<Self, MatrixError> {
         let mut sag = 0.0f64;
         let mut one = |support| -> Result<(String, Motion), MatrixError> {

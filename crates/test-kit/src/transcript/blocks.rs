@@ -1,11 +1,11 @@
-//! The fenced blocks of a page, and the comments that specify how each is run.
+//! Fenced blocks of a page, and the comments that specify how each block is run.
 
 use std::ops::Range;
 
 /// Kind of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Commands after `$ `, each with its output.
+    /// Commands after `$ `, each followed by its output.
     Console,
     /// Commands without output.
     Sh,
@@ -13,47 +13,47 @@ pub enum Kind {
     Text,
 }
 
-/// A block that is used when the page is run.
+/// Block that is used when the page is run.
 #[derive(Clone, Debug)]
 pub struct Block {
     /// Kind of the block.
     pub kind: Kind,
-    /// Line of its fence, counted from 1.
+    /// Line number of the opening fence, counted from 1.
     pub line: usize,
-    /// Its lines without the fences, as a byte range of the page.
+    /// Lines of the block without the fences, as a byte range of the page.
     pub body: Range<usize>,
     /// The text between the fences.
     pub text: String,
-    /// Parts of the comment directly above the block.
+    /// Options in the comment directly above the block.
     notes: Vec<String>,
-    /// Program in the page's `commands` comment, if there is one.
+    /// Program in the `commands` comment of the page, if there is one.
     page: Option<String>,
 }
 
 impl Block {
-    /// Returns the text after `key:` in its comment.
+    /// Returns the text after `key:` in the comment of the block.
     pub fn note(&self, key: &str) -> Option<&str> {
         self.notes.iter().find_map(|note| note.strip_prefix(key)?.strip_prefix(':')).map(str::trim)
     }
 
-    /// Returns `true` if a part of its comment is `words`.
+    /// Returns `true` if an option in the comment is `words`.
     pub fn says(&self, words: &str) -> bool {
         self.notes.iter().any(|note| note == words)
     }
 
-    /// Returns the program whose tests run it.
+    /// Returns the program whose tests run the block.
     pub fn program(&self) -> Option<&str> {
         self.note("program").or(self.page.as_deref())
     }
 }
 
-/// Returns the text of a comment of one line.
+/// Returns the text of a one-line comment.
 fn comment(line: &str) -> Option<&str> {
     line.trim().strip_prefix("<!--")?.strip_suffix("-->").map(str::trim)
 }
 
-/// Returns the blocks of a page in order. Leaves out blocks that tests generate, between `<!-- … begin -->` and
-/// `<!-- … end -->`, and texts that are not typed.
+/// Returns the blocks of a page in order. Blocks that tests generate, between `<!-- … begin -->` and `<!-- …
+/// end -->`, and texts that are not typed are omitted.
 pub fn blocks(page: &str) -> Vec<Block> {
     let named = page.lines().filter_map(comment).find_map(|text| text.strip_prefix("commands:"));
     let named = named.map(|name| name.trim().to_owned());
@@ -96,17 +96,17 @@ pub fn blocks(page: &str) -> Vec<Block> {
     found
 }
 
-/// A command of a block, and its output on the page.
+/// Command of a block and its output on the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// Command to type; empty if the block continues the output of a program that runs already.
+    /// Command that is typed; empty if the block shows later output of a running program.
     pub command: String,
     /// Lines below it.
     pub shown: Vec<String>,
 }
 
 impl Block {
-    /// Returns its commands. A line after `> ` continues the command above it.
+    /// Returns its commands. A line after `> ` continues the previous command.
     pub fn steps(&self) -> Vec<Step> {
         let mut steps: Vec<Step> = Vec::new();
         for line in self.text.lines() {

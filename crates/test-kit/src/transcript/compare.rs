@@ -1,10 +1,10 @@
-//! Comparison of the output of a command with the page.
+//! Comparison of command output with the output on the page.
 
-/// The line of a page that stands for any number of lines.
+/// Line on a page that stands for any number of output lines.
 const LEFT_OUT: &str = "...";
 
-/// Returns `true` if the printed lines match the page, line by line; `...` stands for any number of lines. With
-/// `varying`, numbers are not compared, except those of joints and boards.
+/// Returns `true` if the printed lines match the lines of the page; `...` matches any number of lines. If
+/// `varying` is set, numbers are not compared, except the numbers of joints and boards.
 pub(super) fn same(shown: &[String], printed: &[String], varying: bool) -> bool {
     let prepared = |lines: &[String]| -> Vec<String> {
         let line = |line: &String| if varying { masked(line) } else { line.trim_end().to_owned() };
@@ -26,8 +26,7 @@ fn fits(shown: &[String], printed: &[String]) -> bool {
     }
 }
 
-/// Returns the line with `#` for each number and one blank for each gap, because the width of a gap depends on the
-/// adjacent numbers.
+/// Returns the line with `#` for each number and one blank for each gap. The width of a gap depends on the adjacent numbers.
 fn masked(line: &str) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut out = Vec::new();
@@ -44,7 +43,7 @@ fn numbers_masked(word: &str) -> String {
     let mut rest = word;
     while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
         let (before, from) = rest.split_at(at);
-        // The sign is a part of the number.
+        // The sign belongs to the number.
         out += before.strip_suffix(['-', '+', '−']).unwrap_or(before);
         out.push('#');
         rest = &from[number_length(from)..];
@@ -52,8 +51,9 @@ fn numbers_masked(word: &str) -> String {
     out + rest
 }
 
-/// Returns the length in bytes of the number at the beginning of the text. A number is decimal, perhaps with an
-/// exponent, or hexadecimal. Hexadecimal numbers begin with `0x`, or have eight digits with a letter among them.
+/// Returns the length, in bytes, of the number at the start of the text. A number is decimal, optionally with an
+/// exponent, or hexadecimal. Hexadecimal numbers begin with `0x`, or have eight digits of which at least one is
+/// a letter.
 fn number_length(text: &str) -> usize {
     let while_of = |text: &str, of: fn(char) -> bool| text.find(|c| !of(c)).unwrap_or(text.len());
     if let Some(digits) = text.strip_prefix("0x") {

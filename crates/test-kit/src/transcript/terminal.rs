@@ -1,4 +1,4 @@
-//! Terminal of the reader who follows a page: a shell, and its output.
+//! Terminal of the reader who runs the commands of a page: a shell, and its output.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use crate::patience::Patience;
 
-/// Mark that the shell prints after each command, before its exit code. No command prints it.
+/// Mark that the shell prints after each command, followed by the exit code. Commands never print this mark.
 const END: &str = "\u{1}end of the command ";
 
-/// A shell, or the program that has replaced it.
+/// Shell, or the program that has replaced the shell.
 pub(super) struct Terminal {
     child: Child,
     stdin: ChildStdin,
@@ -19,8 +19,8 @@ pub(super) struct Terminal {
 }
 
 impl Terminal {
-    /// Starts a shell in this folder. Commands are searched in `programs` first; variables that begin with an element
-    /// of `without` are removed.
+    /// Starts a shell in this folder. The shell searches commands in `programs` first; environment variables that
+    /// begin with an element of `without` are removed.
     pub(super) fn new(folder: &Path, programs: &Path, without: &[&str]) -> Self {
         let mut shell = Command::new("bash");
         shell.args(["--norc", "--noprofile"]).current_dir(folder);
@@ -30,7 +30,7 @@ impl Terminal {
         let path = std::env::var("PATH").unwrap_or_default();
         let state = folder.join(".home");
         std::fs::create_dir_all(&state).expect("a home");
-        // Directory in which agents keep files that only their user may read.
+        // In this directory, agents keep files that only their user may read.
         std::fs::set_permissions(&state, std::os::unix::fs::PermissionsExt::from_mode(0o700))
             .expect("rights");
         shell.env("PATH", format!("{}:{path}", programs.display())).env("COLUMNS", "100");
@@ -51,18 +51,17 @@ impl Terminal {
                 }
             }
         });
-        // Both streams have one order, as on a screen.
+        // stdout and stderr are merged in their order, as on a screen.
         writeln!(stdin, "exec 2>&1").expect("bash reads");
         Self { child, stdin, lines }
     }
 
-    /// Runs a command to its end; returns its output and its exit code.
+    /// Runs a command until it ends, and returns its output and its exit code.
     ///
     /// # Panics
     /// If the command does not end.
     pub(super) fn run(&mut self, command: &str) -> (Vec<String>, i32) {
-        // The command gets no stdin, or else it would read the line that is typed next. The subshell sets `$?` for
-        // the next command.
+        // The command has no stdin; otherwise it would read the line that is typed next. The subshell sets `$?` for the next command.
         let typed = format!("{{ {command}\n}} < /dev/null\n__code=$?; echo \"{END}$__code\"; (exit $__code)");
         self.type_line(&typed);
         let mut printed = Vec::new();
@@ -70,7 +69,7 @@ impl Terminal {
             let Some(line) = Patience::begin().receive(&self.lines) else {
                 panic!("`{command}` does not end; it printed\n{}", printed.join("\n"))
             };
-            // The mark may follow a line without a line end.
+            // If the output does not end with a line break, the mark follows in the same line.
             if let Some((before, code)) = line.split_once(END) {
                 printed.extend(Some(before.to_owned()).filter(|before| !before.is_empty()));
                 return (printed, code.trim().parse().expect("a code"));
@@ -79,7 +78,7 @@ impl Terminal {
         }
     }
 
-    /// Replaces the shell by a command, which keeps running.
+    /// Replaces the shell by a command that keeps running.
     pub(super) fn start(&mut self, command: &str) {
         self.type_line(&format!("exec {command}"));
     }
@@ -89,12 +88,12 @@ impl Terminal {
         writeln!(self.stdin, "{line}").expect("it reads what is typed");
     }
 
-    /// Returns the next line; `None` if no line comes within this time, or at the end of the output.
+    /// Returns the next line; `None` if no line is printed within this time, or at the end of the output.
     pub(super) fn line(&mut self, within: Duration) -> Option<String> {
         self.lines.recv_timeout(within).ok()
     }
 
-    /// Returns the lines up to and including the first that is `last`; all lines so far if none is.
+    /// Returns the lines up to and including the first line for which `last` returns `true`; all lines if there is no such line.
     pub(super) fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
         let (mut patience, mut printed) = (Patience::begin(), Vec::new());
         while let Some(line) = patience.receive(&self.lines) {

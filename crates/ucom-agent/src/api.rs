@@ -1,4 +1,4 @@
-//! API of the agent: HTTP requests, and a stream of events.
+//! API of the agent: HTTP requests and a stream of events.
 mod boards;
 mod commands;
 mod events;
@@ -37,13 +37,13 @@ use crate::owner::{Owner, Shared};
 use events::EventObject;
 use objects::{LeaseObject, StatusObject};
 
-/// Longest request body, bytes.
+/// Maximum length of a request body, in bytes.
 const BODY_MAX: usize = 64 << 10;
-/// Longest request body with images, bytes: 1 MiB each, as text.
+/// Maximum length of a request body with images, in bytes: 1 MiB for each image, as text.
 const IMAGES_MAX: usize = 6 << 20;
-/// Largest number of requests with images that are read at the same time.
+/// Maximum number of requests with images that are read at the same time.
 const UPDATES_READ: usize = 2;
-/// Longest duration of a request.
+/// Maximum duration of a request.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
 
 /// State that every handler receives.
@@ -51,18 +51,18 @@ const REQUEST_TIME: Duration = Duration::from_secs(10);
 pub struct Agent {
     shared: Arc<Shared>,
     gate: Gate,
-    /// Number that identifies this run of the agent for clients.
+    /// Number that identifies this run of the agent; clients can compare it.
     id: Arc<str>,
     bus: Arc<str>,
     simulated: bool,
     sockets: Sockets,
     events: Arc<Events>,
-    /// Limit of simultaneous requests with images.
+    /// Semaphore that limits the number of requests with images at the same time.
     images: Arc<Semaphore>,
 }
 
 impl Agent {
-    /// Creates the agent of a bus. `bus` is its name for people.
+    /// Creates the agent of a bus. `bus` is the display name of the bus.
     ///
     /// # Errors
     ///
@@ -182,7 +182,7 @@ fn described() -> OpenApiRouter<Agent> {
     others.merge(images)
 }
 
-/// Refusals that a command can receive in addition to those of every request.
+/// Error responses that a command can receive, in addition to the error responses of every request.
 struct Denials;
 
 impl IntoResponses for Denials {
@@ -234,7 +234,7 @@ struct SentObject {
     )
 )]
 async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
-    // The identity of the client matters only for its later requests.
+    // The identity of the client matters only for later requests of this client.
     let client = match asker.caller.role {
         Role::Operator => agent.client(&asker).ok(),
         Role::Viewer => None,

@@ -8,7 +8,7 @@ use ucom::Admin;
 use ucom_host::master::update::UpdateReport;
 use ucom_host::master::{BoardSeen, LoadForecast};
 
-/// Number of jobs that are kept.
+/// Maximum number of stored jobs.
 const KEPT: usize = 256;
 
 /// Stage of a job.
@@ -22,7 +22,7 @@ pub(crate) enum Stage {
 }
 
 impl Stage {
-    /// Returns a word for the stage.
+    /// Returns the name of the stage.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -40,13 +40,13 @@ pub(crate) enum Done {
     Chain(Vec<BoardSeen>, Vec<String>),
     /// Findings of a doctor.
     Findings(Vec<Finding>),
-    /// Result for each board.
+    /// Result of an update for each board.
     Update(UpdateReport),
     /// Running boards with their flags, and the predicted bus load.
     Running(Vec<(u8, Admin)>, LoadForecast),
 }
 
-/// Job, while it runs and afterwards.
+/// Job that is running or has ended.
 #[derive(Clone, Debug)]
 pub(crate) struct Job {
     pub number: u64,
@@ -85,7 +85,7 @@ impl Jobs {
         job
     }
 
-    /// Ends a job. Returns `false` if it had ended before.
+    /// Ends a job. Returns `false` if the job had already ended.
     pub(crate) fn end(&self, number: u64, stage: Stage, done: Option<Done>, error: Option<Problem>) -> bool {
         let mut kept = self.lock();
         let running = |job: &&mut Job| job.number == number && job.stage == Stage::Running;
@@ -94,12 +94,12 @@ impl Jobs {
         true
     }
 
-    /// Returns a job by its number.
+    /// Returns a job by its job number.
     pub(crate) fn get(&self, number: u64) -> Option<Job> {
         self.lock().jobs.iter().find(|job| job.number == number).cloned()
     }
 
-    /// Returns the kept jobs, oldest first.
+    /// Returns the stored jobs, oldest first.
     pub(crate) fn list(&self) -> Vec<Job> {
         self.lock().jobs.iter().cloned().collect()
     }

@@ -1,4 +1,4 @@
-//! Owner of a bus: one thread with a session on it, for all clients.
+//! Owner of a bus: a single thread that runs a session on the bus for all clients.
 mod ask;
 mod operator;
 mod shared;
@@ -18,19 +18,18 @@ pub(crate) use host_kit::owner::Kind;
 pub(crate) use shared::Shared;
 pub(crate) use worker::Worker;
 
-/// Configuration of the boards that is known beforehand.
+/// Configuration of the boards that is known before the bus is opened.
 #[derive(Clone, Debug, Default)]
 pub struct Config {
-    /// Profile of the protocol on these boards.
+    /// Protocol profile of these boards.
     pub profile: Profile,
-    /// Meaning of their words.
+    /// Signal table: the meaning of the words of these boards.
     pub signals: SignalTable,
-    /// Cache for the names of values.
+    /// Cache for the signal names.
     pub cache: Cache,
-    /// List of clean-up steps that would remain if the process ended now. The code that ends the process prints them.
+    /// List of the clean-up steps that would be missing if the process ended now. The code that ends the process prints this list.
     pub cleanup: CleanupList,
-    /// Inventory file with the images that updates wrote to boards; `None`: the agent keeps these records while it
-    /// runs.
+    /// Inventory file that records the images written by updates. If `None`, the agent keeps these records only while it runs.
     pub inventory: Option<PathBuf>,
 }
 
@@ -41,7 +40,7 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// Opens the bus of this URL. Scans for boards unless another PC is master of the bus.
+    /// Opens the bus of this URL. Scans for boards, unless another PC is the master of the bus.
     ///
     /// # Errors
     ///
@@ -57,7 +56,7 @@ impl Owner {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Returns a function that gives the reason why the bus was lost; `None` if it was not lost.
+    /// Returns a function that returns the reason why the bus was lost; `None` if the bus was not lost.
     pub fn lost(&self) -> impl Fn() -> Option<String> + Send + use<> {
         let shared = self.shared.clone();
         move || shared.lost()
@@ -71,7 +70,7 @@ impl Owner {
     fn join(&mut self) {
         self.shared.end();
         if let Some(thread) = self.thread.take() {
-            // A panic of that thread has been printed.
+            // A panic of that thread was already printed.
             drop(thread.join());
         }
     }
@@ -83,7 +82,7 @@ impl Drop for Owner {
     }
 }
 
-/// Marks the bus as lost on drop, even after a panic of its thread.
+/// Guard that marks the bus as lost when it is dropped, even after a panic of the thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {

@@ -9,23 +9,23 @@ use ucom_host::master::io::{ParValue, Snapshot};
 use ucom_host::master::{Boards, Statistics};
 use ucom_host::session::Known;
 
-/// Known values of a board.
+/// Last known values of a board.
 #[derive(Clone)]
 pub(crate) struct Values {
     /// Names, types, scales and units.
     pub known: Arc<Known>,
     /// Last received outputs.
     pub outputs: Option<Snapshot>,
-    /// Inputs as last set or read.
+    /// Inputs that were last set or read.
     pub inputs: Vec<Option<u16>>,
-    /// Parameters as last written by this agent.
+    /// Parameters that this agent wrote last.
     pub parameters: Vec<ParValue>,
 }
 
-/// Bus and boards at one time.
+/// State of the bus and the boards at one time.
 #[derive(Clone)]
 pub(crate) struct BusSnapshot {
-    /// Time of the snapshot by the session's clock, in µs. The next field is the time by the agent's clock.
+    /// Time of the snapshot in the clock of the session, in µs. The next field is the time in the clock of the agent.
     pub now_us: u64,
     pub at: Instant,
     pub profile: Profile,
@@ -34,9 +34,9 @@ pub(crate) struct BusSnapshot {
     pub controller: Option<Controller>,
     /// `true` if the agent sends heartbeats.
     pub is_master: bool,
-    /// Time when another PC last sent a frame on the bus, in µs.
+    /// Time of the last frame from another PC, in µs.
     pub competing_us: Option<u64>,
-    /// Texts about numbers that two boards share.
+    /// Texts about board numbers that two boards share.
     pub shared: Vec<String>,
     pub values: BTreeMap<u8, Values>,
 }
@@ -57,7 +57,7 @@ impl BusSnapshot {
         }
     }
 
-    /// Returns the present time of the session, in µs.
+    /// Returns the current time of the session, in µs.
     pub(crate) fn clock_us(&self) -> u64 {
         self.now_us + self.at.elapsed().as_micros() as u64
     }

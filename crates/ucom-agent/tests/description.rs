@@ -1,5 +1,5 @@
-//! Checks that docs/ucom-openapi.json equals the description that an agent serves. `UPDATE_DOCS=1 cargo test -p
-//! ucom-agent --test suite description::` writes it.
+//! Checks that docs/ucom-openapi.json equals the API description that an agent serves. `UPDATE_DOCS=1 cargo
+//! test -p ucom-agent --test suite description::` writes it.
 use std::path::Path;
 
 #[test]

@@ -1,4 +1,4 @@
-//! A request made before a Stop moves nothing after it, whatever its delay and whichever client requested the Stop.
+//! Tests that a request from before a Stop moves nothing after the Stop, whatever the delay of the request is and whichever client stopped.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -8,7 +8,7 @@ use std::time::Duration;
 use common::Served;
 use serde_json::{Value, json};
 
-/// Time longer than the hold-off of three seconds after another client's Stop.
+/// Time that exceeds the hold-off of three seconds after a Stop of another client.
 const CALM: Duration = Duration::from_millis(3_300);
 
 fn last_halt(served: &Served) -> u64 {
@@ -24,13 +24,13 @@ fn stop(served: &Served, key: Option<&str>) -> u64 {
     number
 }
 
-/// Checks that the request was refused with the name of the client that requested the Stop.
+/// Checks that the request was refused, and that the message contains the name of the client that requested the Stop.
 fn is_stopped((status, error): (u16, Value), by: &str) {
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
     assert!(error["message"].as_str().is_some_and(|text| text.starts_with(by)), "{error}");
 }
 
-/// Sends the head of a request, without its body.
+/// Sends the header of a request, without the body.
 fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
     let (address, token, length) = (served.address, &served.tokens.operator, body.len());
     let mut socket = TcpStream::connect(address).expect("it listens");
@@ -40,7 +40,7 @@ fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
          Content-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
     )
     .expect("it reads");
-    // The agent has received the head.
+    // At this time, the agent has received the header.
     std::thread::sleep(Duration::from_millis(300));
     socket
 }
@@ -53,7 +53,7 @@ fn finish(mut socket: TcpStream, body: &str) -> String {
     answer
 }
 
-/// Checks that no application runs, so no start was sent.
+/// Checks that no application runs, which proves that no start was sent.
 fn nothing_runs(served: &Served) {
     let (_, boards) = served.api("GET /api/boards", None, None);
     for board in boards.as_array().expect("boards") {
@@ -88,7 +88,7 @@ fn a_body_that_arrives_behind_a_stop_starts_nothing() {
         json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true }).to_string();
     let late = [("POST /api/run", &run), ("POST /api/updates", &update)]
         .map(|(request, body)| (begin(&served, request, &key, body), body));
-    // A request is also refused after the client's own Stop, which causes no hold-off.
+    // A request is also refused after a Stop of the client itself, although this Stop causes no hold-off.
     stop(&served, Some(&key));
     let last = served.last_event();
     for (socket, body) in late {
@@ -120,7 +120,7 @@ fn stops_that_no_agent_has_counted_are_refused_with_what_it_has() {
         let (status, error) = served.api(&format!("{request}?asked_after=7"), Some(&key), body.clone());
         let found = (status, &error["value"], &error["limit"]);
         assert_eq!(found, (400, &json!(7.0), &json!(1.0)), "{request}: {error}");
-        // Each of these requests is refused after a Stop, whichever client requested it.
+        // After a Stop, each of these requests is refused, whichever client requested the Stop.
         is_stopped(served.api(&format!("{request}?asked_after=0"), Some(&key), body), "anna");
     }
     nothing_runs(&served);
@@ -142,20 +142,19 @@ fn an_input_behind_ones_own_stop_is_refused_and_what_ends_something_is_not() {
     let halt = stop(&served, Some(&key));
     is_stopped(set(&format!("?asked_after={before}"), 700), "anna");
     served.event(last, "stopped", |event| event["kind"] == "stopped");
-    // A request to switch outputs off moves nothing, so it is carried out even if it is older than the Stop.
+    // A request to switch outputs off moves nothing, so the agent executes it even if it is older than the Stop.
     let off = json!({ "active": false });
     let (_, error) =
         served.api(&format!("PUT /api/boards/1/outputs?asked_after={before}"), Some(&key), Some(off));
     assert_ne!(error["code"], "stopped", "{error}");
-    // After the client's own Stop there is no hold-off for a request that gives the number of this Stop, or no
-    // number.
+    // After a Stop of the client itself there is no hold-off for a request that contains the number of this Stop, or no number.
     let job =
         served.begin(&format!("POST /api/run?asked_after={halt}"), &key, Some(json!({ "boards": [1] })));
     assert_eq!(served.over(job)["stage"], "finished");
     assert_eq!(set("", 700).0, 200);
 }
 
-/// Every status carries its time, so a client can detect that messages are old even if they arrive regularly.
+/// Every status contains its time, so that a client can detect old messages even if messages arrive regularly.
 #[test]
 fn each_status_has_the_time_when_it_was_made() {
     let served = Served::start(1);

@@ -1,4 +1,4 @@
-//! The log of commands contains completed commands and their results, even of clients that have disconnected.
+//! Tests that the command log contains completed commands and their results, even of clients that have disconnected.
 use crate::common;
 
 use std::io::Write as _;
@@ -9,7 +9,7 @@ use common::Served;
 use serde_json::{Value, json};
 use test_kit::patience::Patience;
 
-/// Waits for the first line for which `is` returns `true`, and returns it.
+/// Waits for the first log line for which `is` returns `true`, and returns this line.
 fn line(served: &Served, what: &str, is: impl Fn(&Value) -> bool) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -28,8 +28,7 @@ fn what_a_client_has_done_is_in_the_log_when_it_hangs_up() {
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
     let first = served.board(1)["offers"]["parameters"][0].as_str().expect("a name").to_owned();
     let (name, token) = (first.split(' ').next().unwrap_or_default(), served.tokens.operator.clone());
-    // The client disconnects before it gets an answer. This is repeated until the agent has carried out one command
-    // anyway.
+    // The client disconnects before it gets an answer. The test repeats this until the agent has executed one command anyway.
     let done = (100..140).find(|word| {
         let body = json!({ "value": word }).to_string();
         let request = format!(
@@ -74,8 +73,7 @@ fn a_lapse_its_stop_and_what_became_of_jobs_are_in_the_log() {
     line(&served, "lapse", lease(Value::Null));
 }
 
-/// The log contains denied requests as well as completed ones, with the request and the reason. It does not contain
-/// read-only requests.
+/// The log contains completed and denied requests, with the request and the reason. The log does not contain read-only requests.
 #[test]
 fn what_was_denied_is_in_the_log() {
     let (served, key) = Served::numbered(1);

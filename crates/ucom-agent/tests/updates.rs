@@ -1,4 +1,4 @@
-//! Firmware updates by HTTP: upload, write, read back.
+//! Tests of firmware updates by HTTP: upload, write, read back.
 use crate::common;
 
 use std::time::Duration;
@@ -25,7 +25,7 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
     let flash = before["flash_number"].as_u64().expect("a number");
     let body = request(json!([{ "board": 2, "flash_number": flash }]), 1000);
     let number = served.begin("POST /api/updates", &key, Some(body.clone()));
-    // Only one update may run at a time, and no other command is accepted meanwhile.
+    // While an update runs, no other update and no other command is accepted.
     let (status, busy) = served.api("POST /api/updates", Some(&key), Some(body.clone()));
     assert_eq!((status, busy["code"].as_str()), (409, Some("busy")), "{busy}");
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 409);
@@ -43,14 +43,14 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
         (after["program_id"].as_u64(), after["flash_date"].as_str()),
         (Some(0x4B3F), Some("2009-06-01"))
     );
-    // Progress is reported as events, up to the end of both cycles.
+    // Events report the progress until the end of both cycles.
     let (_, all) = served.api(&format!("GET /api/events?job={number}"), None, None);
     let entries = all["events"].as_array().expect("events");
     let all: Vec<&Value> = entries.iter().map(|e| &e["event"]).collect();
     let progress: Vec<&&Value> = all.iter().filter(|event| event["kind"] == "progress").collect();
     let bytes: Vec<u64> = progress.iter().filter_map(|event| event["bytes"].as_u64()).collect();
     assert!(bytes.len() > 2 && bytes.is_sorted() && bytes.last() == Some(&2176), "{bytes:?}");
-    // Progress does not crowd out other events: within a cycle there are at most five events per second.
+    // Progress events do not displace other events: within a cycle there are at most five progress events per second.
     let times: Vec<(f64, &Value)> = entries
         .iter()
         .filter(|entry| entry["event"]["kind"] == "progress" && entry["event"]["bytes"] != 2176)
@@ -63,8 +63,8 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
     assert_eq!(job["update"]["boards"][0]["outcome"], "up-to-date", "{job}");
 }
 
-/// D-62: the same bytes at another address are written. A program for which the agent has no record is not reported
-/// as verified. U-3: without a date, the board keeps its date.
+/// D-62: if the image has another address, its bytes are written again. If the agent has no record for a program,
+/// the program is not reported as verified. U-3: without a date, the board keeps its date.
 #[test]
 fn d62_what_the_agent_wrote_is_what_it_knows() {
     let (served, key) = Served::numbered(1);
@@ -91,7 +91,7 @@ fn d62_what_the_agent_wrote_is_what_it_knows() {
     assert_eq!(update(again), is("verified", true, "finished"));
 }
 
-/// D-46: the request says that the file is raw binary, but the file contains records. No job is begun.
+/// D-46: the request says that the file is raw binary, but the file contains records. The agent does not start a job.
 #[test]
 fn d46_records_are_no_raw_bytes() {
     let (served, key) = Served::numbered(1);
@@ -105,7 +105,7 @@ fn d46_records_are_no_raw_bytes() {
     }
 }
 
-/// D-46: an image for another board than the one with this number is not sent.
+/// D-46: the agent does not send an image that is for another board than the board with this number.
 #[test]
 fn d46_the_wrong_board_and_what_is_no_image_are_refused() {
     let (served, key) = Served::numbered(1);
@@ -138,8 +138,7 @@ fn d46_the_wrong_board_and_what_is_no_image_are_refused() {
     );
 }
 
-/// Boards continue to run if their update is refused or is only a dry run. When the lease lapses, these boards are
-/// still stopped.
+/// Boards continue to run if their update is refused or is only a dry run. When the lease lapses, these boards are still stopped.
 #[test]
 fn boards_whose_update_is_refused_are_still_stopped_at_the_lapse() {
     let (served, key) = Served::numbered(2);
@@ -155,7 +154,7 @@ fn boards_whose_update_is_refused_are_still_stopped_at_the_lapse() {
     served.event(last, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1, 2]));
 }
 
-/// D-46: a Stop is sent during an update and does not end the update. The lease holder can cancel the update.
+/// D-46: a Stop during an update does not end the update. The lease holder can cancel the update.
 #[test]
 fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     let (served, key) = Served::numbered(1);
@@ -175,7 +174,7 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
         "{job}"
     );
     served.event(last, "stopped", |event| event["kind"] == "stopped");
-    // The update with another image is cancelled.
+    // An update with another image is cancelled.
     let last = served.last_event();
     let number = served.begin("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 60_000)));
     served.event(last, "progress", progress);
@@ -188,8 +187,8 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     );
     std::thread::sleep(Duration::from_millis(100));
     assert_eq!(served.api(&format!("DELETE /api/jobs/{number}"), Some(&key), None).0, 409);
-    // No memory was erased, so the board has its old program. After an update that was begun, the agent no longer
-    // knows the flash content (D-62).
+    // The flash was not erased, so the board has its old program. After an update that was started, the agent no
+    // longer knows the flash content (D-62).
     let job = served.job("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 1000)));
     assert_eq!(job["update"]["boards"][0]["outcome"], "program-up-to-date", "{job}");
 }

@@ -1,4 +1,4 @@
-//! Boards, for all clients.
+//! Requests about boards, which every client may send.
 use agent_kit::api::{Number, Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
@@ -6,12 +6,12 @@ use axum::extract::State;
 use super::objects::{BoardObject, ValuesObject};
 use super::{Agent, Denials};
 
-/// Returns the problem for an unknown board.
+/// Returns the problem response for an unknown board.
 pub(super) fn unknown(number: u8) -> Problem {
     Problem::nothing("board", number, "/api/boards")
 }
 
-/// Checks numbers of boards.
+/// Checks board numbers.
 ///
 /// # Errors
 ///
@@ -87,7 +87,7 @@ pub(super) async fn values(
         return Ok(Json(ValuesObject::of(&snapshot, values)));
     }
     if snapshot.competing_us.is_some() {
-        // Even questions could mix with those of the other PC.
+        // Queries of the agent could also mix with the queries of the other PC.
         let message = format!(
             "the names of board {number} are not known, and the agent cannot request them while another PC \
              is master of this bus"

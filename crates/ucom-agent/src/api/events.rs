@@ -1,4 +1,4 @@
-//! Events as numbered lists, and a live stream of events with the values of running boards.
+//! Events of the chain: numbered lists, and a live stream with the values of running boards.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Problem, Refusals};
@@ -18,7 +18,7 @@ use super::objects::{BoardObject, StatusObject, ValuesObject};
 use crate::event::ChainEvent;
 use crate::snapshot::Values;
 
-/// Interval at which a stream sends the status and the boards.
+/// Interval at which a stream sends the bus status and the list of boards.
 const SLOWLY: Duration = Duration::from_secs(1);
 
 /// Event with its number and time.
@@ -87,7 +87,7 @@ pub(super) async fn stream(
     )
 }
 
-/// Returns the values that arrived after this time, and the time of the newest, µs.
+/// Returns the values that arrived after this time, and the time of the newest value, in µs.
 fn new_values(agent: &Agent, shown_us: u64) -> Option<(Vec<ValuesObject>, u64)> {
     let snapshot = agent.shared.snapshot();
     let time_us = |values: &Values| values.outputs.as_ref().map_or(0, |outputs| outputs.time_us);

@@ -1,4 +1,4 @@
-//! Lease: each request shows that the holder is alive.
+//! Lease: each request of the holder proves that the holder still responds.
 use agent_kit::access::random;
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::{Asker, Caller};
@@ -51,13 +51,13 @@ impl Halts for Agent {
 }
 
 impl Agent {
-    /// Returns the client of a lease key.
+    /// Returns the client that has this lease key.
     pub(super) fn client(&self, asker: &Asker) -> Result<Client<Policy>, Problem> {
         let (mut leases, now) = self.shared.leases();
         Ok(leases.client(asker.key(), now)?)
     }
 
-    /// Returns the client of a lease key and renews its lease. Returns an error if it does not hold the lease.
+    /// Returns the client that has this lease key, and renews its lease. Returns an error if the client does not hold the lease.
     pub(super) fn commander(&self, asker: &Asker) -> Result<Client<Policy>, Problem> {
         asker.caller.operator()?;
         let (mut leases, now) = self.shared.leases();
@@ -134,7 +134,7 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
     let client = agent.client(&asker)?;
     {
         let (mut leases, now) = agent.shared.leases();
-        // Otherwise outputs could be enabled later without a lease holder.
+        // Otherwise the agent could enable outputs later, when no client holds the lease.
         if leases.holds(client.id, now) && agent.shared.moves_for(client.id) {
             return Err(Problem::new(
                 "busy",

@@ -1,4 +1,4 @@
-//! Line of the log of commands, which is written even if the client disconnects.
+//! Line in the command log, which is written even if the client disconnects.
 use std::sync::{Mutex, PoisonError};
 
 use agent_kit::api::Problem;
@@ -8,17 +8,17 @@ use serde_json::Value;
 /// Command whose result is not logged yet.
 pub(super) struct Line {
     gate: Gate,
-    /// Facts of the command; `None` after the line was written.
+    /// Facts about the command; `None` after the line was written.
     facts: Mutex<Option<Value>>,
 }
 
 impl Line {
-    /// Returns the line of a command that is requested now.
+    /// Returns the log line for a command that is requested now.
     pub(super) fn new(gate: &Gate, facts: Value) -> Self {
         Self { gate: gate.clone(), facts: Mutex::new(Some(facts)) }
     }
 
-    /// Logs the result: success, or the reason of the failure.
+    /// Logs the result: success, or the reason for the failure.
     pub(super) fn end<T>(&self, done: &Result<T, Problem>) {
         self.write(done.as_ref().err().map(|error| &*error.message));
     }

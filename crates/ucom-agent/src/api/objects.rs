@@ -1,4 +1,4 @@
-//! Objects that the API sends. The API description is made from these types.
+//! Objects that the API sends. The API description is generated from these types.
 mod board;
 mod bus;
 mod job;

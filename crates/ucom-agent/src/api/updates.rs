@@ -1,4 +1,4 @@
-//! Updates: images are uploaded, checked, written and read back.
+//! Updates: the client uploads images; the agent checks the images, writes them and reads them back.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -123,7 +123,7 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
     Ok(image.into())
 }
 
-/// Returns the next step for a file that is not a valid image. The step never skips a check of the contents.
+/// Returns the next step for a file that is not a valid image. The proposed step never skips a check of the contents.
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
@@ -140,7 +140,7 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash date: the requested one, else today (UTC); 0 if no header contains a date.
+/// Returns the flash date: the requested date, else the current date (UTC); 0 if the headers contain no date.
 fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Problem> {
     let wrong = |text: &str| {
         usage(
@@ -193,7 +193,7 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
     })
 }
 
-/// Reads a request; long images are parsed outside the threads that serve requests.
+/// Reads a request. Long images are parsed in a thread that does not serve other requests.
 async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Problem> {
     let (parts, body) = request.into_parts();
     let body = Bytes::from_request(Request::from_parts(parts.clone(), body), &()).await;
@@ -207,7 +207,7 @@ async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Probl
     parsed.await.unwrap_or_else(|_| Err(fault()))
 }
 
-/// Returns the problem of an update that failed.
+/// Returns the problem response for an update that failed.
 fn failed(report: &UpdateReport) -> Option<Problem> {
     let kind = report.failure()?;
     let failures: Vec<_> =
@@ -247,7 +247,7 @@ pub(super) async fn update(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // Checked before the images are read.
+    // This is checked before the images are read.
     agent.commander(&asker)?;
     let Ok(room) = agent.images.clone().acquire_owned().await else { return Err(fault()) };
     let profile = agent.shared.snapshot().profile;

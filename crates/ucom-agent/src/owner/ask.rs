@@ -1,4 +1,4 @@
-//! Requests to the owner of a bus: short ones, and jobs.
+//! Requests to the owner of a bus: short requests, and jobs.
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,11 +13,12 @@ use super::shared::{CANCELLED, STOPPED, Shared};
 use crate::event::ChainEvent;
 use crate::jobs::{Done, Job, Stage};
 
-/// Longest wait for a turn. Then the request is refused, because its HTTP request times out after ten seconds.
+/// Maximum time for which a request waits in the queue. After this time the request is refused, because its HTTP
+/// request times out after ten seconds.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Largest numbers of waiting commands, and of waiting questions without the lease. They are separate, so questions
-/// do not block commands.
+/// Maximum numbers of waiting commands, and of waiting queries without the lease. These numbers are separate, so
+/// that queries do not block commands.
 const WAITING_MAX: usize = 32;
 const QUESTIONS_MAX: usize = 8;
 
@@ -25,23 +26,22 @@ const QUESTIONS_MAX: usize = 8;
 pub(super) type Queue = host_kit::owner::Queue<Worker, Tag>;
 type Place<'a> = host_kit::owner::Place<'a, Worker, Tag>;
 
-/// Request of the lease holder. Before its turn a Stop may come, or the lease may pass to another client.
+/// Request that the lease holder made. Before the request is executed, a Stop may come, or another client may take the lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Asked {
     pub client: ClientId,
-    /// Number of the last Stop before the request.
+    /// Number of the last Stop that came before the request.
     pub halt: u64,
-    /// `true` if the request may move boards. Requests that can only end a motion are executed even if their client has
-    /// disconnected.
+    /// `true` if the request may move boards. Requests that can only end a motion are executed even if their client has disconnected.
     pub moves: bool,
 }
 
-/// Data of the agent about a request in the queue.
+/// Data that the agent stores about a request in the queue.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tag {
-    /// Number of its job.
+    /// Number of the job, if the request is a job.
     pub job: Option<u64>,
-    /// Request of the lease holder; missing: a question without the lease, or the check after a Stop.
+    /// Request of the lease holder; `None` for a query without the lease and for the check after a Stop.
     pub asked: Option<Asked>,
 }
 
@@ -53,7 +53,7 @@ impl Tag {
 }
 
 impl Shared {
-    /// Returns a place in the queue. While a job runs or waits, no other request is accepted.
+    /// Reserves a place in the queue for a request. While a job runs or waits, other requests are refused.
     fn place(&self, is_question: bool) -> Result<Place<'_>, Problem> {
         let place = self.queue.place().ok_or_else(gone)?;
         if let Some(job) = place.tags().find_map(|tag| tag.job) {
@@ -75,31 +75,32 @@ impl Shared {
         Ok(place)
     }
 
-    /// Returns the device for a request whose turn has come. Otherwise returns the reason why the request is not
-    /// done: a Stop came before its turn, or its client has lost the lease.
+    /// Returns the worker for a request that may be executed now. Otherwise returns the reason for the refusal:
+    /// a Stop came after the request, or its client has lost the lease.
     fn turn<'a>(
         &self,
         worker: Result<&'a mut Worker, Refused>,
         asked: Option<Asked>,
     ) -> Result<&'a mut Worker, Problem> {
-        // A refusal may come in a thread that holds the leases. Their lock is taken only below, in the owner's thread.
+        // A refusal may be made in a thread that holds the lock of the leases. The code takes this lock only below, in
+        // the thread of the owner.
         let worker = worker.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),
             Refused::Closed => gone(),
         })?;
         let late = asked.and_then(|asked| {
-            // A Stop may come while the leases are looked at.
+            // A Stop may come while the leases are checked.
             self.too_late(asked).or_else(|| (asked.halt < self.queue.stops()).then(|| self.stopped()))
         });
         if late.is_some() {
-            // The request must be marked as done before its client learns of the refusal.
+            // The request must be marked as done before its client receives the refusal.
             self.queue.done();
         }
         late.map_or(Ok(worker), Err)
     }
 
-    /// Runs a short function in the owner's thread and waits for it: a command, or a question that needs no lease.
+    /// Runs a short function in the thread of the owner and waits for its result: a command, or a query that needs no lease.
     pub(crate) async fn call<T: Send + 'static>(
         self: &Arc<Self>,
         asked: Option<Asked>,
@@ -112,14 +113,14 @@ impl Shared {
         let own = self.clone();
         let act = move |worker: Result<&mut Worker, Refused>| {
             let worker = own.turn(worker, asked);
-            // If the client of a request has given up, the request must not move boards later.
+            // If the client no longer waits for the answer, the request must not move boards later.
             if answer.is_closed() && !only_ends {
                 return;
             }
-            // The answer would come too late even if the request were done now.
+            // The answer would be too late even if the request were executed now.
             let worker = worker.and_then(|worker| match begun.elapsed() > PATIENCE && !only_ends {
                 true => {
-                    // Before its client learns of it.
+                    // The request is marked as done before its client receives the refusal.
                     own.queue.done();
                     Err(Problem::new(
                         "busy",
@@ -129,7 +130,7 @@ impl Shared {
                 }
                 false => Ok(worker),
             });
-            // A client that has disconnected needs no answer.
+            // If a client has disconnected, it needs no answer.
             let _ = answer.send(worker.and_then(|worker| {
                 let done = act(worker);
                 worker.settle();
@@ -165,7 +166,7 @@ impl Shared {
                 Ok((done, error)) => (Some(done), error),
                 Err(error) => (None, Some(error)),
             };
-            // If the job was cancelled, results from before the cancellation are kept.
+            // If the job was cancelled, its earlier results are kept.
             let stage = match &error {
                 None => Stage::Finished,
                 Some(error) if error.code == CANCELLED || error.code == STOPPED => Stage::Cancelled,
@@ -178,7 +179,7 @@ impl Shared {
         Ok(job)
     }
 
-    /// Cancels a job. The job still undoes its steps on the boards. Returns `false` if it has ended.
+    /// Cancels a job. After that, the job still undoes its steps on the boards. Returns `false` if the job has ended.
     pub(crate) fn cancel_job(&self, number: u64) -> bool {
         self.queue.cancel(|tag| tag.job == Some(number))
     }
@@ -204,7 +205,7 @@ fn gone() -> Problem {
     .kind(ErrorKind::NoLink)
 }
 
-/// Job that has not ended. If this is dropped because of a fault of the agent, the job ends as failed.
+/// Job that has not ended. If a fault of the agent drops this value, the job ends as failed.
 struct Unfinished {
     shared: Arc<Shared>,
     number: u64,

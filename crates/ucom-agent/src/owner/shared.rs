@@ -1,4 +1,4 @@
-//! State that the owner of a bus shares with its callers: boards as last seen, lease and Stops.
+//! State that the owner of a bus shares with its callers: last known state of the boards, lease and Stops.
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,17 +16,17 @@ use crate::event::{ChainEvent, Journal, Policy};
 use crate::jobs::Jobs;
 use crate::snapshot::BusSnapshot;
 
-/// Hold-off after a Stop of another client.
+/// Hold-off time after a Stop of another client.
 const CALM: Duration = Duration::from_secs(3);
 
-/// Stops within this time are reported as one event.
+/// Time within which several Stops are reported as one event.
 const TOGETHER: Duration = Duration::from_millis(100);
 
-/// Error codes of a cancelled request, and of a request that a Stop has ended.
+/// Error codes of a cancelled request, and of a request that was ended by a Stop.
 pub(super) const CANCELLED: &str = "cancelled";
 pub(super) const STOPPED: &str = "stopped";
 
-/// Stop: its requester, its client if it has a lease key, and its time.
+/// Stop: the name of its requester, the client if the requester has a lease key, and the time.
 #[derive(Clone)]
 struct Halt {
     by: String,
@@ -34,14 +34,14 @@ struct Halt {
     at: Instant,
 }
 
-/// Requesters of the last Stops. The queue counts the Stops.
+/// Requesters of the latest Stops. The queue counts the Stops.
 #[derive(Default)]
 struct Halts {
-    /// Time of the last event. The next field is the number of Stops since then.
+    /// Time of the last event about Stops. The next field is the number of Stops since that event.
     shown: Option<Instant>,
     more: u64,
     last: Option<Halt>,
-    /// Last Stop by a client other than the requester of `last`.
+    /// Latest Stop by a client other than the requester of `last`.
     last_by_another: Option<Halt>,
 }
 
@@ -78,19 +78,19 @@ pub(crate) struct Shared {
     pub journal: Journal,
     pub jobs: Jobs,
     leases: Mutex<Leases<Policy>>,
-    /// Lease holder at the last check.
+    /// Lease holder at the time of the last check.
     holder: Mutex<Option<String>>,
-    /// `true` from before the first frame to a started board until all started boards have been stopped.
+    /// `true` from the time before the first frame to a started board until all started boards have been stopped.
     pub(super) runs: Arc<AtomicBool>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // If another thread panicked, an incomplete state matters less than a Stop.
+    // If another thread panicked, the state may be incomplete, but a Stop is more important.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shared {
-    /// Returns the state of an unknown bus with this profile of the protocol.
+    /// Returns the state for a bus whose boards are not known yet, with this protocol profile.
     pub(super) fn new(profile: Profile) -> Self {
         Self {
             start: Instant::now(),
@@ -108,7 +108,7 @@ impl Shared {
         }
     }
 
-    /// Returns the time of the agent.
+    /// Returns the time since the start of the agent.
     pub(crate) fn now(&self) -> Duration {
         self.start.elapsed()
     }
@@ -123,12 +123,12 @@ impl Shared {
         self.changed.subscribe()
     }
 
-    /// Returns the reason why the bus was lost; `None` while it is available.
+    /// Returns the reason why the bus was lost; `None` while the bus is available.
     pub(crate) fn lost(&self) -> Option<String> {
         lock(&self.lost).clone()
     }
 
-    /// Stops all boards ahead of all other requests, and checks that they have stopped. Returns the number of the Stop.
+    /// Stops all boards before any other request, and checks that the boards have stopped. Returns the number of the Stop.
     pub(crate) fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
         let act = |worker: Result<&mut Worker, Refused>| {
             if let Ok(worker) = worker {
@@ -136,30 +136,29 @@ impl Shared {
             }
         };
         let number = {
-            // Counter and requester change under one lock, so a thread that reads the number of a Stop also reads its
-            // requester.
+            // The counter and the requester change under one lock, so that a thread that reads the number of a Stop
+            // also reads its requester.
             let mut halts = lock(&self.halts);
             halts.add(by, client);
             self.queue.stop_alike(Tag::default(), Box::new(act))
         };
         self.show_halts();
-        // Without the lock, because refusals name the requester of the Stop.
+        // This call is made without the lock, because the refusals contain the name of the requester.
         self.queue.refuse_late();
         number
     }
 
-    /// Returns the number of requested Stops, which is the number of the last one.
+    /// Returns the number of requested Stops, which is also the number of the last Stop.
     pub(crate) fn halts(&self) -> u64 {
         self.queue.stops()
     }
 
-    /// Returns `true` while a request of this client that may move boards is running or waiting.
+    /// Returns `true` while a request of this client that may move boards runs or waits.
     pub(crate) fn moves_for(&self, client: ClientId) -> bool {
         self.queue.has(|tag| tag.moves_for(client))
     }
 
-    /// Returns a new request of this client. For a request that may move boards, `after` is the number of the last
-    /// Stop that the client knew.
+    /// Creates a request of this client. For a request that may move boards, `after` is the number of the last Stop known to the client.
     ///
     /// # Errors
     ///
@@ -178,8 +177,8 @@ impl Shared {
         Ok(Asked { client, halt: count, moves: after.is_some() })
     }
 
-    /// Returns the leases and the present time. A lease that has lapsed is ended first and its policy applied, before
-    /// another client can take it.
+    /// Returns the leases and the current time. If the lease has lapsed, it is ended and its policy is applied before
+    /// another client can take the lease.
     pub(crate) fn leases(&self) -> (MutexGuard<'_, Leases<Policy>>, Duration) {
         let (mut leases, now) = (lock(&self.leases), self.now());
         let lapsed = leases.lapse(now);
@@ -197,9 +196,9 @@ impl Shared {
     }
 }
 
-/// Functions for the owner.
+/// Functions that the owner uses.
 impl Shared {
-    /// Tells the owner to end.
+    /// Requests the end of the owner.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
@@ -214,7 +213,7 @@ impl Shared {
         self.has_ended() || self.queue.is_cancelled()
     }
 
-    /// Writes the events of new Stops: the first one at once, further ones together.
+    /// Writes events for new Stops: the first Stop at once, the following Stops together.
     pub(super) fn show_halts(&self) {
         let mut halts = lock(&self.halts);
         if halts.more > 0 && halts.shown.is_none_or(|at| at.elapsed() >= TOGETHER) {
@@ -225,7 +224,7 @@ impl Shared {
         }
     }
 
-    /// Returns the problem for a request whose client has lost the lease before its turn.
+    /// Returns the problem for a request whose client lost the lease before the request was executed.
     pub(super) fn too_late(&self, asked: Asked) -> Option<Problem> {
         let may = !asked.moves || lock(&self.leases).holds(asked.client, self.now());
         (!may).then(|| {
@@ -234,7 +233,7 @@ impl Shared {
         })
     }
 
-    /// Returns the problem for a request that the last Stop has overtaken.
+    /// Returns the problem for a request that is older than the last Stop.
     pub(super) fn stopped(&self) -> Problem {
         stopped(lock(&self.halts).last_by())
     }
@@ -252,14 +251,14 @@ impl Shared {
         lock(&self.leases).lease().is_some()
     }
 
-    /// Publishes a snapshot and then events, so that readers of the events find the new state.
+    /// Publishes a snapshot and then the events, so that readers of an event find the new state in the snapshot.
     pub(super) fn publish(&self, snapshot: BusSnapshot, happened: Vec<ChainEvent>) {
         *lock(&self.snapshot) = Arc::new(snapshot);
         happened.into_iter().for_each(|event| self.journal.write(event));
         self.changed.send_replace(());
     }
 
-    /// Marks the bus as lost, with the reason; waiting requests are refused.
+    /// Marks the bus as lost for this reason; waiting requests are refused.
     pub(super) fn close(&self, why: String) {
         *lock(&self.lost) = Some(why.clone());
         self.queue.close();

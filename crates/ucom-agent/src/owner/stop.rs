@@ -1,4 +1,4 @@
-//! Check after a Stop: each board is asked after the frames of the Stop have been sent.
+//! Check after a Stop: after the stop frames, the agent queries each board.
 use std::collections::BTreeSet;
 
 use ucom::Status;
@@ -9,15 +9,15 @@ use super::Worker;
 use crate::event::ChainEvent;
 
 impl Worker {
-    /// After a Stop, asks each board and stops its application. This covers boards that answer, and boards that may
-    /// run but do not answer.
+    /// After a Stop, queries each board and stops its application. The check includes boards that answer, and
+    /// boards that do not answer but may run.
     pub(super) fn see_to_stop(&mut self) {
         let was_master = self.driver.master.is_master();
         let mut wanted = self.may_run();
         let mut not_stopped = Vec::new();
         match self.driver.numbers_to_stop(&Boards::All) {
             Ok(found) => wanted.extend(found),
-            // A board without a number does not run.
+            // A board without a number cannot be running.
             Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) => {}
             Err(error) => not_stopped.push(error.to_string()),
         }
@@ -40,8 +40,8 @@ impl Worker {
         // The other boards are still listed as started until they have been stopped.
         confirmed.iter().for_each(|board| self.runs_no_more(Some(*board)));
         if !was_master {
-            // A Stop does not make the agent the master. A board that has not confirmed the Stop becomes safe without
-            // heartbeats, unless the master sends its own.
+            // A Stop does not make the agent the master. If a board has not confirmed the Stop, it becomes safe
+            // because it receives no heartbeats, unless another master sends them.
             self.driver.master.end_session();
         }
         let boards = confirmed.into_iter().collect();
@@ -49,8 +49,8 @@ impl Worker {
         self.settle();
     }
 
-    /// Returns the boards that may run: this agent has started them, or they were started or ran when last seen. A
-    /// board that has rebooted does not run.
+    /// Returns the boards that may run: boards that this agent has started, and boards that were started or
+    /// running in their last known state. After a reboot, a board does not run.
     fn may_run(&mut self) -> BTreeSet<u8> {
         let (boards, now_us) = (self.driver.master.boards(), self.driver.now_us());
         for (number, _) in boards.iter().filter(|(_, board)| board.rebooted) {

@@ -1,4 +1,4 @@
-//! Work on the bus: one turn after the other, and the resulting knowledge about the boards.
+//! Work on the bus in turns, and the resulting knowledge about the boards.
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
@@ -17,14 +17,14 @@ use super::shared::Shared;
 use crate::event::ChainEvent;
 use crate::snapshot::Values;
 
-/// Longest wait of a turn.
+/// Maximum wait in one turn.
 const TURN: Duration = Duration::from_millis(5);
-/// Listening time before the first question, because another PC may be master of the bus (D-08).
+/// Time for which the agent listens before its first query, because another PC may be the master of the bus (D-08).
 const LISTEN: Duration = Duration::from_millis(600);
-/// After a board has returned no names, requests without the lease do not ask it again for this time.
+/// Time for which requests without the lease do not query a board again after it returned no names.
 const LEFT_ALONE: Duration = Duration::from_secs(3);
 
-/// Session of the bus, with its data.
+/// Session of the bus and its data.
 pub(crate) struct Worker {
     pub session: Session,
     /// Records of the images that updates wrote to boards.
@@ -68,7 +68,7 @@ impl Worker {
             if !looked && start.elapsed() >= LISTEN {
                 looked = true;
                 if self.driver.master.competing_master().is_none() {
-                    // The scan is repeated on request; a lost bus is detected in the next turn.
+                    // A client can request another scan; the next turn detects a lost bus.
                     let _ = self.driver.run(Request::Scan);
                 }
             }
@@ -77,12 +77,12 @@ impl Worker {
             {
                 self.serve_one(turn);
                 self.turn()?;
-                // Called here as well, because questions may arrive without a pause.
+                // This is called here as well, because queries may arrive without a pause.
                 self.rest();
             }
             self.rest();
         }
-        // A Stop that was requested just before the end is sent.
+        // If a Stop was requested just before the end, its frames are sent here.
         self.turn()
     }
 
@@ -97,33 +97,33 @@ impl Worker {
         Ok(())
     }
 
-    /// Keeps the heartbeats going while a client holds the lease.
+    /// Continues the heartbeats while a client holds the lease.
     fn rest(&mut self) {
         let commands = self.shared.is_commanded();
         self.session.rest(commands);
     }
 
-    /// Publishes the snapshot and the events of a request and marks it as ended, before its client receives the answer.
+    /// Publishes the snapshot and the events of a request, and marks the request as ended, before its client receives the answer.
     pub(super) fn settle(&mut self) {
         self.local.borrow_mut().published = None;
-        // A lost bus is detected in the next turn.
+        // If the bus is lost, the next turn detects this.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }
 
     /// Does one request.
     fn serve_one(&mut self, turn: owner::Turn<Self, Tag>) {
-        // Background questions must not keep a board busy.
+        // Background queries must not keep a board busy.
         self.quiet();
         self.local.borrow_mut().job = turn.tag.job;
         turn.run(self);
         self.local.borrow_mut().job = None;
-        // Requests that were abandoned or never begun have not called `settle`.
+        // Requests that were abandoned or did not begin have not called `settle`.
         self.shared.queue.done();
     }
 
-    /// Returns the problem for an error of the session. If a Stop or the agent's end caused the error, returns that
-    /// problem instead.
+    /// Returns the problem for an error of the session. If a Stop or the end of the agent caused the error, returns
+    /// the problem for this cause instead.
     pub(crate) fn problem(&self, error: &SessionError) -> Problem {
         if !error.is_cancelled() {
             let kind = match (error.kind(), error) {
@@ -139,8 +139,8 @@ impl Worker {
         self.shared.why_cancelled()
     }
 
-    /// Returns names and meanings of a board's values, for requests without the lease. A board that returned no names
-    /// is not asked again for 3 s, because commands wait meanwhile.
+    /// Returns the names and meanings of the values of a board, for requests without the lease. If a board returned
+    /// no names, the agent does not query it again for 3 s, because commands wait during a query.
     pub(crate) fn known_to_viewers(&mut self, board: u8) -> Result<Arc<Known>, Problem> {
         if let Some((at, problem)) = self.local.borrow().nameless.get(&board)
             && at.elapsed() < LEFT_ALONE

@@ -1,4 +1,4 @@
-//! An agent with a simulated chain in this process, and HTTP requests to it.
+//! Agent with a simulated chain in this process, and HTTP requests to the agent.
 
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use ucom_agent::api::Agent;
 use ucom_agent::{Config, Owner};
 use ucom_sim::{ChainConfig, ChainServer, ChainSim};
 
-/// A simulated chain on a bus that other members can join.
+/// Simulated chain on a bus that other programs can join.
 pub(crate) struct Chain {
     pub url: String,
     faults: Sender<(String, Sender<()>)>,
@@ -52,11 +52,11 @@ impl Chain {
         Self { url: url.recv().expect("it listens"), faults, ended, thread: Some(thread) }
     }
 
-    /// Begins a fault, and returns when it has begun.
+    /// Starts a fault, and returns when the fault has started.
     pub(crate) fn fault(&self, line: &str) {
         let (begun, begins) = channel();
         self.faults.send((line.into(), begun)).expect("it goes on");
-        // The channel carries no message. This wait ends when the other side drops its sender.
+        // The channel carries no message. This wait ends when the thread of the chain drops the sender.
         begins.recv().unwrap_or_default();
     }
 
@@ -79,7 +79,7 @@ impl Drop for Chain {
     }
 }
 
-/// Waits on a bus for a frame with this identifier and these data; returns the time waited.
+/// Waits for a frame with this identifier and this data on a bus; returns the waiting time.
 pub(crate) fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     let begun = Instant::now();
     let what = format!("{id:03X}#{data:02X?}");
@@ -87,14 +87,14 @@ pub(crate) fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     begun.elapsed()
 }
 
-/// Waits on a bus for a frame for which `is` returns `true`.
+/// Waits for a frame on a bus for which `is` returns `true`.
 pub(crate) fn frame_when(peer: &mut dyn CanBus, what: &str, is: impl Fn(&CanFrame) -> bool) {
     let mut patience = Patience::begin();
     let mut next = || patience.wait(what, |time| peer.receive(time)).expect("the bus is there");
     while !next().is_some_and(|frame| is(&frame)) {}
 }
 
-/// An agent that ends together with its test.
+/// Agent that ends when its test ends.
 pub(crate) struct Served {
     pub chain: Chain,
     pub tokens: Tokens,
@@ -119,7 +119,7 @@ impl Served {
         Self::start_as(boards, Config::default())
     }
 
-    /// Like `start`, with a configuration of the agent.
+    /// Like `start`, but with this configuration of the agent.
     pub(crate) fn start_as(boards: usize, config: Config) -> Self {
         let chain = Chain::start(boards);
         let dir = tempfile::tempdir().expect("a directory");
@@ -142,12 +142,12 @@ impl Served {
         Self { chain, tokens, log: log_path, http, ended, thread: Some(thread), _dir: dir }
     }
 
-    /// Starts an agent with a numbered chain, and takes the lease. Returns the lease key as well.
+    /// Starts an agent with a numbered chain, and takes the lease. Also returns the lease key.
     pub(crate) fn numbered(boards: usize) -> (Self, String) {
         Self::numbered_as(boards, Config::default())
     }
 
-    /// Like `numbered`, with a configuration of the agent.
+    /// Like `numbered`, but with this configuration of the agent.
     pub(crate) fn numbered_as(boards: usize, config: Config) -> (Self, String) {
         let served = Self::start_as(boards, config);
         let key = served.lease("anna", 60.0, "continue");
@@ -164,7 +164,7 @@ impl Served {
         grant["key"].as_str().expect("a key").to_owned()
     }
 
-    /// Begins a job and returns its number.
+    /// Starts a job and returns its number.
     pub(crate) fn begin(&self, request: &str, key: &str, body: Option<Value>) -> u64 {
         let (status, job) = self.api(request, Some(key), body);
         assert_eq!(status, 202, "{request}: {job}");
@@ -184,7 +184,7 @@ impl Served {
         }
     }
 
-    /// Begins a job, waits for its end and returns the job.
+    /// Starts a job, waits for its end and returns the job.
     pub(crate) fn job(&self, request: &str, key: &str, body: Option<Value>) -> Value {
         self.over(self.begin(request, key, body))
     }

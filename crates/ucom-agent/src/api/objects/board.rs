@@ -1,4 +1,4 @@
-//! Boards: as last seen, as found by a scan, and as they answer a command.
+//! Boards in their last known state, boards that a scan found, and boards that answered a command.
 use ucom::{Profile, Status};
 use ucom_host::date_text;
 use ucom_host::master::{Board, BoardSeen, Life};
@@ -66,12 +66,12 @@ fn bits(status: Status) -> Vec<String> {
 }
 
 impl BoardObject {
-    /// Returns all boards of a snapshot.
+    /// Returns all boards in a snapshot.
     pub(crate) fn all(snapshot: &BusSnapshot) -> Vec<Self> {
         snapshot.boards.iter().map(|(number, board)| Self::of(snapshot, number, board)).collect()
     }
 
-    /// Returns one board of a snapshot.
+    /// Returns one board in a snapshot.
     pub(crate) fn of(snapshot: &BusSnapshot, number: u8, board: &Board) -> Self {
         let now_us = snapshot.clock_us();
         let info = board.info;

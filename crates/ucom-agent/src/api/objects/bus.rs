@@ -84,7 +84,7 @@ pub(crate) struct ControllerObject {
 }
 
 impl StatusObject {
-    /// Returns the status of a snapshot; values that the snapshot does not contain are empty.
+    /// Returns the status for a snapshot; values that are not in the snapshot are empty.
     pub(crate) fn of(snapshot: &BusSnapshot) -> Self {
         let (statistics, now_us) = (&snapshot.statistics, snapshot.now_us);
         Self {

@@ -1,7 +1,7 @@
 //! Detection of Stop and Pause, which take effect before all other frames. The watch finds these commands in the bytes of a line as
 //! soon as they arrive, independently of the frame parser (J-04).
 //!
-//! Other frames may have to wait for earlier frames, for bytes that a false header announces, or for space in a full buffer. A Stop must
+//! Other frames may wait for earlier frames, for bytes that a false header announces, or for space in a full buffer. A Stop must
 //! not wait. The watch therefore recognises the seven bytes of a Stop or a Pause at any position, and the command takes effect in the next
 //! tick. The frame of the command still passes through the [`Receiver`](crate::Receiver) and gets its response record in the normal order.
 //! From the position of the frame in the stream, the controller detects that the command has already taken effect. An Execute that was

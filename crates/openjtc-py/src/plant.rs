@@ -72,7 +72,7 @@ impl Plant {
         self.ticks
     }
 
-    /// Joint positions in the latest reports of the drives, or the true positions if there are no drives.
+    /// Joint positions in the latest reports of the drives, or the true positions without drives.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.measured(|report| report.position, self.plant.truth().q))

@@ -89,8 +89,8 @@ impl Link {
         self.worker.shared.is_running() && !self.worker.is_closed()
     }
 
-    /// Sends a request to the current or next run, which executes the request when the arm moves. If there is no run, the request is
-    /// sent directly to the controller.
+    /// Sends a request to the current or next run, which executes the request when the arm moves. Without a run,
+    /// the request is sent directly to the controller.
     fn wish(
         &self,
         py: Python<'_>,

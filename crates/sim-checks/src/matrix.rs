@@ -306,7 +306,7 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     Ok(Cell { reaction, back: recover(&mut operator, &mut watch, state)? })
 }
 
-/// Performs the steps with which an operator returns the arm to position hold.
+/// Performs the steps of an operator who returns the arm to position hold.
 fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -> Result<Back, MatrixError> {
     // In Init and Error, the controller waits for the host even without the fault.
     let host_first = matches!(state, ControllerState::Init | ControllerState::Error);

@@ -16,7 +16,7 @@ pub fn file(name: &str) -> Option<PathBuf> {
 }
 
 /// Returns the positions, velocities and accelerations of a trajectory file as the host sends them to the
-/// controller. The file has 19 integers per line, of which the first is the time.
+/// controller. The file has 19 integers per line; the first integer is the time.
 ///
 /// # Panics
 /// If the file has another form.

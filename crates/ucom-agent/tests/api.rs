@@ -160,7 +160,7 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
         let http = served.clone();
         move || http.get("POST /api/stop").0
     });
-    // The frame is MCA_ADMIN_DATA to all boards with all flags 0. It is sent three times, because one frame can be lost.
+    // The frame is MCA_ADMIN_DATA to all boards with all flags 0. The frame is sent three times, because one frame can be lost.
     for _ in 0..3 {
         frame(&mut *peer, 0x600, &[0, 0, 0, 0]);
     }

@@ -1,4 +1,4 @@
-//! Tests that a request from before a Stop moves nothing after the Stop, whatever the delay of the request is and whichever client stopped.
+//! Tests that a request from before a Stop moves nothing after the Stop, for any delay of the request and for a Stop of any client.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -147,7 +147,7 @@ fn an_input_behind_ones_own_stop_is_refused_and_what_ends_something_is_not() {
     let (_, error) =
         served.api(&format!("PUT /api/boards/1/outputs?asked_after={before}"), Some(&key), Some(off));
     assert_ne!(error["code"], "stopped", "{error}");
-    // After a Stop of the client itself there is no hold-off for a request that contains the number of this Stop, or no number.
+    // A Stop of the client itself causes no hold-off for a request that contains the number of this Stop, or no number.
     let job =
         served.begin(&format!("POST /api/run?asked_after={halt}"), &key, Some(json!({ "boards": [1] })));
     assert_eq!(served.over(job)["stage"], "finished");

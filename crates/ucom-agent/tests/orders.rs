@@ -314,13 +314,13 @@ fn the_lease_is_not_let_go_while_a_run_begins() {
     assert_eq!(served.board(1)["active"], true);
 }
 
-/// Waits until the agent is no longer the master: no client holds the lease and no board runs.
+/// Waits until the agent has ended its role as master: no client holds the lease and no board runs.
 fn heartbeats_end(served: &Served) {
     until("the end of the heartbeats", || served.api("GET /api/status", None, None).1["is_master"] == false);
 }
 
-/// D-50: read-only requests do not keep the heartbeats active, even if the requests are frequent. If there is no
-/// lease holder, boards become safe.
+/// D-50: read-only requests do not keep the heartbeats active, even if the requests are frequent. Without a lease
+/// holder, boards become safe.
 #[test]
 fn d50_questions_do_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);

@@ -1,4 +1,4 @@
-//! Cache of board information and signal words (D-11), in the folder that the command line gives.
+//! Cache of board information and signal names (D-11), in the folder that the command line specifies.
 
 use cli_kit::Failure;
 use host_kit::user_folder;
@@ -13,7 +13,7 @@ use crate::args::{CacheArgs, LinkArgs};
 const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 impl LinkArgs {
-    /// Loads the signal table. Without a file, the table is empty.
+    /// Loads the signal table. If the file does not exist, the table is empty.
     pub(crate) fn signal_table(&self) -> Result<SignalTable, Failure> {
         let here = Path::new(SIGNAL_TABLE);
         let path = match &self.edges {
@@ -26,12 +26,12 @@ impl LinkArgs {
 }
 
 impl CacheArgs {
-    /// Returns the cache of names.
+    /// Returns the cache of signal names.
     pub(crate) fn cache(&self) -> Cache {
         Cache::new(self.directory(), self.fresh)
     }
 
-    /// Returns the folder of the cache; `None` if the folder is unknown.
+    /// Returns the folder of the cache; `None` if no folder can be determined.
     fn directory(&self) -> Option<PathBuf> {
         self.cache.clone().or_else(|| Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom")))
     }

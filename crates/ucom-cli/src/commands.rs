@@ -1,4 +1,4 @@
-//! The commands. Each file contains one command or one family of commands.
+//! The commands. Each file in this folder contains one command or one group of commands.
 
 mod boards;
 mod chain;

@@ -1,5 +1,5 @@
-//! Ctrl-C: the first one cancels the command, which completes the steps that it has started. The second one ends the
-//! process at once, and prints the remaining steps and their command.
+//! Ctrl-C: the first Ctrl-C cancels the command, which completes the steps that it has started. The second Ctrl-C
+//! ends the process at once, and prints the remaining steps and the command for them.
 
 use std::io::Write;
 use std::time::Duration;
@@ -8,15 +8,15 @@ use cli_kit::exit::FAULT;
 use cli_kit::{Stop, print_within};
 use ucom_host::session::CleanupList;
 
-/// Longest wait for a blocked reader.
+/// Maximum wait for a blocked reader.
 const PRINT_TIMEOUT: Duration = Duration::from_millis(300);
 
-/// Starts to handle Ctrl-C.
+/// Starts the handling of Ctrl-C.
 pub(crate) fn listen(cleanup: &CleanupList) -> std::io::Result<Stop> {
     let cleanup = cleanup.clone();
     Stop::listen_with(move || {
         let words = cleanup.words();
-        // Removes files that were created but not written.
+        // Files that were created but not written are removed.
         cli_kit::output_file::abandon();
         print_within(PRINT_TIMEOUT, move || {
             let _ = std::io::stderr().write_all(words.as_bytes());

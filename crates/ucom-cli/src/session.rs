@@ -26,7 +26,7 @@ impl Operator for Console {
 }
 
 impl LinkArgs {
-    /// Returns the profile; the defaults if no file is given.
+    /// Returns the profile, or the default profile if no file is selected.
     pub(crate) fn profile(&self) -> Result<Profile, Failure> {
         let Some(path) = &self.profile else { return Ok(Profile::default()) };
         let text =
@@ -55,7 +55,7 @@ impl LinkArgs {
         self.session_with(self.profile()?)
     }
 
-    /// Like [`Self::session`], with a profile other than the command line's.
+    /// Like [`Self::session`], but with another profile than that of the command line.
     pub(crate) fn session_with(&self, profile: Profile) -> Result<Driver, Failure> {
         let cleanup = CleanupList::default();
         let console = Console { stop: listen(&cleanup)?, notes: Lines::stderr()? };
@@ -63,7 +63,7 @@ impl LinkArgs {
     }
 }
 
-/// Returns the numbers that two boards share, in the form of `--json`.
+/// Returns the board numbers that two boards share, in the format of `--json`.
 pub(crate) fn shared_numbers(master: &Master) -> Vec<Value> {
     let value = |e: &Error| {
         let Error::Identity(IdentityError::NumberShared { board, found, .. }) = e else { return Value::Null };

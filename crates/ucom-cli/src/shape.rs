@@ -1,4 +1,4 @@
-//! Boards as text and as JSON, in the same form for all commands.
+//! Conversion of boards to text and JSON, in the same format for all commands.
 
 use cli_kit::table;
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use ucom::{BoardInfo, Profile, Status};
 use ucom_host::date_text;
 use ucom_host::master::{BoardSeen, state_name};
 
-/// Returns the names of the set bits.
+/// Returns the names of the status bits that are set.
 pub(crate) fn bits(status: Status) -> Vec<&'static str> {
     Status::NAMES.iter().filter(|(_, bit)| status.has(*bit)).map(|(name, _)| *name).collect()
 }
@@ -26,7 +26,7 @@ pub(crate) fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Val
     })
 }
 
-/// Returns a board with its description.
+/// Returns a board and its description.
 pub(crate) fn board_value(board: &BoardSeen, profile: &Profile) -> Value {
     let mut value = info_value(board.number, &board.info, profile);
     value["description"] = json!(board.description);

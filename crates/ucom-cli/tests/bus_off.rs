@@ -1,17 +1,17 @@
-//! CAN controllers of `ucom sim` that go bus-off and recover: those of boards and those of clients.
+//! Tests of CAN controllers that go bus-off and recover: the controllers of simulated boards and of clients of `ucom sim`.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::Sim;
 
-/// ISO 11898-1: when the wire is intact again, bus-off boards recover, and so does a client.
+/// ISO 11898-1: when the wire works again, boards and clients that were bus-off recover.
 #[test]
 fn bus_off_is_not_for_ever() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
     let mut peer = sim.peer();
     sim.fault("disturbed share=1 for_s=2");
-    // Each frame of the client and of the boards is repeated until its sender is bus-off.
+    // Each frame of the client and of the boards is repeated until the sender is bus-off.
     let during = sim.ucom(&["scan"]);
     assert_ne!(during.code, 0, "{}", during.out);
     std::thread::sleep(std::time::Duration::from_millis(2_000));
@@ -21,8 +21,8 @@ fn bus_off_is_not_for_ever() {
     assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
 }
 
-/// A client learns of its own bus-off from an error frame, and `ucom` prints a message with the next step. The
-/// bus-off is not only reported on the simulator's stderr.
+/// An error frame informs a client that its controller is bus-off, and `ucom` prints a message with the next
+/// step. The bus-off is also reported on the stderr of the simulator.
 #[test]
 fn the_bus_off_controller_is_named() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

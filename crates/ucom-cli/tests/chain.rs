@@ -1,4 +1,4 @@
-//! Commands against `ucom sim`: the chain, process data, recordings.
+//! Tests of commands with `ucom sim`: the chain, process data and recordings.
 #![cfg(unix)]
 
 use crate::common;
@@ -36,7 +36,7 @@ fn p1_scan_only_asks() {
     assert!(of_pc.is_empty(), "{of_pc:?}");
 }
 
-/// P-2: chains of 0, 1 and 31 boards. The inventory is written, compared, and kept if it differs.
+/// P-2: tests chains of 0, 1 and 31 boards. The inventory is written and compared; if it differs from the chain, the file is not changed.
 #[test]
 fn p2_init_of_chains_and_their_inventory() {
     let sim = Sim::start(&["--boards", "0"]);
@@ -60,7 +60,7 @@ fn p2_init_of_chains_and_their_inventory() {
     assert_eq!(first["flash_date"], "2008-03-14");
     let inventory = std::fs::read_to_string(sim.path("inventory.toml")).unwrap();
     assert!(inventory.contains("flash_number = 0x0023"), "{inventory}");
-    // The inventory looks as if two boards had been swapped.
+    // The changed inventory looks as if two boards had been swapped.
     std::fs::write(sim.path("inventory.toml"), inventory.replace("0x0023", "0x0055")).unwrap();
     let output = sim.ucom(&["--json", "init"]).ends(1);
     let text = output.json()["findings"][0].as_str().unwrap().to_owned();
@@ -68,7 +68,7 @@ fn p2_init_of_chains_and_their_inventory() {
     sim.ucom(&["init", "--renew"]).ends(0);
 }
 
-/// D-24, 5.4: a broken wire is reported with its place.
+/// D-24, 5.4: the report of a broken wire contains the position of the fault.
 #[test]
 fn a_broken_init_wire_is_reported_with_its_place() {
     let mut sim = Sim::start(&["--boards", "4"]);
@@ -79,7 +79,7 @@ fn a_broken_init_wire_is_reported_with_its_place() {
     assert!(text.contains("after position 2") && text.contains("0x23") && text.contains("0x31"), "{text}");
 }
 
-/// D-T21: two boards with the same flash number send one report but are found as two boards.
+/// D-T21: two boards with the same flash number send a single report, but are detected as two boards.
 #[test]
 fn d07_equal_flash_ids_are_found_out() {
     let sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x22,0x22"]);
@@ -95,7 +95,7 @@ fn status_bits_are_set_and_cleared_by_name() {
     assert_eq!(status["boards"][0]["status_byte"], 0x5B);
     let status = sim.json(&["status", "2", "--clear", "astart"], 0);
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
-    // D-T8: the status byte through all states.
+    // D-T8: the status byte is correct in all states.
     let byte = |words: &[&str]| sim.ucom(words).ends(0).json()["boards"][0]["status_byte"].clone();
     assert_eq!(byte(&["--json", "xreset", "1"]), 0x1F);
     assert_eq!(byte(&["--json", "start", "1"]), 0x8B);
@@ -114,13 +114,13 @@ fn names_inputs_and_motion() {
     let io = sim.json(&["io", "1"], 0);
     assert_eq!(io["boards"][0]["ci"][0], "set_position [0.01 deg]");
     assert_eq!(io["boards"][0]["initial_ci"], json!([0, 1000, 900]));
-    // Inputs move outputs under supervision.
+    // Under supervision, inputs move the outputs.
     let so = sim.json(&["ci", "1", "set_position=1500", "--for", "1.5"], 0);
     let position = so["so"]["position"].as_i64().unwrap();
     assert!((1450..1550).contains(&position), "{so}");
     let status = sim.json(&["status", "1"], 0);
     assert_eq!(status["boards"][0]["state"], "started", "the loop was stopped");
-    // D-35: the written values are only assumed.
+    // D-35: the values after a write are only assumed, because boards do not report parameters.
     let par = sim.json(&["par", "1", "kp=150"], 0);
     assert_eq!(
         (par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()),
@@ -136,18 +136,17 @@ fn names_inputs_and_motion() {
     );
 }
 
-/// P-17, D-08, D-50: while one PC runs the boards, a second PC is refused. When the first PC is lost, the boards
-/// become safe.
+/// P-17, D-08, D-50: while one PC runs the boards, a second PC is refused. If the first PC is lost, the boards become safe.
 #[test]
 fn p17_one_master_at_a_time_and_none_is_safe() {
     let sim = Sim::numbered(&["--boards", "2"]);
     let run = sim.spawn(&["--json", "run", "1", "--active", "--ci", "1.set_position=1000"]);
     let mut peer = sim.peer();
     peer.wait("601#01010000");
-    // Listening is allowed: the names were requested before the loop ran, or are known.
+    // Listening is allowed: the names were requested before the loop started, or are already known.
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["position"].is_i64(), "{so}");
-    // Requests for identity are allowed as well, because the running PC interprets the answers correctly.
+    // Identity requests are allowed as well, because the PC that runs the boards interprets the answers correctly.
     let scan = sim.json(&["scan"], 0);
     assert_eq!(
         (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
@@ -158,14 +157,14 @@ fn p17_one_master_at_a_time_and_none_is_safe() {
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["current"].is_i64(), "the board still runs: {so}");
     sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
-    // After kill -9 no stop is sent, and the board itself must stop.
+    // After kill -9 no stop is sent, so the board itself must stop.
     ended_by(run, "-KILL");
     peer.wait("601#00000000");
     let status = sim.json(&["status", "1"], 0);
     assert_eq!(status["boards"][0]["state"], "started");
 }
 
-/// Ctrl-C stops control, then applications.
+/// Ctrl-C stops the control loops first, then the applications.
 #[test]
 fn run_stops_in_order() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -180,7 +179,7 @@ fn run_stops_in_order() {
     assert_eq!(status["boards"][1]["status_byte"], 0x1B);
 }
 
-/// P-19: too much load is refused before the loops start.
+/// P-19: if the bus load would be too high, the run is refused before the loops start.
 #[test]
 fn p19_load_is_refused() {
     let sim = Sim::numbered(&["--boards", "3"]);
@@ -241,8 +240,8 @@ fn p20_probe_finds_big_endian_boards() {
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
 
-/// Ctrl-C while a board moves stops it at once. The board's own supervision, which is for a dead PC, would stop it
-/// later.
+/// If Ctrl-C is pressed while a board moves, the board is stopped at once. The supervision of the board itself,
+/// which detects a lost PC, would stop the board later.
 #[test]
 fn an_interrupted_motion_is_stopped() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -251,7 +250,7 @@ fn an_interrupted_motion_is_stopped() {
     peer.wait("601#01010000");
     peer.wait("381#");
     signal(&moving, "-INT");
-    // The PC sends run = 0 before the board's own timeout of 1.5 s.
+    // The PC sends run = 0 before the board timeout of 1.5 s.
     let since = std::time::Instant::now();
     peer.wait("601#00000000");
     assert!(since.elapsed() < std::time::Duration::from_millis(1000), "{:?}", since.elapsed());
@@ -259,7 +258,7 @@ fn an_interrupted_motion_is_stopped() {
     assert_eq!(output.code, 0, "{}", output.err);
 }
 
-/// D-15, D-34: if this PC does not run the control loop, an input is sent alone and the other inputs are not written.
+/// D-15, D-34: if this PC does not run the control loop, the command sends only the requested input and does not write other inputs.
 #[test]
 fn d34_an_input_leaves_its_neighbours_alone() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -269,7 +268,7 @@ fn d34_an_input_leaves_its_neighbours_alone() {
     assert_eq!(peer.wait("341#"), "341#0000DC05");
 }
 
-/// D-36: two boards have the same image, Program ID and date. The names of one are not used to move the other.
+/// D-36: two boards have the same image, Program ID and date. The names of one board are not used to move the other board.
 #[test]
 fn d36_one_image_on_boards_that_differ() {
     let sim = Sim::numbered(&[]);
@@ -281,7 +280,7 @@ fn d36_one_image_on_boards_that_differ() {
     let other = io(&["--json", "io", "7"]);
     assert_ne!(first["ci"], other["ci"], "the simulator's boards differ");
     assert_eq!(other, io(&["--json", "io", "7", "--fresh"]));
-    // Puts the names of another board into the cache file of a board with the same program and date.
+    // Copies the names of another board to the cache file of a board with the same program and date.
     let kept = |board: &str| {
         let info = sim.json(&["info", board], 0)["boards"][0].clone();
         let end = format!("-{:04X}.json", info["flash_number"].as_u64().unwrap());
@@ -297,7 +296,7 @@ fn d36_one_image_on_boards_that_differ() {
     sim.ucom(&["ci", "7", &format!("{name}=1"), "--for", "0.5"]).ends(0);
 }
 
-/// If one of several boards is missing, the command stops before any change. Completed changes are reported.
+/// If one of several boards is missing, the command ends before any change. Completed changes are reported.
 #[test]
 fn several_boards_are_changed_only_when_all_answer() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -312,7 +311,7 @@ fn several_boards_are_changed_only_when_all_answer() {
     }
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{received:?}");
-    // The board has lost its number, and no status is shown that was not received.
+    // The board has lost its number, and a status that was not received is not shown.
     let output = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
     assert!(output.out.contains("lost its number") && !output.out.contains("0x"), "{}", output.out);
     sim.ucom(&["init"]).ends(0);
@@ -323,13 +322,13 @@ fn several_boards_are_changed_only_when_all_answer() {
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
 
-/// D-T21: two boards with the same flash number report at the same moment with the same bits. This gives one frame on
-/// the bus.
+/// D-T21: two boards with the same flash number send their reports at the same time with the same bits. On the bus,
+/// these two reports are a single frame.
 #[test]
 fn d_t21_reports_that_are_alike_are_one_frame() {
     let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x21"]);
     let mut peer = sim.peer();
-    // Time for the boards to boot.
+    // The boards need this time to boot.
     peer.all(600);
     peer.send("240#");
     let reports: Vec<String> = peer.all(600).into_iter().filter(|f| f.starts_with("441#")).collect();
@@ -339,8 +338,7 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
     assert!(output.out.contains("more boards than reports"), "{}", output.out);
 }
 
-/// Single frames are sent unchanged. Frames that change boards need a confirmation; then either all frames are sent
-/// or none.
+/// Single frames are sent unchanged. Frames that change boards need a confirmation. Either all frames are sent, or none.
 #[test]
 fn single_frames_can_be_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -358,7 +356,7 @@ fn single_frames_can_be_sent() {
     sim.ucom(&["send", "xyz"]).ends(2);
 }
 
-/// A name that the user gives twice is an error, because it is ambiguous.
+/// If the user specifies a name twice, this is an error, because the value is ambiguous.
 #[test]
 fn a_name_given_twice_is_refused() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -371,7 +369,7 @@ fn a_name_given_twice_is_refused() {
     assert!(peer.all(100).iter().all(|f| !f.starts_with("3C1#") && !f.starts_with("341#")));
 }
 
-/// Boards without a number reveal only the form of their reports, and the command says so.
+/// Boards without a number reveal only the format of their reports, and the command reports this.
 #[test]
 fn a_probe_of_boards_without_numbers_reports_how_little_it_is() {
     let sim = Sim::start(&["--boards", "2"]);

@@ -1,4 +1,4 @@
-//! `ucom conformance` and `ucom status --raw` against `ucom sim`.
+//! Tests of `ucom conformance` and `ucom status --raw` with `ucom sim`.
 #![cfg(unix)]
 
 use crate::common;
@@ -6,7 +6,7 @@ use crate::common;
 use common::{Sim, ended_by};
 use serde_json::json;
 
-/// D-T2, D-T5, D-T10, D-T11: tests that only send requests pass on simulated boards, in both byte orders.
+/// D-T2, D-T5, D-T10, D-T11: the tests that only send requests pass on simulated boards, in both byte orders.
 #[test]
 fn simulated_boards_conform() {
     for endian in ["little", "big"] {
@@ -30,7 +30,7 @@ fn simulated_boards_conform() {
         assert_eq!(output["passed"], 2, "{output}");
         ucom(&["conformance", "--only", "D-T99"]).ends(2);
         ucom(&["conformance", "1", "--init"]).ends(2);
-        // The user must select exactly one board, and it must be the intended one.
+        // The user must select exactly one board, and this board must be the intended board.
         let image = dir.path().join("image.bin");
         std::fs::write(&image, [0xA5; 256]).unwrap();
         let image = image.to_str().unwrap();
@@ -41,7 +41,7 @@ fn simulated_boards_conform() {
     }
 }
 
-/// The conformance tests that change boards are refused while a control loop runs, and no option overrides that.
+/// While a control loop runs, the conformance tests that change boards are refused, and no option overrides this.
 #[test]
 fn running_loops_are_stopped_first() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -56,7 +56,7 @@ fn running_loops_are_stopped_first() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// D-22: the formula is applied literally, and the result that the rules require is shown next to the actual one.
+/// D-22: the formula is applied literally, and the command shows the result that the rules require and the actual result.
 #[test]
 fn d22_raw_status_sets_bits_outside_the_mask() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -67,11 +67,11 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
     );
     assert_eq!(peer.wait("1C1#"), "1C1#0040");
-    // This is a single broadcast frame.
+    // This command sends a single broadcast frame.
     sim.ucom(&["status", "all", "--raw", "40:00"]).ends(0);
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);
-    // Without INIT the number is lost, as expected.
+    // Without INIT, the board loses its number, as expected.
     let output = sim.json(&["status", "2", "--raw", "0x08:0x00"], 0);
     assert_eq!(
         (&output["boards"][0]["after"], &output["boards"][0]["as_expected"]),

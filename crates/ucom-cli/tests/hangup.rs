@@ -1,4 +1,4 @@
-//! A closed terminal (SIGHUP) and `kill` (SIGTERM) end commands in the same way as Ctrl-C.
+//! Tests that a closed terminal (SIGHUP) and `kill` (SIGTERM) end commands in the same way as Ctrl-C.
 #![cfg(unix)]
 
 use crate::common;
@@ -8,7 +8,7 @@ use std::time::Duration;
 use cli_kit::testing::{ended, signal};
 use common::{Sim, ended_by};
 
-/// A closed terminal ends running control loops and programming, like Ctrl-C.
+/// Like Ctrl-C, a closed terminal ends running control loops and programming.
 #[test]
 fn a_hangup_stops_in_order() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -25,7 +25,7 @@ fn a_hangup_stops_in_order() {
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2]);
 }
 
-/// `ci --for` stops the board, `monitor` ends, and a recording is complete.
+/// After such a signal, `ci --for` stops the board, `monitor` ends, and a recording is complete.
 #[test]
 fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -33,8 +33,7 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
         peer.wait("601#01010000");
-        // Long enough for a complete snapshot on a loaded computer. Without a snapshot the command has no
-        // values to show.
+        // This wait is long enough for a complete snapshot on a loaded computer. Without a snapshot the command has no values to show.
         peer.wait_for(50, "381#");
         signal(&child, name);
         peer.wait("601#00000000");
@@ -64,8 +63,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     }
 }
 
-/// A recorder that is killed loses at most one second in each format. If the format shows that the end is missing,
-/// this is reported.
+/// If a recorder is killed, it loses at most one second of frames in each format. If the file format shows that
+/// the end of the file is missing, the command reports this.
 #[test]
 fn a_killed_recorder_leaves_what_was_recorded() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -77,7 +76,7 @@ fn a_killed_recorder_leaves_what_was_recorded() {
         std::thread::sleep(Duration::from_millis(3_300));
         ended_by(child, "-KILL");
         let output = sim.ucom(&["decode", &file]).ends(0);
-        // At least two packages every 10 ms, for more than a second.
+        // The output contains at least two packages every 10 ms, for more than a second.
         let frames = output.out.lines().count();
         assert!(frames > 200, "{ending}: {frames} frames; {}", output.err);
         assert!(ending != "mcap" || output.err.contains("the file ends after"), "{ending}: {}", output.err);

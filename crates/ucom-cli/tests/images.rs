@@ -1,11 +1,11 @@
-//! Accepted firmware files: records, raw binary in a `.bin` file, and other files only on request.
+//! Tests of accepted firmware files: records, raw binary in a `.bin` file, and other files only on request.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, image};
 
-/// A text file is refused with the position of the error before any frame is sent. The images and targets are shown.
+/// A text file is refused before any frame is sent; the error contains the position. The images and targets are shown.
 #[test]
 fn d40_a_text_is_never_flashed() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -39,8 +39,7 @@ fn d40_a_text_is_never_flashed() {
     assert!(output.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", output.err);
 }
 
-/// No hint about a damaged record file leads the user to write its characters to the board, and `--raw` does not
-/// write them either.
+/// The hint about a damaged record file never suggests to write its characters to the board. `--raw` does not write them either.
 #[test]
 fn d46_raw_does_not_flash_records() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -78,8 +77,7 @@ fn d46_raw_does_not_flash_records() {
     assert!(peer.all(50).is_empty(), "nothing was sent");
 }
 
-/// A count record with the right number ends a file of S-records. Gaps are filled on request, and the hint contains
-/// the option.
+/// A count record with the correct number ends a file of S-records. Gaps are filled on request, and the hint contains the option for this.
 #[test]
 fn count_records_and_gaps() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -101,8 +99,8 @@ fn count_records_and_gaps() {
     assert!(output.contains("gap of 12 bytes at word address 0x2 filled with FF"), "{output}");
 }
 
-/// The boards' tool chain writes S-record addresses in words, other tools in bytes. The unit follows from the
-/// records, or from `--addresses`.
+/// The tool chain of the boards counts S-record addresses in words; other tools count bytes. The unit is
+/// determined from the records, or from `--addresses`.
 #[test]
 fn s_records_count_words_or_bytes() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -128,7 +126,7 @@ fn s_records_count_words_or_bytes() {
     let output = update("bytes.s19", file(16, 4), &[], 0);
     assert!(output.contains("64 bytes from word 0x20, addresses in bytes"), "{output}");
     assert!(output.contains("because only then the records are contiguous"), "{output}");
-    // Two records may have an intended gap between them.
+    // The gap between the two records may be intended.
     peer.all(100);
     let output = update("two.s19", file(16, 2), &[], 2);
     assert!(output.contains("0x48") && output.contains("--addresses byte"), "{output}");

@@ -1,5 +1,5 @@
-//! Boards leave their control loop while `ucom run` supervises them (D-37). The command reports this at once, as an
-//! event of `--json`, by outdated values, and by exit code 5.
+//! Tests of boards that leave their control loop while `ucom run` supervises them (D-37). The command reports this
+//! at once: by an event of `--json`, by outdated values, and by exit code 5.
 
 use crate::common;
 
@@ -13,7 +13,7 @@ use common::Sim;
 use serde_json::Value;
 use test_kit::patience::Patience;
 
-/// A running `ucom --json run` and its events.
+/// Running `ucom --json run` command and its events.
 struct Running {
     child: Child,
     events: Receiver<Value>,
@@ -34,7 +34,7 @@ impl Running {
         running
     }
 
-    /// Returns the next event of this kind.
+    /// Returns the next event for which `wanted` returns `true`.
     fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         let mut patience = Patience::begin();
         loop {
@@ -50,7 +50,7 @@ impl Running {
         self.ended()
     }
 
-    /// Waits until the command ends by itself.
+    /// Waits until the command ends without a signal.
     fn ended(mut self) -> (i32, String) {
         let mut err = String::new();
         self.child.stderr.take().unwrap().read_to_string(&mut err).unwrap();
@@ -62,7 +62,7 @@ fn of(board: u8, name: &str) -> impl Fn(&Value) -> bool {
     move |event| event["event"] == name && event["board"] == board
 }
 
-/// A board misses the PC's heartbeats (D-50) and leaves its loop, while the other board continues.
+/// A board receives no heartbeats of the PC (D-50) and leaves its loop, while the other board continues.
 #[test]
 fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -74,7 +74,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!(so["stale"], true, "{so}");
     let so = run.until(of(2, "so"));
     assert_eq!(so["stale"], false, "{so}");
-    // The age of old values grows, and their time does not change.
+    // The age of outdated values increases, and their time does not change.
     let (first, second) = (run.until(of(1, "so")), run.until(of(1, "so")));
     assert_eq!((first["time_s"].clone(), &second["stale"]), (second["time_s"].clone(), &Value::Bool(true)));
     assert!(second["age_s"].as_f64() > first["age_s"].as_f64(), "{first} {second}");
@@ -86,7 +86,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2], "stopped");
 }
 
-/// Another PC stops all boards. Each of them is reported; without `--json` as text.
+/// Another PC stops all boards. Each stop of a board is reported; without `--json`, as text.
 #[test]
 fn d37_boards_that_another_pc_stops_are_named() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -112,7 +112,7 @@ fn d37_boards_that_another_pc_stops_are_named() {
     assert_eq!(child.wait().unwrap().code(), Some(5));
 }
 
-/// Boards that stay silent are stopped by policy. Then no board is left to supervise, and the run ends by itself.
+/// If boards remain silent, they are stopped by policy. After that, the command has lost all boards, and the run ends by itself.
 #[test]
 fn d51_a_run_without_boards_ends_by_itself() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -125,7 +125,7 @@ fn d51_a_run_without_boards_ends_by_itself() {
     assert!(err.contains("the run ends, because no board is in its control loop"), "{err}");
 }
 
-/// Section 8: if a board's heartbeats are late, lost and back again, each change is an event.
+/// Section 8: each change of the heartbeats of a board (late, lost, back) is an event.
 #[test]
 fn p15_late_lost_and_back_are_events() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

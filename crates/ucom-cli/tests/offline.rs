@@ -1,4 +1,4 @@
-//! Commands without a bus: exit codes, JSON, pages.
+//! Tests of commands without a bus: exit codes, JSON, help pages.
 
 use crate::common;
 
@@ -54,7 +54,7 @@ fn decode_prints_names_of_frames() {
     let output = ucom_with(&["--json", "decode", "-"], "(1.5) can0 1C1#0202\n").ends(0);
     let value = output.json();
     assert_eq!((value["function"].as_str(), value["mask"].as_u64()), (Some("PC_SETSTATUS"), Some(2)));
-    // A string is decoded across its packages.
+    // A string that spans several packages is decoded.
     let text = "141#2100011934126E38\n141#0200\n141#55436F4D32206865\n141#61642070616E\n";
     let output = ucom_with(&["decode"], text).ends(0);
     assert!(output.out.lines().last().unwrap().contains("\"UCoM2 head pan\""), "{}", output.out);
@@ -83,7 +83,7 @@ fn a_dbc_without_boards_needs_no_bus() {
     assert!(output.out.starts_with("VERSION") && output.out.contains("BO_ "), "{}", output.out);
 }
 
-/// A result that cannot be printed is a failure; a reader that has disconnected is not.
+/// A result that cannot be printed is a failure, but a reader that has disconnected is not.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
@@ -102,7 +102,7 @@ fn a_result_that_cannot_be_printed_is_an_error() {
     }
 }
 
-/// Existing files are not overwritten without a request, and no profile is written without measurements.
+/// Existing files are not overwritten unless the user requests it, and no profile is written without measurements.
 #[test]
 fn files_are_kept_and_nothing_is_made_up() {
     let dir = tempfile::tempdir().unwrap();
@@ -125,7 +125,7 @@ fn files_are_kept_and_nothing_is_made_up() {
         assert_eq!(error["code"], "exists", "{words:?}: {}", output.out);
         assert!(error["hint"].as_str().unwrap().contains("--overwrite"), "{words:?}: {}", output.out);
     }
-    // No board answers here, so no file is written, even with --overwrite.
+    // In this test no board answers, so no file is written, even with --overwrite.
     for words in [&["--json", "probe", "--out", &toml, "--overwrite"][..], &["--json", "probe"]] {
         let output = ucom(&[words, &bus].concat()).ends(3);
         assert_eq!(output.json()["error"]["code"], "no-boards", "{}", output.out);
@@ -136,7 +136,7 @@ fn files_are_kept_and_nothing_is_made_up() {
     assert_ne!(std::fs::read_to_string(dbc).unwrap(), "mine");
 }
 
-/// Programs that request JSON get JSON for wrong usage as well.
+/// If a program requests JSON, wrong usage is also reported as JSON.
 #[test]
 fn wrong_usage_is_json_where_that_is_asked_for() {
     for words in [&["--json", "scann"][..], &["ci", "2,3", "x=1", "--json"], &["info", "--json", "99"]] {
@@ -153,8 +153,8 @@ fn wrong_usage_is_json_where_that_is_asked_for() {
     assert!(output.err.contains(".asc") && !file.exists(), "{}", output.err);
 }
 
-/// The writer of a recording was killed. The complete part is decoded, and the command reports that the recording is
-/// incomplete.
+/// The process that wrote the recording was killed. The complete part of the recording is decoded, and the command
+/// reports that the recording is incomplete.
 #[test]
 fn a_recording_that_is_cut_off_is_decoded_up_to_there() {
     let dir = tempfile::tempdir().unwrap();

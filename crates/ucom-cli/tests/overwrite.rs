@@ -1,12 +1,11 @@
-//! `--overwrite` overwrites a file and skips no check of the bus. `--force` skips a check of the bus and overwrites
-//! no file.
+//! Tests that `--overwrite` overwrites a file but skips no check of the bus. `--force` skips a check of the bus but overwrites no file.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, ended_by, ucom};
 
-/// A user who follows the hint of the file check while boards run resets no board.
+/// If a user follows the hint of the file check while boards run, no board is reset.
 #[test]
 fn writing_over_a_file_never_resets_a_running_chain() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -34,7 +33,7 @@ fn writing_over_a_file_never_resets_a_running_chain() {
     assert!(!output.err.contains("rebooted"), "{}", output.err);
 }
 
-/// Each command that writes a file: `--force` alone overwrites no file, and `--overwrite` does.
+/// Tests each command that writes a file: `--force` alone overwrites no file, and `--overwrite` does.
 #[test]
 fn force_writes_over_no_file() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -62,8 +61,8 @@ fn force_writes_over_no_file() {
     }
 }
 
-/// `record` has no check of the bus. Its `--force` of older scripts means `--overwrite`, and the help does not list
-/// it.
+/// The command `record` does not check the bus. In older scripts, its option `--force` means `--overwrite`; the
+/// help does not list `--force`.
 #[test]
 fn record_takes_force_for_overwrite() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -1,4 +1,4 @@
-//! `ucom serve`: an agent for a bus, or for a simulated chain.
+//! Tests of `ucom serve`: an agent for a bus or for a simulated chain.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,7 @@ use common::Sim;
 use serde_json::Value;
 use test_kit::http::Http;
 
-/// Starts an agent with these words, and returns its first line.
+/// Starts an agent with these arguments, and returns its first output line.
 fn serve(dir: &Path, words: &[&str]) -> (Child, Value) {
     let mut command = program(env!("CARGO_BIN_EXE_ucom"), "UCOM_");
     command.args(["--json", "serve", "--listen", "127.0.0.1:0"]).args(words);
@@ -29,7 +29,7 @@ fn serve(dir: &Path, words: &[&str]) -> (Child, Value) {
     (child, ready)
 }
 
-/// Returns a client with the right to read the token file.
+/// Returns a client that has permission to read the token file.
 fn http(ready: &Value) -> Http {
     let url = ready["url"].as_str().expect("its address");
     let tokens = std::fs::read_to_string(ready["token_file"].as_str().expect("its file")).expect("tokens");
@@ -60,13 +60,13 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     assert_eq!(code, Some(0), "{err}");
     assert!(err.contains("new operator's token in") && err.contains("`cat "), "{err}");
     assert!(!err.contains(&http(&ready).operator) && !err.contains("#token="), "{err}");
-    // The tokens are the same in the next start.
+    // The tokens do not change at the next start.
     let (child, again) = serve(dir.path(), &["--sim"]);
     assert_eq!(http(&again).operator, http(&ready).operator);
     signal(&child, "-INT");
     let (code, err) = over(child);
     assert_eq!((code, err.contains("token")), (Some(0), false), "{err}");
-    // The user requests the link. The link is still not printed, because the reader of the output may store it.
+    // In this test the user requests the link. The link is still not printed, because the program that reads the output may store it.
     let (child, again) = serve(dir.path(), &["--sim", "--link"]);
     signal(&child, "-INT");
     let (code, err) = over(child);
@@ -89,7 +89,7 @@ fn the_link_with_the_token_is_printed_on_a_terminal() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// When the agent ends, it stops the boards that it has started. The loss of the bus ends the agent.
+/// When the agent ends, it stops the boards that it has started. If the bus is lost, the agent ends.
 #[test]
 fn what_an_agent_has_started_is_stopped_with_it() {
     let sim = Sim::numbered(&["--boards", "2"]);

@@ -1,19 +1,19 @@
-//! Two boards with the same number: every command reports this and changes no board, and `stop` stops both.
+//! Tests with two boards that have the same number: every command reports this and changes no board, and `stop` stops both boards.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, image};
 
-/// Board 2 of three has number 1 as well.
+/// Starts a chain of three boards in which board 2 has number 1 as well.
 fn sharing() -> Sim {
     let mut sim = Sim::numbered(&["--boards", "3", "--flash-ids", "0x21,0x42,0x63"]);
     sim.fault("same-number board=2");
     sim
 }
 
-/// D-24: the exit code is 4, and the message contains both flash numbers and the next command. Only requests and
-/// heartbeats are sent.
+/// D-24: the exit code is 4, and the message contains both flash numbers and the next command. The command sends
+/// only requests and heartbeats.
 #[test]
 fn d24_every_command_names_it_and_changes_nothing() {
     let sim = sharing();
@@ -56,12 +56,12 @@ fn d24_every_command_names_it_and_changes_nothing() {
         doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire after"),
         "{doctor}"
     );
-    // After `init` has given new numbers, the commands succeed.
+    // After `init` has assigned new numbers, the commands succeed.
     sim.ucom(&["init"]).ends(0);
     sim.ucom(&["info", "all"]).ends(0);
 }
 
-/// D-24: a stop is not refused; it reports at its end that two boards were stopped.
+/// D-24: a stop is not refused; at its end, the command reports that it stopped two boards.
 #[test]
 fn d24_stop_stops_both_and_says_so() {
     let sim = sharing();

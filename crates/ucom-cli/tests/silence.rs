@@ -1,11 +1,11 @@
-//! Silent boards and buses. The report always contains the request, the place, the reason and the next command.
+//! Tests with silent boards and buses. The report always contains the request, the affected boards, the reason and the next command.
 
 use crate::common;
 
 use cli_kit::testing::ended;
 use common::Sim;
 
-/// A recorder of a silent bus reports this once, only to users. The recorder does not report this if frames arrive.
+/// If the bus is silent, a recorder reports this once, and only to users. If frames arrive, the recorder does not report silence.
 #[test]
 fn a_recorder_of_a_silent_bus_reports_it_once() {
     let sim = Sim::start(&["--boards", "2"]);
@@ -22,7 +22,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     let recorded = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let its = recorded.clone();
     let ask = std::thread::spawn(move || {
-        // Sends frames until the recorder has one, because a slow computer starts it late.
+        // Sends frames until the recorder has received one, because a slow computer starts the recorder late.
         while !its.load(std::sync::atomic::Ordering::Relaxed) {
             peer.send("240#");
             std::thread::sleep(std::time::Duration::from_millis(25));

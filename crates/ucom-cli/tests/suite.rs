@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of it.
+//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of that program.
 mod bus_off;
 mod chain;
 mod common;

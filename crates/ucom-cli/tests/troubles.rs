@@ -1,5 +1,5 @@
-//! The part of docs/troubles.md about `ucom`. The real program runs each case against `ucom sim`. `UPDATE_DOCS=1`
-//! rewrites that part.
+//! Generates and checks the part of docs/troubles.md about `ucom`. The real program runs each case against `ucom
+//! sim`. `UPDATE_DOCS=1` rewrites that part.
 #![cfg(target_os = "linux")]
 
 use crate::common;
@@ -27,7 +27,7 @@ fn the_page_of_troubles_has_what_ucom_prints() {
     page.finish();
 }
 
-/// Commands of a user for this chain, with both streams in one, as on a terminal.
+/// Commands that a user runs for this chain; stdout and stderr are merged, as on a terminal.
 trait Desk {
     fn shell(&self, shown: &str) -> Command;
     fn seen(&self, code: Option<i32>, text: &str) -> Printed;
@@ -49,7 +49,7 @@ impl Desk for Sim {
         }
         let address = self.url.split(['/']).next().unwrap().trim_start_matches("socketcand:").to_owned();
         let real = shown.replace("localhost:29536", &address);
-        // The command replaces the shell, so it receives signals directly.
+        // The command replaces the shell, so that it receives signals directly.
         shell
             .args(["-c", &format!("exec 2>&1\nexec {real}")])
             .current_dir(self.dir.path())
@@ -161,7 +161,7 @@ fn firmware(page: &mut Page) {
     });
 }
 
-/// Two threads write to one pipe here: the result may come before or after the last note. The error comes after both.
+/// Two threads write to one pipe here, so the result may come before or after the last note. The error comes after the result and the note.
 fn result_last(mut printed: Printed) -> Printed {
     let result = "not stopped for certain: 1\n";
     if let Some(before) = printed.text.find(&format!("\n{result}")) {
@@ -179,7 +179,7 @@ fn running(page: &mut Page) {
         let mut sim = numbered(&["--boards", "2"]);
         let child = sim.start(run);
         sim.peer().wait("382#");
-        // Time for the start to complete.
+        // The start needs this time to complete.
         std::thread::sleep(Duration::from_millis(1_000));
         sim.fault("power-loss board=1");
         result_last(of_a_moment(sim.all_of(child)))

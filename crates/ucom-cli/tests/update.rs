@@ -1,4 +1,4 @@
-//! `ucom update` against `ucom sim`: outcomes, exit codes, and remaining files.
+//! Tests of `ucom update` with `ucom sim`: outcomes, exit codes, and the files that remain.
 #![cfg(unix)]
 
 use crate::common;
@@ -14,7 +14,8 @@ fn program_id(sim: &Sim, board: &str) -> serde_json::Value {
     sim.json(&["info", board], 0)["boards"][0]["program_id"].clone()
 }
 
-/// U-1 to U-10 with 60 KiB: the board is verified, then up to date. The Program ID is the golden one of 13.3.
+/// U-1 to U-10 with 60 KiB: the first update verifies the board, and the second reports it as up to date. The Program
+/// ID is the golden value of section 13.3.
 #[test]
 fn d46_update_is_verified_and_then_up_to_date() {
     let sim = chain("2");
@@ -35,7 +36,7 @@ fn d46_update_is_verified_and_then_up_to_date() {
     assert_eq!((update["outcome"].as_str(), update["program_id"].as_u64()), (Some("running"), Some(0x4B3F)));
 }
 
-/// D-41: with `--name-target` the header is for this board only, otherwise for any board.
+/// D-41: with `--name-target`, the header is valid only for this board, otherwise for any board.
 #[test]
 fn d41_the_header_names_the_board_if_wanted() {
     let sim = Sim::numbered(&["--boards", "2", "--flash-ids", "0x21,0x42"]);
@@ -45,27 +46,27 @@ fn d41_the_header_names_the_board_if_wanted() {
         let update = sim.spawn(&["update", "2", &file, "--force", option]);
         peer.wait("2C2#4355");
         peer.wait("2C2#");
-        // Words 8 to 11: Program ID, date, target, reserve.
+        // Words 8 to 11 are Program ID, date, target and reserve.
         let third = peer.wait("2C2#");
         ended(update).ends(0);
         assert_eq!(&third[12..16], expected, "{third}");
     }
 }
 
-/// With the exit codes 2 and 4 no board is changed.
+/// If the exit code is 2 or 4, no board was changed.
 #[test]
 fn d46_refusals_change_nothing() {
     let sim = chain("3");
     let file = sim.file("app.bin", &image(2000, 2));
     let before = program_id(&sim, "1");
-    // The board is not the intended one.
+    // Here, the board is not the intended board.
     let update = sim.json(&["update", "1", &file, "--flash-id", "0x77"], 4);
     assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
     assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
     sim.ucom(&["update", "1-2", &file, "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &sim.file("half.hex", b":10000000"), "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &file, "--date", "yesterday"]).ends(2);
-    // For a list, the identity of each board is needed.
+    // To update several boards, the identity of each board is required.
     let output = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
@@ -76,11 +77,11 @@ fn d46_refusals_change_nothing() {
     sim.ucom(&["update", "1", &file]).ends(4);
     ended_by(run, "-INT").ends(0);
     assert_eq!(program_id(&sim, "1"), before);
-    // The board does not exist.
+    // Here, the board does not exist.
     sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
 }
 
-/// Exit code 1 if the board reported an error before the erase, 5 if after it.
+/// The exit code is 1 if the board reports an error before the erase, and 5 if it reports an error after the erase.
 #[test]
 fn d46_errors_before_and_after_the_erase() {
     let mut sim = chain("2");
@@ -96,8 +97,7 @@ fn d46_errors_before_and_after_the_erase() {
     assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
 }
 
-/// An update session for all boards of the inventory: one board fails and the others succeed. The next run updates
-/// only the remaining one.
+/// Updates all boards of the inventory: one board fails and the other boards succeed. The next run updates only the board that failed.
 #[test]
 fn an_update_session_goes_on_and_is_resumed() {
     let mut sim = chain("3");
@@ -106,10 +106,10 @@ fn an_update_session_goes_on_and_is_resumed() {
     sim.ucom(&["update", "1-3", &file]).ends(3);
     let infos = sim.json(&["scan"], 0);
     assert_eq!(infos["boards"].as_array().unwrap().len(), 2);
-    // Board 2 comes back without a number after a power cycle. The update itself or `init` gives it a number again.
+    // After a power cycle, board 2 has no number. The update itself or `init` assigns a number to it again.
     drop(sim);
     let sim = chain("3");
-    // The date is fixed because U-3 also compares dates, and at midnight the two runs would have different dates.
+    // The date is fixed, because U-3 also compares dates, and around midnight the two runs would have different dates.
     let file = file_in(&sim);
     let update = |boards| sim.json(&["update", boards, &file, "--date", "2009-06-01"], 0);
     assert_eq!(update("1,3")["boards"][1]["outcome"], "verified");
@@ -121,15 +121,15 @@ fn file_in(sim: &Sim) -> String {
     sim.file("session.bin", &image(4000, 6))
 }
 
-/// P-12: Ctrl-C in the middle of a block. SETSTATUS(04,00) is sent, the exit code after the erase is 5, and the board
-/// can be used.
+/// P-12: Ctrl-C is pressed in the middle of a block. The command sends SETSTATUS(04,00), the exit code after the
+/// erase is 5, and the board can still be used.
 #[test]
 fn p12_cancel_leaves_the_board_usable() {
     let sim = chain("1");
     let file = sim.file("app.bin", &image(60 * 1024, 7));
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &file]);
-    // This is in the second cycle, because the first cycle has 961 blocks with a READY each.
+    // This point is in the second cycle, because the first cycle has 961 blocks with one READY each.
     peer.wait_for(1200, "181#");
     signal(&update, "-INT");
     peer.wait("1C1#0400");
@@ -149,15 +149,14 @@ fn p13_a_killed_update_is_recovered_by_the_next() {
     let update = sim.spawn(&["update", "1", &file]);
     peer.wait_for(1100, "181#");
     ended_by(update, "-KILL");
-    // Frames that the killed process has passed to its adapter are still sent, for some time on a busy computer.
-    // Until they end, the next command would find another PC on the bus.
+    // Frames that the killed process has passed to its adapter are still sent; on a busy computer this takes
+    // some time. Until these frames end, the next command would detect another PC on the bus.
     while !peer.all(1000).is_empty() {}
     let update = sim.json(&["update", "1", &file], 0);
     assert_eq!(update["outcome"], "verified", "{update}");
 }
 
-/// The board loses power in the second cycle. The board comes up without an application, and `init` and an update
-/// repair it.
+/// The board loses its power in the second cycle. After that it boots without an application, and `init` and an update repair it.
 #[test]
 fn d46_power_loss_in_mid_update() {
     let mut sim = chain("2");
@@ -170,11 +169,11 @@ fn d46_power_loss_in_mid_update() {
     assert!(["verified", "up-to-date"].contains(&update["outcome"].as_str().unwrap()), "{update}");
 }
 
-/// D-46: if the bus fails after the erase, the exit code is 5 and the report is complete, including boards that are
-/// done. Before the erase the code is 3.
+/// D-46: if the bus fails after the erase, the exit code is 5 and the report is complete, including boards whose
+/// update is complete. If the bus fails before the erase, the exit code is 3.
 #[test]
 fn d46_a_bus_that_fails_leaves_the_report() {
-    // Number of READYs of board 2 before the simulator is killed; the first cycle has 961.
+    // Number of READY frames of board 2 before the simulator is killed; the first cycle has 961 of these frames.
     for (blocks, code, outcome) in [(300, 3, "not-started"), (1200, 5, "incomplete")] {
         let sim = chain("2");
         let file = sim.file("app.bin", &image(60 * 1024, 11));
@@ -193,7 +192,7 @@ fn d46_a_bus_that_fails_leaves_the_report() {
     }
 }
 
-/// Like the test above, with text output: outcome, cause and next step.
+/// Like the test above, but with text output: outcome, cause and next step.
 #[test]
 fn d46_a_bus_that_fails_is_told_in_words() {
     let sim = chain("1");
@@ -209,7 +208,7 @@ fn d46_a_bus_that_fails_is_told_in_words() {
     drop(dir);
 }
 
-/// Ctrl-C before the erase: exit code 4, outcome `cancelled`, and the board keeps its program.
+/// Ctrl-C is pressed before the erase: the exit code is 4, the outcome is `cancelled`, and the board keeps its program.
 #[test]
 fn p12_cancelled_before_the_erase() {
     let sim = chain("1");
@@ -255,8 +254,8 @@ fn d46_a_group_is_one_transfer() {
     assert_eq!(program_id(&sim, "3"), before);
 }
 
-/// Two images: each is written to the target of the profile's plan, and the report has both. Wrong combinations are
-/// refused.
+/// With two images, each image is written to the target in the plan of the profile, and the report contains both.
+/// Invalid combinations are refused.
 #[test]
 fn d40_two_images_by_plan() {
     let files = tempfile::tempdir().unwrap();
@@ -295,7 +294,7 @@ fn d40_two_images_by_plan() {
             images[0]["program_id"] == report["program_id"]
                 && images[1]["program_id"] != report["program_id"]
         );
-        // An image is missing, or an option of another plan is given.
+        // Either an image is missing, or an option of another plan is set.
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app]).ends(2);
         assert!(output.err.contains(option) && output.err.contains(plan), "{}", output.err);
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app, "--second", &other]).ends(2);
@@ -305,8 +304,8 @@ fn d40_two_images_by_plan() {
     }
 }
 
-/// U-10 with raw files: the program is written and reported as not verified. If the user gives a Program ID, the
-/// program is verified against it.
+/// U-10 with raw files: the program is written, and the report says that it is not verified. If the user gives a
+/// Program ID, the program is verified against it.
 #[test]
 fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -314,7 +313,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = profile.path().to_str().unwrap();
     let sim = Sim::start(&["--boards", "1", "--profile", profile]);
     sim.ucom(&["--profile", profile, "init"]).ends(0);
-    // A tool chain has written header and data of each cycle into separate files.
+    // In this test, a tool chain has written the header and data of each cycle to separate files.
     let golden = golden();
     let cycle = |cycle, date| {
         let header = ucom::Header {
@@ -345,7 +344,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
         (&false.into(), &serde_json::Value::Null)
     );
     assert!(report["unverifiable"]["hint"].as_str().unwrap().contains("--expect-program-id"), "{report}");
-    // The board's answer does not cover the second file, so it is written each time (D-62).
+    // The answer of the board does not cover the second file, so this file is written each time (D-62).
     let report = with(&["--expect-program-id", "0x4B3F"]).ends(0).json();
     assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"verified".into(), &true.into()));
     let report = with(&["--expect-program-id", "0x4B3F", "--force"]).ends(0).json();
@@ -354,8 +353,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     assert_eq!(report["boards"][0]["error"]["code"], "not-verified", "{report}");
 }
 
-/// `all` includes the boards of the inventory: boards that have lost their numbers are reported as missing, not
-/// skipped.
+/// `all` includes the boards of the inventory: if boards have lost their numbers, they are reported as missing and not skipped.
 #[test]
 fn all_is_the_inventory_too() {
     let sim = chain("4");
@@ -367,7 +365,7 @@ fn all_is_the_inventory_too() {
     assert_eq!(outcomes(&report), ["verified", "not-started", "verified", "not-started"], "{report}");
     assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
     assert!(output.err.contains("has no number"), "{}", output.err);
-    // Commands for the connected boards list the missing ones.
+    // Commands for the connected boards list the missing boards.
     let output = sim.ucom(&["start", "all"]).ends(0);
     assert!(
         output.err.contains("0x42") || output.err.matches("has no number").count() == 2,
@@ -376,7 +374,7 @@ fn all_is_the_inventory_too() {
     );
 }
 
-/// Ctrl-C during the identification: no board was erased, the exit code is 4, the outcome `cancelled`.
+/// Ctrl-C is pressed during the identification: no board was erased, the exit code is 4, and the outcome is `cancelled`.
 #[test]
 fn p12_cancelled_while_it_scans() {
     let sim = chain("2");
@@ -392,8 +390,7 @@ fn p12_cancelled_while_it_scans() {
     assert_eq!(report["boards"].as_array().unwrap().len(), 2, "{report}");
 }
 
-/// If the Program ID of an image is known and differs from the given one, the update is refused before any frame is
-/// sent.
+/// If the Program ID of an image is known and differs from the requested Program ID, the update is refused before any frame is sent.
 #[test]
 fn a_named_program_id_is_compared_with_the_image() {
     let sim = chain("1");

@@ -1,4 +1,4 @@
-//! `ucom update` of boards that already have the program: the record in the inventory decides (D-62, U-3).
+//! Tests of `ucom update` with boards that already have the program: the record in the inventory decides (D-62, U-3).
 #![cfg(unix)]
 
 use crate::common;
@@ -41,8 +41,8 @@ fn d62_data_memory_is_never_taken_as_proven() {
     }
 }
 
-/// D-62: the same bytes at another address are written. Without a record, no frame is sent and no board is
-/// verified.
+/// D-62: if the image has another address, its bytes are written again. Without a record, no frame is
+/// sent and no board counts as verified.
 #[test]
 fn d62_another_address_is_written() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -57,12 +57,12 @@ fn d62_another_address_is_written() {
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
     let text = sim.ucom(&["update", "1", &high]).ends(0).out;
     assert!(text.contains("same Program ID and date"), "{text}");
-    // The boards get new numbers, and each record stays with its board.
+    // The boards get new numbers, and each record remains with its board.
     let kept = std::fs::read_to_string(&path).unwrap();
     assert!(kept.contains("# cabinet 3") && kept.contains("address = 0x200"), "{kept}");
     sim.ucom(&["init"]).ends(0);
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
-    // The record is removed.
+    // Here, the record is removed.
     std::fs::write(&path, &commented).unwrap();
     let mut peer = sim.peer();
     for (more, code) in [(&[][..], 4), (&["--unverified"], 0), (&["--dry-run"], 4)] {
@@ -74,13 +74,13 @@ fn d62_another_address_is_written() {
     let text = sim.ucom(&["update", "1", &high]).ends(4).out;
     assert!(text.contains("--rewrite") && !text.contains("--force"), "{text}");
     assert_eq!(of(&sim.json(&["update", "1", &high, "--rewrite"], 0)), ("verified", true));
-    // The inventory does not exist.
+    // Here, the inventory does not exist.
     let nowhere = sim.path("nowhere.toml");
     let words = ["update", "1", &high, "--inventory", &nowhere];
     assert_eq!(of(&sim.json(&words, 4)), ("program-up-to-date", false));
 }
 
-/// D-62: a killed update leaves no record, not even one of the previous program.
+/// D-62: a killed update leaves no record; the record of the previous program is removed as well.
 #[test]
 fn d62_a_killed_update_leaves_no_record() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -90,7 +90,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert!(kept());
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &sim.file("next.bin", &image(60 * 1024, 2))]);
-    // This READY is for the first block of the first cycle. The erase begins only with the second cycle.
+    // This READY answers the first block of the first cycle. The erase begins only with the second cycle.
     peer.wait("181#");
     ended_by(update, "-KILL");
     assert!(!kept());
@@ -107,7 +107,7 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let shown = sim.json(&["info", "1"], 0)["boards"][0]["program_id"].clone();
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &next]);
-    // The inventory has been read, and the check for another PC has not begun.
+    // At this time the inventory has been read, and the check for another PC has not started.
     peer.wait("201#");
     std::fs::remove_file(sim.path("inventory.toml")).unwrap();
     let output = ended(update).ends(4);

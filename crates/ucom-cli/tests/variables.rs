@@ -1,5 +1,5 @@
-//! Environment variables: no variable moves, resets, numbers or programs a board or overrides a check. Variables in
-//! effect are shown.
+//! Tests of environment variables: a variable never moves, resets, numbers or programs a board, and never overrides
+//! a check. If a variable has an effect, this is shown.
 #![cfg(unix)]
 
 use crate::common;
@@ -7,7 +7,7 @@ use crate::common;
 use cli_kit::testing::{CommandOutput, run};
 use common::{Sim, ucom};
 
-/// Runs `ucom` with one more variable.
+/// Runs `ucom` with one additional variable.
 fn with(sim: &Sim, (name, value): (&str, &str), words: &[&str]) -> CommandOutput {
     let mut command = sim.command();
     command.env(name, value);
@@ -23,12 +23,12 @@ fn only_questions(frames: &[String]) {
     }
 }
 
-/// A variable that is left in a shell from another command changes no board, and one line reports that it is ignored.
+/// If a shell still contains a variable of another command, no board is changed, and one line reports that the variable is ignored.
 #[test]
 fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "1"]).ends(0);
-    // From now on the names are known, so the commands send the same requests.
+    // After this command the names are known, so the following commands send the same requests.
     sim.ucom(&["io", "all"]);
     let file = sim.file("bus.log", b"(1.000000) can0 201#\n(1.010000) can0 000#\n");
     let parameters =
@@ -37,7 +37,7 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let before = (sim.status_byte("1"), sim.status_byte("2"));
     let mut peer = sim.peer();
     for (variable, value, words, code) in [
-        // Earlier this variable, exported for `ucom record`, would have moved the board.
+        // In earlier versions, this variable, which was exported for `ucom record`, would have moved the board.
         ("UCOM_FOR", "2", &["ci", "1", "set_position=1500"][..], 0),
         ("UCOM_FORCE", "1", &["ci", "1", "set_position=1500"], 0),
         ("UCOM_SET", "ASTART", &["status", "2"], 0),
@@ -53,8 +53,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
         let output = with(&sim, (variable, value), words).ends(code);
         let line = format!("{variable}={value} is ignored: `ucom");
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
-        // Excludes heartbeats and the frames of `ci`, which asks whether the control loop runs and writes its input.
-        // Without the loop the board does not move.
+        // This list excludes heartbeats and the frames of `ci`, which checks whether the control loop runs and
+        // writes its input. If the loop does not run, the board does not move.
         let of_ci = |f: &String| {
             f == "601#00000000" || ["680#", "681#", "341#"].iter().any(|start| f.starts_with(start))
         };
@@ -65,8 +65,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     }
 }
 
-/// A variable that limited a command, or set what it sends, is refused, because without it the command would do
-/// something else.
+/// If a variable limited a command in earlier versions, or set what it sends, the command is refused: without
+/// the variable it would do something else.
 #[test]
 fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -95,12 +95,12 @@ fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
         assert!(error["hint"].as_str().unwrap().starts_with("use --"), "{error}");
         assert_eq!(peer.all(50), [""; 0], "{words:?}");
     }
-    // If the user types the option, the variable has no effect. `stop` is never refused.
+    // If the user types the option, the variable has no effect. The command `stop` is never refused.
     with(&sim, ("UCOM_COUNT", "x"), &["monitor", "--count", "1"]).ends(0);
     with(&sim, ("UCOM_CONTROL_ONLY", "1"), &["stop", "all"]).ends(0);
 }
 
-/// Eight words, in any letter case, mean on or off. Any other value enables nothing.
+/// Eight words, in any letter case, mean on or off. Any other value does not enable anything.
 #[test]
 fn on_off_variables_take_eight_words_and_nothing_else() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -131,7 +131,7 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// A variable in effect is shown in one line of stderr if the option is not typed and the command uses it.
+/// If a command uses a variable because the user did not type the option, one line of stderr shows the variable.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -145,7 +145,7 @@ fn a_variable_in_effect_is_shown() {
     let programs = sim.ucom(&["--json", "scan"]).ends(0);
     assert!(programs.json()["boards"].is_array());
     assert_eq!(programs.events()[0]["text"], shown.trim_end(), "{}", programs.err);
-    // A value of a variable cannot control the terminal.
+    // The value of a variable cannot send control codes to the terminal.
     let odd = with(&sim, ("UCOM_EDGES", "a\u{1b}[2J\n.toml"), &["io", "1"]).err;
     assert!(odd.lines().next().unwrap().contains(r"UCOM_EDGES=a\u{1b}[2J\n.toml"), "{odd}");
 }

@@ -1,5 +1,5 @@
-//! Descriptions of frames in words. The decoder keeps track of answers of several frames, to distinguish packages of strings from first
-//! frames.
+//! Descriptions of frames as text. The decoder tracks answers that consist of several frames, so that it can distinguish packages of
+//! strings from first frames.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +11,9 @@ use ucom::{
 
 /// Description of a frame.
 pub struct Described {
-    /// Function, or the reason why the frame is foreign.
+    /// Function of the frame, or the reason why the frame is foreign.
     pub name: String,
-    /// Sender: `PC`, `board 3`, or both if the identifier does not show it.
+    /// Sender: `PC`, `board 3`, or both if the identifier does not show the sender.
     pub who: String,
     /// Contents as text.
     pub text: String,
@@ -21,13 +21,13 @@ pub struct Described {
     pub value: Value,
 }
 
-/// Decoder of the frames on a bus, in their order.
+/// Decoder for the frames on a bus, which must be passed in their order.
 pub struct Decoder {
     profile: Profile,
     answers: BTreeMap<(Function, Sequence), Answer>,
 }
 
-/// The received part of an answer of several frames.
+/// Received part of an answer that consists of several frames.
 struct Answer {
     strings: Box<StringAssembler>,
     /// Number of strings that are still missing; `None` before the first frame.
@@ -54,7 +54,7 @@ impl Decoder {
         let from_pc = match function.sender() {
             Sender::Pc => Some(true),
             Sender::Board => Some(false),
-            // A frame of this function with data is always the answer of a board (D-12). Only the PC sends broadcasts (D-05).
+            // If a frame of this function has data, it is always the answer of a board (D-12). Broadcasts are sent only by the PC (D-05).
             Sender::Both if function == Function::DumpIo => Some(frame.dlc() == 0),
             Sender::Both if Some(sequence) == self.profile.broadcast_number() => Some(true),
             Sender::Both => None,
@@ -227,7 +227,8 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
-/// Returns a flash date as text such as `2026-05-04`. If the number is not a date in the profile's form, returns the number.
+/// Returns a flash date as text, such as `2026-05-04`. If the number is not a date in the format of the profile,
+/// returns the number as text.
 pub fn date_text(profile: &Profile, date: u16) -> String {
     match profile.prog_date.decode(date) {
         Some((year, month, day)) => format!("{year:04}-{month:02}-{day:02}"),

@@ -1,21 +1,22 @@
-//! Explanations of the words that the tools display: meaning and next step of status bits, states, heartbeats, events, outcomes and errors.
+//! Explanations of the words that the tools display: the meaning and next step of status bits, states, heartbeats,
+//! events, outcomes and errors.
 
 use ucom::ErrorCode;
 
 /// A displayed word.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Family of the word.
+    /// Group to which the word belongs.
     pub family: &'static str,
-    /// Displayed forms. The first one is the name.
+    /// Displayed forms. The first form is the name of the word.
     pub shown: Vec<String>,
     /// Meaning.
     pub meaning: String,
-    /// Next command or action.
+    /// Next command or action that helps the user.
     pub next: String,
 }
 
-/// Family, displayed forms, meaning, next step.
+/// Group, displayed forms, meaning, next step.
 type Fixed = (&'static str, &'static [&'static str], &'static str, &'static str);
 
 const BIT: &str = "status bit";
@@ -24,7 +25,7 @@ const HEARTBEAT: &str = "heartbeat of a board";
 const EVENT: &str = "event of ucom run";
 const OUTCOME: &str = "outcome of ucom update";
 
-/// The status bits come first, beginning with bit 7.
+/// Words of the tools; the status bits come first, beginning with bit 7.
 const WORDS: [Fixed; 38] = [
     (BIT, &["MSTART", "M"], "The exloader has started the application.", "ucom stop N ends the application"),
     (
@@ -209,8 +210,8 @@ pub fn words() -> Vec<Word> {
     fixed.chain(errors).collect()
 }
 
-/// Returns the words that match exactly. Otherwise returns the words that match without regard to letter case and punctuation. If this also
-/// finds nothing and the query has at least 3 letters, returns the words that contain the query.
+/// Returns the words that match exactly. If no word matches exactly, returns the words that match without regard to letter case and
+/// punctuation. If no word matches in this way and the query has at least 3 letters, returns the words that contain the query.
 pub fn find<'a>(all: &'a [Word], query: &str) -> Vec<&'a Word> {
     let any = |fits: &dyn Fn(&str) -> bool| -> Vec<&'a Word> {
         all.iter().filter(|word| word.shown.iter().any(|shown| fits(shown))).collect()
@@ -240,7 +241,7 @@ mod tests {
         assert!(find(all, word).iter().any(|w| w.family == family), "{word}");
     }
 
-    /// The displayed status bits, states, heartbeats and errors are all explained.
+    /// All displayed status bits, states, heartbeats and errors have an explanation.
     #[test]
     fn every_word_on_a_screen_is_explained() {
         let all = words();

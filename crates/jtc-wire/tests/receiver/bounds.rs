@@ -66,7 +66,7 @@ fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
     assert_ne!(place(&receiver), before);
 }
 
-/// One call of `poll` skips at most 2,048 bytes, so it does not delay a tick (J-07).
+/// A call of `poll` skips at most 2,048 bytes, so the call does not delay a tick (J-07).
 #[test]
 fn j07_noise_is_passed_over_in_bounded_steps() {
     let mut receiver = receiver();

@@ -90,7 +90,7 @@ fn j03_a_slow_reader_is_no_gap() {
     assert_eq!(received.bytes, frame);
 }
 
-/// The test sends 15,000 false headers, each of which announces tens of thousands of bytes. The parser needs a bounded
+/// The test sends 15,000 false headers, and each header announces tens of thousands of bytes. The parser needs a bounded
 /// number of bounded steps.
 #[test]
 fn j07_hostile_bytes_cost_little() {

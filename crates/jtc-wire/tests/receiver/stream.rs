@@ -251,8 +251,8 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
 }
 
-/// A line becomes plain 2 s after an extension request. The time of its first byte counts as the time of a frame,
-/// whatever the length of the frame is.
+/// A line becomes plain 2 s after an extension request. The time of its first byte counts as the time of
+/// a frame of any length.
 #[test]
 fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame() {
     // Returns a flag for each complete frame: true if the line was plain.

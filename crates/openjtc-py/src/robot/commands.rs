@@ -29,7 +29,7 @@ pub(super) fn stopped(what: &str) -> Failure {
 }
 
 impl WorkerState {
-    /// Stops the arm and waits for standstill. It is not an error if the arm is already at rest. Also ends Teaching, even if
+    /// Stops the arm and waits for standstill. If the arm is already at rest, this is not an error. Also ends Teaching, even if
     /// another program has enabled it, because the caller expects that the controller holds the arm.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
@@ -78,7 +78,7 @@ impl WorkerState {
         let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
         let due = [self.shared.moves(), self.teaching];
         for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
-            // An error is ignored, because there is no caller to report it to.
+            // An error is ignored, because a caller no longer exists.
             let _ = port.write_all(frame);
         }
     }
@@ -106,7 +106,7 @@ impl WorkerState {
         self.session.settle_for_jog_until(|| asked.is_halted())?;
         let end = self.session.now() + time;
         let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // After the end of the jog, for whatever reason, the arm is stopped at once, without waiting for the jog timeout of the controller.
+        // When the jog ends for any reason, the arm is stopped at once, without waiting for the jog timeout of the controller.
         let rested = self.session.jog_to_rest();
         if let Ok(Some(_)) = rested {
             self.shared.set_moves(false);

@@ -16,7 +16,7 @@ use super::worker::lock;
 
 /// Maximum duration of a read before it checks for a requested Stop.
 const LOOK: Duration = Duration::from_millis(10);
-/// Maximum time between two pieces of a frame. After a longer pause, the missing bytes of the frame are no longer expected.
+/// Maximum time between two pieces of a frame. After a longer pause, the port does not expect the missing bytes of the frame any more.
 const PIECE: Duration = Duration::from_millis(50);
 /// Maximum time until the response record of a Stop arrives. Only the status that is being sent can delay the record.
 const RECORD: Duration = Duration::from_millis(200);

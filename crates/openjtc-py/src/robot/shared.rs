@@ -122,7 +122,7 @@ impl Shared {
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Passes a request to the current run. If there is no run, the result channel is dropped.
+    /// Passes a request to the current run. Without a run, the result channel is dropped.
     pub(crate) fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {

@@ -309,7 +309,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // The motion is stopped, because there is no caller that supervises it. The thread ends after the motion.
+        // The motion is stopped, because a caller no longer supervises it. The thread ends after the motion.
         self.halt();
         self.shared.end();
         if !self.is_foreign() {
@@ -371,6 +371,6 @@ fn serve(state: &mut WorkerState) {
         }
     }
     shared.queue.close();
-    // An error is ignored, because there is no caller to report it to.
+    // An error is ignored, because a caller no longer exists.
     let _ = state.rest();
 }

@@ -20,7 +20,7 @@ use super::shared::{Asked, Shared};
 use super::tape::Tape;
 use crate::error::Failure;
 
-/// Maximum wait for a status while there is no job.
+/// Maximum wait for a status between jobs.
 const IDLE: Duration = Duration::from_millis(10);
 /// Maximum delay that a simulator catches up. After a larger delay, the simulator skips the missed time.
 const BEHIND: Duration = Duration::from_millis(100);
@@ -137,7 +137,7 @@ impl WorkerState {
         self.time_passes
     }
 
-    /// Reads statuses while there is no job. If the line is lost, the next job reports this.
+    /// Reads statuses between jobs. If the line is lost, the next job reports this.
     pub(crate) fn idle(&mut self) {
         match self.session.poll(IDLE) {
             Ok(_) => {}
@@ -234,7 +234,7 @@ fn agent(url: &str, target: &Target) -> Result<Box<dyn Port>, Failure> {
     Ok(Box::new(AgentPort::open(url, &options)?))
 }
 
-/// Reads the token of the operator from the token file of the local agent. If there is no token, the agent itself reports the refusal.
+/// Reads the token of the operator from the token file of the local agent. Without a token, the agent itself reports the refusal.
 fn operator(file: &std::path::Path) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Tokens {

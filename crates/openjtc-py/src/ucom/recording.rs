@@ -148,7 +148,7 @@ impl ChainRecording {
 
 impl Drop for ChainRecording {
     fn drop(&mut self) {
-        // An error is ignored, because there is no caller to report it to.
+        // An error is ignored, because a caller no longer exists.
         let _ = self.finish();
     }
 }

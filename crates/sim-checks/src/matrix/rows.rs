@@ -74,9 +74,9 @@ pub(super) struct Row {
     pub act: Act,
     /// Silence of the host after which the controller reacts, in ms (J-59); 0 disables the reaction.
     pub host_timeout_ms: u16,
-    /// Reason why there is no reaction while the arm is held or moves.
+    /// Reason for the missing reaction while the arm is held or moves.
     held: Option<&'static str>,
-    /// Reason why there is no reaction in Init and Error.
+    /// Reason for the missing reaction in Init and Error.
     parked: Option<&'static str>,
 }
 

@@ -52,8 +52,8 @@ fn numbers_masked(word: &str) -> String {
 }
 
 /// Returns the length, in bytes, of the number at the start of the text. A number is decimal, optionally with an
-/// exponent, or hexadecimal. Hexadecimal numbers begin with `0x`, or have eight digits of which at least one is
-/// a letter.
+/// exponent, or hexadecimal. Hexadecimal numbers begin with `0x`, or have eight digits
+/// and contain a letter.
 fn number_length(text: &str) -> usize {
     let while_of = |text: &str, of: fn(char) -> bool| text.find(|c| !of(c)).unwrap_or(text.len());
     if let Some(digits) = text.strip_prefix("0x") {

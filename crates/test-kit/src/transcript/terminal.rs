@@ -93,7 +93,7 @@ impl Terminal {
         self.lines.recv_timeout(within).ok()
     }
 
-    /// Returns the lines up to and including the first line for which `last` returns `true`; all lines if there is no such line.
+    /// Returns the lines up to and including the first line for which `last` returns `true`; all lines if such a line does not exist.
     pub(super) fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
         let (mut patience, mut printed) = (Patience::begin(), Vec::new());
         while let Some(line) = patience.receive(&self.lines) {

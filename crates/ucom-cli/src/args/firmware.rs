@@ -1,4 +1,4 @@
-//! The options of `ucom update` and `ucom repair`.
+//! Options of `ucom update` and `ucom repair`.
 
 use std::path::PathBuf;
 
@@ -123,7 +123,7 @@ pub(crate) struct RepairArgs {
     pub force: ForceArgs,
 }
 
-/// A Program ID, decimal or with 0x.
+/// Program ID, decimal or hexadecimal with 0x.
 fn program_id(text: &str) -> Result<u16, String> {
     flash_id(text).map_err(|_| format!("\"{text}\" is no Program ID, as 0x4B3F"))
 }

@@ -1,4 +1,4 @@
-//! The options of each command.
+//! Options of each command.
 
 use std::path::PathBuf;
 use std::time::Duration;

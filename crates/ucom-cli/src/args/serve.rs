@@ -1,4 +1,4 @@
-//! `ucom serve`: the agent.
+//! Options of `ucom serve`, the agent.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -69,7 +69,7 @@ pub(crate) struct ServeArgs {
     pub cache: CacheArgs,
 }
 
-/// Room for the log of commands: some thousand lines at least.
+/// Parses the maximum size of the command log; the minimum of 1 MB is enough for some thousand lines.
 fn log_size(text: &str) -> Result<u64, String> {
     size(text, 1_000_000)
 }

@@ -1,12 +1,13 @@
-//! The environment variables of `ucom`.
+//! Environment variables of `ucom`.
 
 use cli_kit::variables::{Retired, Variables};
 
-/// Variables in effect, and variables of earlier versions.
+/// Variables that have an effect, and variables of earlier versions.
 pub(crate) const VARIABLES: Variables = Variables {
     json: "UCOM_JSON",
     retired: &[
-        // These variables made a command reset, number, program, start, move, override a check or overwrite a file.
+        // In earlier versions, these variables made a command reset, number, program, start or move boards, override a
+        // check, or overwrite a file.
         Retired::less("UCOM_FORCE", "", "force"),
         Retired::less("UCOM_FORCE", "", "overwrite"),
         Retired::less("UCOM_ACTIVE", "run", "active"),
@@ -32,7 +33,8 @@ pub(crate) const VARIABLES: Variables = Variables {
         Retired::less("UCOM_SET", "status", "set"),
         Retired::less("UCOM_START", "update", "start"),
         Retired::less("UCOM_UNVERIFIED", "update", "unverified"),
-        // These variables limited a command, or set the data that it sends. Without them the command would do something else.
+        // In earlier versions, these variables limited a command, or set the data that the command sent. Without the
+        // variable, the command would do something else.
         Retired::other("UCOM_ADDRESSES", "update", "addresses"),
         Retired::other("UCOM_CI", "run", "ci"),
         Retired::other("UCOM_COUNT", "", "count"),
@@ -61,7 +63,7 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// No new option gets a variable that acts: each variable is in this list, with the reason why it may exist.
+    /// A new option must not get a variable that acts: this list contains every variable and the reason why it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{Caution, File, Format, Limit, Output, Place, Simulator};
@@ -98,7 +100,7 @@ mod tests {
             ("UCOM_TLS_CERT", File),
             ("UCOM_TLS_KEY", File),
         ];
-        // Files that are programmed, that make a question a command, or that have the inputs of a board.
+        // These options select files that are programmed, that turn a query into a command, or that contain the inputs of a board.
         let without = [
             "update --exloader",
             "update --data",

@@ -26,7 +26,7 @@ pub(super) fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(
     Ok(())
 }
 
-/// Shows status bits, after setting and clearing some of them.
+/// Sets and clears status bits if this is requested, then shows the status bits.
 pub(super) fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let (set, clear) = (args.set.unwrap_or_default(), args.clear.unwrap_or_default());
     let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
@@ -54,8 +54,8 @@ pub(super) fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result
     Ok(())
 }
 
-/// Sends one PC_SETSTATUS with these two bytes to each board, or one to all boards. Shows the actual result next to
-/// the result that the rules require.
+/// Sends one PC_SETSTATUS with these two bytes to each board, or a single broadcast to all boards. Shows the actual
+/// result and the result that the rules require.
 fn raw_status(
     args: &StatusArgs,
     (mask, value): (u8, u8),
@@ -123,7 +123,7 @@ fn lines_of(all: &[Numbered]) -> String {
     all.iter().map(line).collect()
 }
 
-/// Sends PC_RESET, to all boards at once or one by one.
+/// Sends PC_RESET, either to all boards at once or to one board after the other.
 pub(super) fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let force = args.force.force;
@@ -152,12 +152,12 @@ pub(super) fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(
     Ok(())
 }
 
-/// Sends PC_XRESET. Afterwards the board is in the exloader with programming enabled.
+/// Sends PC_XRESET. Afterwards, the board runs the exloader and programming is enabled.
 pub(super) fn xreset(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::XReset { board, force })
 }
 
-/// Sends PC_START: starts the application.
+/// Sends PC_START, which starts the application.
 pub(super) fn start(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::Start { board, force })
 }
@@ -176,14 +176,13 @@ fn act(
     Ok(())
 }
 
-/// Stops outputs, control and application, as requested. Stopping is always allowed: no other PC can prevent it.
+/// Stops the outputs, the control loop and the application, as requested. A stop is always allowed; another PC cannot prevent it.
 pub(super) fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
     let Stopped { boards: all, failed } = driver.stop_each(&args.boards, level)?;
-    // The shared numbers are only reported, and only now, because both boards with such a number received the stop
-    // command.
+    // Shared numbers are only reported, and only at this point, because both boards with such a number have received the stop command.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
         driver.note(format!("{error}; both boards received the Stop\n  {}", error.hint()));

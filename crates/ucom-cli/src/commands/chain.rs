@@ -9,7 +9,7 @@ use ucom_host::session::{SessionError, nothing_shared};
 use crate::args::{InitArgs, LinkArgs};
 use crate::shape::{board_table, board_value};
 
-/// Lists the connected boards; changes no board.
+/// Lists the connected boards without changing them.
 pub(super) fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
@@ -43,12 +43,12 @@ pub(super) fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         if unnumbered > 0 {
             text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
         }
-        // The error at the end of the command reports these findings, so they are not noted here.
+        // The error at the end of the command reports these findings, so they are omitted here.
         let reported = |f: &&ScanFinding| is_unnumbered(f) || f.error().is_some();
         text + &lines(&report.findings.iter().filter(|f| !reported(f)).collect::<Vec<_>>())
     });
     match shared {
-        // stdout already contains the result.
+        // The result on stdout already contains this failure.
         Some(failure) => {
             out.note(format!("{}\n  {}", failure.message, failure.next));
             Err(Failure::shown(failure.kind))
@@ -77,7 +77,7 @@ fn lines(findings: &[impl ToString]) -> String {
     texts(findings).iter().map(|text| format!("! {text}\n")).collect()
 }
 
-/// Resets and numbers the whole chain; writes an inventory.
+/// Resets and numbers the whole chain, and writes an inventory.
 pub(super) fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let known = match args.inventory.exists() {
         true => Some(Inventory::read(&args.inventory).map_err(Failure::usage)?),

@@ -1,4 +1,4 @@
-//! `ucom conformance`: runs the acceptance tests for boards on the connected boards.
+//! `ucom conformance`: runs the acceptance tests on the connected boards.
 
 use std::path::Path;
 
@@ -17,11 +17,11 @@ use crate::args::{Boards, ConformanceArgs, LinkArgs};
 
 /// Returns 2026-01-01, a fixed date for test programs that differs from the dates of the boards.
 fn date(profile: &Profile) -> u16 {
-    // If the profile's date is a plain number, any number is valid.
+    // If the profile treats the date as a plain number, any number is valid.
     profile.prog_date.encode(2026, 1, 1).unwrap_or(0x5C21)
 }
 
-/// Runs the allowed tests and shows their results.
+/// Runs the tests that the options allow, and shows their results.
 pub(crate) fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(wrong) = args.only.iter().find(|o| !test_names().any(|id| id.eq_ignore_ascii_case(o))) {
         let all: Vec<&str> = test_names().collect();
@@ -63,7 +63,7 @@ pub(crate) fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output)
     }
 }
 
-/// Returns the image for one board, after the check that it is the intended board.
+/// Checks that the board is the intended board, and returns the image for it.
 fn program(
     args: &ConformanceArgs,
     path: &Path,

@@ -1,4 +1,4 @@
-//! `ucom doctor` and `ucom probe`: faults of the bus, and the profile of the boards.
+//! `ucom doctor` and `ucom probe`: diagnosis of the bus, and measurement of the profile of the boards.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};
 use crate::shape::board_value;
 
-/// Listening time before the first request.
+/// Time for which the command listens before its first request.
 const LISTEN: Duration = Duration::from_millis(1500);
 
 /// Checks everything. The exit code is 0 without a problem, 3 without any frame, and 1 otherwise.
@@ -58,8 +58,7 @@ pub(super) fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(
         other => return Err(SessionError::from(other).into()),
     };
     if report.boards.is_empty() && report.reports == 0 {
-        // Without measurements the file would contain only defaults, which would look like the profile of these
-        // boards.
+        // Without measurements, the file would contain only default values, which would look like the profile of these boards.
         let what = "no board answers: nothing was measured, and no profile was written";
         return Err(
             Failure::new(ErrorKind::NoLink, "no-boards", what).next("find the cause with ucom doctor")

@@ -1,4 +1,4 @@
-//! `ucom io`, `ci`, `dbc`: inputs, outputs and parameters by name.
+//! `ucom io`, `ucom ci` and `ucom dbc`: inputs, outputs and parameters by name.
 
 use std::time::{Duration, Instant};
 
@@ -16,13 +16,13 @@ use ucom_host::session::{
 use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 
-/// Shows all names and the meaning of their words. If the application runs, also shows the initial inputs.
+/// Shows all signal names and the meaning of their words. If the application runs, also shows the initial inputs.
 pub(super) fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     note_force(args.force, out);
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
     let file =
         args.template.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
-    // An existing file is a table that a user has filled in.
+    // An existing file is probably a signal table that a user has edited.
     let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
         true => Failure::nothing_sent(e).next(
             "--template - prints the table, so that you can add it by hand; --overwrite writes over it",
@@ -34,12 +34,12 @@ pub(super) fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
     let numbers = driver.numbers(&args.boards)?;
     for known in cache.all(&mut driver, &signals, &numbers, |_| false)? {
         let board = known.board;
-        // Only a started application can answer this.
+        // Only a started application can report its initial inputs.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
             Some(_) => None,
         };
-        // A board that has sent its inputs has also sent its names.
+        // If a board has sent its inputs, it has also sent its signal names.
         let known = match driver.master.description(board) {
             Some(names) if initial.is_some() => known.renamed(names, &signals, driver.master.profile()),
             _ => known,
@@ -87,7 +87,7 @@ fn io_value((known, initial): &Described) -> Value {
     })
 }
 
-/// Returns the known meaning of a signal's words; null if the signal is not in a table.
+/// Returns the known meaning of the words of a signal; null if the signal is not in a table.
 fn signal_value(signal: &Signal) -> Value {
     if !signal.known {
         return Value::Null;
@@ -140,7 +140,7 @@ fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
     }
 }
 
-/// Shows the initial inputs, or sets some inputs. With `--for` the board moves under supervision.
+/// Shows the initial inputs, or sets some inputs. With `--for`, the board moves under supervision.
 pub(super) fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
     let mut driver = link.session()?;
@@ -199,7 +199,7 @@ fn move_for(
         let plan = RunBoard { board, ci, par: Vec::new() };
         let options = RunOptions { boards: vec![plan], active: true, force };
         driver.master.watch(board, None, true);
-        // After a failure the run has already undone its own changes.
+        // If the run fails, it has already undone its own changes.
         driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
         Ok(prepared)
     })?;
@@ -222,7 +222,7 @@ fn move_for(
         }
     }
     followed.ask_no_more(&mut driver.master);
-    // This is not a procedure, because Ctrl-C would cancel a procedure, and here Ctrl-C requests the stop.
+    // This is not a procedure, because Ctrl-C cancels a procedure. Here, Ctrl-C requests the stop.
     driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();
@@ -253,7 +253,7 @@ fn print_words(key: &str, known: &Known, kind: Kind, words: &[u16], out: &Output
     });
 }
 
-/// Writes a DBC file with the boards' names.
+/// Writes a DBC file with the signal names of the boards.
 pub(super) fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     note_force(args.force, out);
     let file = args.out.as_deref().map(|file| open_output(file, args.overwrite.overwrite)).transpose()?;
@@ -284,7 +284,7 @@ pub(super) fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     Ok(())
 }
 
-/// Notes that `--force` skips no check in this command, because older scripts use it to overwrite a file.
+/// Prints a note that `--force` skips no check in this command. Older scripts use this option to overwrite a file.
 fn note_force(force: bool, out: &Output) {
     if force {
         out.note(
@@ -293,8 +293,7 @@ fn note_force(force: bool, out: &Output) {
     }
 }
 
-/// Encodes text as Windows-1252, which readers of DBC files expect. Letters of units like ° and µ have the same codes
-/// as in Latin-1.
+/// Encodes text as Windows-1252, which readers of DBC files expect. Letters in units, such as ° and µ, have the codes of Latin-1.
 fn windows(text: &str) -> Vec<u8> {
     let byte = |c: char| u8::try_from(u32::from(c)).ok().filter(|b| !(0x80..0xA0).contains(b));
     text.chars().map(|c| byte(c).unwrap_or(b'?')).collect()

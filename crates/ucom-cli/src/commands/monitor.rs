@@ -1,5 +1,5 @@
-//! `ucom monitor`: live view of boards, bus load and foreign frames. A terminal shows a full view; other outputs get
-//! one object per second.
+//! `ucom monitor`: live view of boards, bus load and foreign frames. On a terminal, the command shows a full view;
+//! other outputs receive one object per second.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ use crate::args::{LinkArgs, MonitorArgs};
 use crate::session::shared_numbers;
 use crate::shape::{bits, info_value};
 
-/// Shows the bus until the user presses `q` or Ctrl-C, or the requested number of views has been shown.
+/// Shows the bus until the user presses `q` or Ctrl-C, or until the requested number of views was shown.
 pub(super) fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let mut watch = Watch::new(link.url()?.to_owned(), args.listen_only, driver.master.profile());
@@ -29,7 +29,7 @@ pub(super) fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Resu
 
 fn lines(driver: &mut Driver, watch: &mut Watch, mut left: u64, out: &Output) -> Result<(), Failure> {
     let mut shown = Instant::now();
-    // The first view waits for the scan.
+    // The first view is shown after the scan.
     let first = Instant::now();
     let stdout = Lines::stdout()?;
     while left > 0 && !driver.stop_asked() && !stdout.gone() {
@@ -97,7 +97,7 @@ fn text(driver: &Driver) -> String {
     text
 }
 
-/// Shortest time between two views.
+/// Minimum time between two views.
 const PICTURE: Duration = Duration::from_millis(100);
 
 fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64, mut screen: Screen) -> Result<(), Failure> {

@@ -1,5 +1,5 @@
-//! View of `ucom monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first, rows
-//! that do not fit can be scrolled, and the keys are always visible.
+//! View of `ucom monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command are at the top,
+//! rows that do not fit can be scrolled, and the keys are always visible.
 
 use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small, wrapped};
 use ratatui::Frame;
@@ -11,14 +11,14 @@ use ucom_host::session::{Picture, Problems, Watch};
 
 use super::monitor_boards::{self as rows, WIDE};
 
-/// Keys. A terminal that is too small shows only the first one.
+/// Keys. If the terminal is too small, only the first key is shown.
 const KEYS: &str = "s stops  q ends";
-/// Smallest number of board rows including their head, for any number of errors.
+/// Minimum number of board rows, including their head, for any number of errors.
 const LEAST_ROWS: u16 = 4;
-/// Number of rows above which the last event has its own row.
+/// Number of rows above which the last event gets its own row.
 const EVENT: u16 = 16;
 
-/// Draws the view; sets the visible rows in `scroll`.
+/// Draws the view, and sets the visible rows in `scroll`.
 pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     if too_small(frame, KEYS) {
         return;
@@ -64,7 +64,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Sc
     let [causes, table] =
         Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(place);
     frame.render_widget(Paragraph::new(above), causes);
-    // The head is drawn only if at least one row fits below it.
+    // The head of the table is drawn only if there is space for at least one row below it.
     if boards > 0 && table.height > 1 {
         frame.render_widget(rows::table(picture.boards, picture.statistics, picture.now, inner, skip), table);
     }
@@ -73,13 +73,13 @@ pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Sc
     frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
 }
 
-/// Returns the errors, the effect of a key, and the next command.
+/// Returns the errors, the effect of a key press, and the next command.
 fn trouble(picture: &Picture<'_>) -> Trouble {
     let Problems { causes, warnings, next } = picture.problems();
     Trouble { causes, warnings, next, message: picture.watch.message.clone() }
 }
 
-/// Returns the bus in one line, with the name of the bus if the complete name fits.
+/// Returns the state of the bus in one line; the line contains the bus name if the complete name fits.
 fn facts(picture: &Picture<'_>, boards: u16, width: u16) -> Line<'static> {
     let load = picture.statistics.load_percent(picture.now);
     let foreign = picture.statistics.foreign_count();
@@ -125,7 +125,7 @@ fn load(picture: &Picture<'_>, room: usize) -> Sparkline<'static> {
         .block(panel(&format!("bus load {percent:.1} %")))
 }
 
-/// Draws the newest events, the last one at the bottom. A long event continues on the next line.
+/// Draws the newest events; the last event is at the bottom. A long event continues on the next line.
 fn events(frame: &mut Frame<'_>, watch: &Watch, area: Rect, framed: bool) {
     let (width, height) = if framed {
         (area.width.saturating_sub(4), area.height.saturating_sub(2))

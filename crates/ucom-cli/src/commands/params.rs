@@ -1,4 +1,4 @@
-//! `ucom par`: parameters by name, and parameter files.
+//! `ucom par`: reads and writes parameters by name, and handles parameter files.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use ucom_host::session::{
 
 use crate::args::{Boards, LinkArgs, ParArgs};
 
-/// Shows parameters, writes some, saves or applies a file.
+/// Shows parameters, writes some parameters, or saves or applies a parameter file.
 pub(super) fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(file) = &args.apply {
         return apply(args, file, link, out);
@@ -46,12 +46,12 @@ pub(super) fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     Ok(())
 }
 
-/// Opens the output file before any frame is sent; an existing file is overwritten only on request.
+/// Opens the output file before any frame is sent. An existing file is overwritten only if the user requests it.
 pub(super) fn open_output(file: &Path, overwrite: bool) -> Result<OutputFile, Failure> {
     OutputFile::open(file, overwrite, &[]).map_err(Failure::nothing_sent)
 }
 
-/// Opens an output file; `-` is stdout, and returns `None`.
+/// Opens an output file; returns `None` for `-`, which means stdout.
 pub(super) fn file_or_stdout(file: &Path, overwrite: bool) -> Result<Option<OutputFile>, OutputError> {
     match file.as_os_str() == "-" {
         true => Ok(None),
@@ -96,7 +96,7 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
     });
 }
 
-/// Returns for each parameter its index, its name, and the value that this process wrote.
+/// Returns the index, the name and the value last written by this process of each parameter.
 fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, &'a String, Option<u16>)> {
     let assumed = driver.master.parameters(p.known.board);
     p.known.names.par.iter().enumerate().map(move |(i, name)| match assumed.get(i) {
@@ -105,7 +105,7 @@ fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, 
     })
 }
 
-/// Writes a parameter file: the last written values, and all other names as comments.
+/// Writes a parameter file: the values that were written last, and the other names as comments.
 fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Output) -> Result<(), Failure> {
     let names = inventory(&args.inventory).map_err(Failure::usage)?;
     let board = |p: &Parameters| {
@@ -141,7 +141,7 @@ fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Outp
     })
 }
 
-/// Writes a requested text to a file, or to stdout for `-`.
+/// Writes the requested text to a file, or to stdout for `-`.
 pub(super) fn deliver(
     file: Option<OutputFile>,
     text: &str,
@@ -154,7 +154,7 @@ pub(super) fn deliver(
         out.result(&result, || text.into());
         return Ok(());
     };
-    // Written atomically, because the old content is the work of a user.
+    // The file is written atomically, because a user may have edited the old content.
     ucom_host::files::write_text(file.path(), text).map_err(Failure::usage)?;
     let name = file.name();
     file.is_written();
@@ -163,7 +163,7 @@ pub(super) fn deliver(
     Ok(())
 }
 
-/// Checks the whole file, and then writes its parameters.
+/// Checks the complete file, and then writes its parameters to the boards.
 fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
     let meant = |n: u8| match &args.boards {
@@ -179,7 +179,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     let mut driver = link.session()?;
     file.identities(&mut driver)?;
-    // Boards that are written to must run. For a check, the cache is enough.
+    // Writing requires a running application. For a check, the cache is sufficient.
     let cache = args.cache.cache();
     let known = cache.all(&mut driver, &signals, &file.numbers(), |_| !args.dry_run)?;
     let checked = file.words(|number| known.iter().find(|k| k.board == number))?;

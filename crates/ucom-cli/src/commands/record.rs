@@ -14,7 +14,7 @@ use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::interrupt::listen;
 use crate::session::shared_numbers;
 
-/// Period of writes to the file. A recorder that is killed loses at most the frames of this time.
+/// Interval at which frames are written to the file. If the recorder is killed, at most the frames of this interval are lost.
 const FLUSH: Duration = Duration::from_secs(1);
 
 fn failed(e: RecordingError) -> Failure {
@@ -30,22 +30,22 @@ pub(super) fn report_broken_off(recording: &Recording, file: &Path, out: &Output
     }
 }
 
-/// After this time without a frame, the command reports that the bus is silent.
+/// Time without a frame after which the command reports that the bus is silent.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// Reports once that a bus has sent no frames yet, and what to check. Only users get this note.
+/// Reports once that the bus has sent no frames yet, and what the user can check. This note is only for users.
 pub(super) struct Silence {
     since: Instant,
     over: bool,
 }
 
 impl Silence {
-    /// Starts to listen. Programs get no note, because they detect silence themselves.
+    /// Starts the observation. Programs do not get the note, because they detect silence themselves.
     pub(super) fn begins(out: &Output) -> Self {
         Self { since: Instant::now(), over: out.is_json() }
     }
 
-    /// Checks for silence; called at each poll of the bus. `came` is `true` if a frame has arrived.
+    /// Checks for silence. The command calls this function at each poll of the bus. `came` is `true` if a frame has arrived.
     pub(super) fn look(&mut self, came: bool, out: &Output) {
         if !came && self.since.elapsed() < SILENCE {
             return;
@@ -59,7 +59,7 @@ impl Silence {
     }
 }
 
-/// Records until Ctrl-C, for the requested time, or the requested number of frames.
+/// Records until Ctrl-C, for the requested time, or until the requested number of frames.
 pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = listen(&CleanupList::default())?;
     let profile = link.profile()?;
@@ -89,11 +89,11 @@ pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result
         bus.news().iter().for_each(|news| out.note(news));
         silence.look(received.is_some(), out);
         let Some(frame) = received else { continue };
-        // Times in a file never decrease, even if the clock is changed meanwhile.
+        // The times in a file never decrease, even if the clock is changed during the recording.
         let time = began_at + start.elapsed();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {
             Ok(()) => {}
-            // The reader of `ucom record - | head` has read enough.
+            // The reader has read enough, as in `ucom record - | head`.
             Err(RecordingError::Io { source: e, .. }) if stdout => {
                 Output::lose(&e);
                 break;
@@ -122,7 +122,7 @@ pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result
     Ok(())
 }
 
-/// Opens the files of a recording before it starts. The file ending selects the format.
+/// Opens the files of a recording before the recording starts. The file extension selects the format.
 fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>, Failure> {
     let ending = args.file.extension().map(|e| e.to_string_lossy().into_owned());
     let known = ["log", "candump", "fzi", "fzican", "mcap"];
@@ -152,7 +152,7 @@ impl Operator for Player<'_> {
     }
 }
 
-/// Sends the frames of a recording at their times.
+/// Sends the frames of a recording at their recorded times.
 pub(super) fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if !(args.speed.is_finite() && args.speed > 0.0) {
         return Err(Failure::usage(format!(

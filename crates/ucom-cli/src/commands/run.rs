@@ -1,4 +1,4 @@
-//! `ucom run`: runs control loops under supervision, from the start of all boards to their stop.
+//! `ucom run`: starts all boards, supervises their control loops, and stops the boards.
 
 use std::time::{Duration, Instant};
 
@@ -16,10 +16,10 @@ use super::outputs::finish;
 use super::typed::{obey, typed};
 use crate::args::{Boards, LinkArgs, OnLost, RunArgs};
 
-/// Period of the reports of `run`.
+/// Interval between the reports of `ucom run`.
 const REPORT_PERIOD: Duration = Duration::from_secs(1);
 
-/// Starts boards and keeps them running until Ctrl-C.
+/// Starts boards and supervises them until Ctrl-C.
 pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut profile = link.profile()?;
     if let Some(policy) = args.on_lost {
@@ -40,7 +40,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
         })?),
         None => None,
     };
-    // The identities are read first, because this needs no started application.
+    // The identities are read first, because this does not need a started application.
     if let Some(file) = &file {
         file.identities(&mut driver)?;
     }
@@ -49,7 +49,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     let (report, prepared) = with_names(&args.cache.cache(), |cache| {
         let mut prepared = Prepared::default();
         let report = start(&mut driver, args, cache, &boards, &signals, file.as_ref(), &mut prepared);
-        // The procedure has already undone its own changes.
+        // The procedure itself has already undone its changes.
         let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
         Ok((report, prepared))
     })?;
@@ -83,7 +83,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     Ok(followed.nobody_left()?)
 }
 
-/// Prints that the boards run, with their flags and the load of the bus.
+/// Prints that the boards run, including their flags and the load of the bus.
 fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output) {
     let running = json!({
         "event": "running",
@@ -98,7 +98,7 @@ fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output)
     }));
 }
 
-/// Reads names, prepares the changes, and starts all boards.
+/// Reads the signal names, prepares the changes, and starts all boards.
 fn start(
     driver: &mut Driver,
     args: &RunArgs,
@@ -122,7 +122,7 @@ fn start(
     }
 }
 
-/// Requests the texts of the boards, if the user wants them.
+/// Requests the debug texts of the boards if the user wants to see them.
 fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), Failure> {
     let on = |wanted: bool| wanted.then_some(true);
     for board in boards.iter().filter(|_| args.debug || args.global_debug) {
@@ -133,7 +133,7 @@ fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), 
     Ok(())
 }
 
-/// Supervises boards until Ctrl-C, `stop`, the end of the time, or the end of the last board's loop.
+/// Supervises boards until Ctrl-C, `stop`, the end of the requested time, or the end of the last control loop.
 fn supervise(
     driver: &mut Driver,
     args: &RunArgs,
@@ -165,7 +165,7 @@ fn supervise(
         for notice in followed.look(&mut driver.master, now_us) {
             print(driver, notice);
         }
-        // The error was found during the run, so it is a fault and not a refusal.
+        // The error occurred during the run, so it is a fault and not a refusal.
         nothing_shared(&driver.master).map_err(|e| Failure { kind: ErrorKind::Fault, ..e.into() })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {

@@ -1,4 +1,4 @@
-//! `ucom serve`: the agent that owns a bus.
+//! `ucom serve`: runs the agent that owns a bus.
 
 use std::io::IsTerminal as _;
 use std::net::TcpListener;
@@ -21,10 +21,10 @@ use ucom_sim::{ChainConfig, ChainServer, ChainSim};
 use crate::args::{LinkArgs, ServeArgs};
 use crate::interrupt::listen;
 
-/// Period at which signals are polled.
+/// Interval at which the process checks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Owns the bus until SIGINT or SIGTERM. Then stops the boards that the agent has started.
+/// Owns the bus until SIGINT or SIGTERM. Then the agent stops the boards that it has started.
 pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if args.sim && link.bus.is_some() {
         return Err(
@@ -43,7 +43,7 @@ pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(
         signals: link.signal_table()?,
         cache: args.cache.cache(),
         cleanup: CleanupList::default(),
-        // Simulated boards are new each time, so the inventory of real boards does not apply.
+        // Simulated boards are new at each start, so the inventory of real boards does not apply.
         inventory: (!args.sim).then(|| args.inventory.clone()),
     };
     let stop = listen(&config.cleanup)?;
@@ -89,7 +89,7 @@ pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(
     })
 }
 
-/// Notes that the log of commands cannot be written.
+/// Prints a note that the command log cannot be written.
 fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + use<> {
     let out = *out;
     move |error| {
@@ -97,7 +97,7 @@ fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + u
     }
 }
 
-/// A simulated chain that runs in a thread.
+/// Simulated chain that runs in a separate thread.
 struct Simulated {
     url: String,
     ended: Arc<AtomicBool>,
@@ -136,7 +136,7 @@ impl Drop for Simulated {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of that thread has been printed.
+            // A panic of that thread was already printed.
             drop(thread.join());
         }
     }

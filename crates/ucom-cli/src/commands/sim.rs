@@ -1,4 +1,4 @@
-//! `ucom sim`: a simulated chain with a server for the socketcand protocol.
+//! `ucom sim`: a simulated chain of boards with a server for the socketcand protocol.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use super::typed::typed;
 use crate::args::{LinkArgs, SimArgs};
 use crate::interrupt::listen;
 
-/// Period at which signals and stdin are polled.
+/// Interval at which the process checks for signals and stdin.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Serves a simulated chain until SIGINT or SIGTERM.

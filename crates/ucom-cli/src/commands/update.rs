@@ -26,7 +26,7 @@ pub(super) fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result
     };
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
-    // Images and targets are shown before any question and any frame.
+    // The images and targets are shown before any confirmation prompt and any frame.
     files.notes.iter().for_each(|note| driver.note(note.clone()));
     driver.note(format!("onto {}", targets.iter().map(target).collect::<Vec<_>>().join(", ")));
     let options = UpdateOptions {
@@ -40,7 +40,7 @@ pub(super) fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result
         second: files.second,
         expect_program_id: args.expect_program_id,
         name_target: args.name_target,
-        // In an update session, the failure of a board does not affect the other boards.
+        // In an update of several boards, the failure of one board does not affect the other boards.
         keep_going: several,
         ..UpdateOptions::new(targets, files.image, day)
     };
@@ -56,15 +56,14 @@ pub(super) fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result
     }
 }
 
-/// Describes a board and its required identity.
+/// Describes a board and the identity that it must have.
 fn target(target: &UpdateTarget) -> String {
     let who =
         target.flash_number.map_or_else(|| "any flash number".into(), |f| format!("flash number 0x{f:04X}"));
     format!("board {} ({who})", target.board)
 }
 
-/// Returns the selected boards. `all` selects the boards that answer and those of the inventory, so that a missing
-/// board is reported.
+/// Returns the selected boards. `all` selects the boards that answer and the boards of the inventory, so that a missing board is reported.
 fn with_listed(mut numbers: Vec<u8>, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
     if args.boards == Boards::All && args.inventory.exists() {
         let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
@@ -79,7 +78,7 @@ fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
     (0..32).filter(|board| inventory.get(*board).is_some())
 }
 
-/// Handles Ctrl-C during the identification. No board was changed, and the report says so.
+/// Handles Ctrl-C while the boards are identified. The report says that no board was changed.
 fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
     let inventory = Inventory::read(&args.inventory).ok();
     let left = UpdateOutcome::Cancelled;
@@ -103,7 +102,7 @@ fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Ou
     Failure::shown(report.failure().unwrap_or(ErrorKind::Refused))
 }
 
-/// Returns the required flash number of each board: the given one, or else the one in the inventory.
+/// Returns the required flash number of each board: the number on the command line, or else the number in the inventory.
 fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = args.flash_id {
         return match numbers {
@@ -115,7 +114,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
             .next("for several boards, ucom reads the flash ids from the inventory that ucom init writes")),
         };
     }
-    // For a single board its number is enough. For a list, the identity of each board is needed.
+    // For a single board its number is enough. To select several boards, their identities are required.
     if let ([board], Boards::Some(_)) = (numbers, &args.boards)
         && !args.inventory.exists()
     {

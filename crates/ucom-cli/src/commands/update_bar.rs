@@ -1,4 +1,5 @@
-//! Bar of an update on stderr. A separate thread draws it, so a blocked terminal (Ctrl-S) does not delay a block.
+//! Progress bar of an update on stderr. A separate thread draws the bar, so that a blocked terminal (Ctrl-S) does not
+//! delay the transfer of a block.
 
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
@@ -7,32 +8,32 @@ use cli_kit::{ErrorKind, Failure, Output, ProgressBar};
 use ucom_host::master::Event;
 use ucom_host::master::update::Progress;
 
-/// Largest number of waiting steps; further ones are dropped.
+/// Maximum number of waiting steps; further steps are dropped.
 const WAITING: usize = 4;
-/// Longest wait for a blocked terminal at the end.
+/// Maximum wait for a blocked terminal at the end.
 const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Next state of the bar.
+/// Next state of the progress bar.
 struct Step {
     bar: ProgressBar,
-    /// Number of the bar. A bar with a new number replaces the previous one.
+    /// Number of the progress bar. A bar with a new number replaces the previous bar.
     serial: usize,
     bytes: u64,
     message: String,
 }
 
-/// Bar of the boards in progress.
+/// Progress bar for the boards that are being updated.
 pub(super) struct Bar<'a> {
     out: &'a Output,
     bar: Option<(Vec<u8>, ProgressBar)>,
     serial: usize,
     steps: SyncSender<Step>,
-    /// Ends with the thread.
+    /// Channel that closes when the thread ends.
     ended: Receiver<()>,
 }
 
 impl<'a> Bar<'a> {
-    /// Creates a bar that stays hidden before the first progress.
+    /// Creates a progress bar that is hidden until the first progress event.
     pub(super) fn new(out: &'a Output) -> Result<Self, Failure> {
         let (steps, drawn) = sync_channel(WAITING);
         let (end, ended) = channel::<()>();
@@ -46,7 +47,7 @@ impl<'a> Bar<'a> {
         Ok(Self { out, bar: None, serial: 0, steps, ended })
     }
 
-    /// Draws the progress in an event, if the terminal accepts it.
+    /// Draws the progress of an event, if the terminal accepts output.
     pub(super) fn see(&mut self, event: &Event) {
         let Event::Progress { progress, .. } = event else { return };
         if self.bar.as_ref().is_none_or(|(boards, _)| *boards != progress.boards) {
@@ -58,16 +59,16 @@ impl<'a> Bar<'a> {
         if let Some((_, bar)) = &self.bar {
             let (bar, serial) = (bar.clone(), self.serial);
             let step = Step { bar, serial, bytes: progress.bytes, message: message(progress) };
-            // If too many steps wait, this one is dropped. The next step includes its progress.
+            // If too many steps wait, this step is dropped. The next step includes its progress.
             let _ = self.steps.try_send(step);
         }
     }
 
-    /// Removes the bar, before any other output.
+    /// Removes the progress bar; must be called before any other output.
     pub(super) fn end(self) {
         let Self { steps, ended, .. } = self;
         drop(steps);
-        // The thread sends no message; the channel closes when it ends.
+        // The thread sends no message; the channel closes when the thread ends.
         let _ = ended.recv_timeout(PRINT_TIMEOUT);
     }
 }

@@ -1,4 +1,4 @@
-//! Files and date of an update, checked against the plan of the profile.
+//! Files and date of an update, which are checked against the plan of the profile.
 
 use std::path::{Path, PathBuf};
 
@@ -12,20 +12,20 @@ use ucom_host::master::update::{UpdateImage, has_header};
 
 use crate::args::{Addresses, UpdateArgs};
 
-/// Contents of the files.
+/// Contents of the firmware files.
 pub(super) struct Files {
     /// The image.
     pub image: UpdateImage,
     /// Image of the other cycle.
     pub second: Option<UpdateImage>,
-    /// Paths of the images, in the same order.
+    /// Paths of the images, in the order of the images.
     pub names: Vec<PathBuf>,
     /// Description of each file.
     pub notes: Vec<String>,
 }
 
 impl Files {
-    /// Reads the files that the plan needs; refuses other files.
+    /// Reads the files that the plan needs, and refuses other files.
     pub(super) fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
         if args.name_target && !has_header(profile) {
             return Err(Failure::usage(
@@ -71,7 +71,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     Ok((image.into(), note))
 }
 
-/// Returns the hint for an invalid image file. The hint never suggests skipping a check of the content.
+/// Returns the hint for an invalid image file. The hint never suggests to skip a check of the content.
 fn advice(error: &ImageError) -> String {
     match error.advice() {
         ImageAdvice::None => String::new(),
@@ -129,7 +129,7 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
     Ok(None)
 }
 
-/// Returns the flash date: the requested one, or else today (UTC); 0 if no header contains a date.
+/// Returns the flash date: the requested date, or else the current date (UTC); 0 if the headers contain no date.
 pub(super) fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let form = profile.prog_date;
     let date = match asked {
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use ucom::DateForm;
 
-    /// D-45: a date is a day of the calendar in the profile's form, or a plain number.
+    /// D-45: a date is a calendar day in the format of the profile, or a plain number.
     #[test]
     fn d45_dates_are_days_of_the_calendar() {
         let fat = Profile::default();
@@ -194,7 +194,7 @@ mod tests {
             assert!(read(wrong).is_none(), "{wrong}");
         }
         assert!(day(None, &fat).is_ok_and(|today| today > 0x3AC1));
-        // This form has no calendar, so only plain numbers are valid.
+        // This format has no calendar, so only plain numbers are valid.
         let raw = Profile { prog_date: DateForm::Raw, ..fat };
         assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
         assert!(day(None, &raw).is_err_and(|e| e.next.to_string().contains("0x3AC1")));

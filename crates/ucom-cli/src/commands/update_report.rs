@@ -8,7 +8,7 @@ use ucom::{BoardInfo, Memory, Profile};
 use ucom_host::date_text;
 use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult, has_header};
 
-/// Prints the report; `names` are the files of its images.
+/// Prints the report; `names` are the paths of its image files.
 pub(super) fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {
     let images = report.images.iter().zip(names);
     let value = json!({
@@ -18,7 +18,7 @@ pub(super) fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile,
         "bytes": report.bytes,
         "images": images.clone().map(|(image, name)| image_value(image, name)).collect::<Vec<_>>(),
         "unverifiable": report.unverifiable.map(|why| json!({ "reason": why.to_string(), "hint": why.hint() })),
-        // Scripts mostly read the outcome of one board, or the outcome of several boards if all are equal.
+        // Most scripts read a single outcome: the outcome of one board, or the outcome of several boards if all are equal.
         "outcome": match report.boards.as_slice() {
             [first, rest @ ..] if rest.iter().all(|b| b.outcome == first.outcome) => json!(first.outcome.name()),
             _ => Value::Null,
@@ -59,13 +59,13 @@ fn boards(report: &UpdateReport, profile: &Profile) -> String {
     table(&[">board", "flash id", "outcome", ">attempts", ">time", ""], &rows)
 }
 
-/// Returns `true` if the board's own report is the only evidence that it is done.
+/// Returns `true` if only the answer of the board itself shows that the update is complete.
 fn taken_on_trust(b: &UpdateResult, report: &UpdateReport) -> bool {
     let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
     report.unverifiable.is_some() && done && b.failure.is_none()
 }
 
-/// Returns the next step if the program is known only from the board's own answer.
+/// Returns the next step if only the answer of a board shows which program it has.
 fn not_known(report: &UpdateReport) -> String {
     match report.boards.iter().any(|b| b.outcome == UpdateOutcome::ProgramUpToDate) {
         true if report.accept_unverified => "program-up-to-date is accepted, NOT verified\n".into(),
@@ -76,7 +76,7 @@ fn not_known(report: &UpdateReport) -> String {
     }
 }
 
-/// Describes what could not be verified, why, and how it could be verified.
+/// Describes which property could not be verified, the reason, and how the user can verify it.
 fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     let Some(why) = report.unverifiable else { return String::new() };
     let line = |b: &UpdateResult| {
@@ -106,7 +106,7 @@ fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     format!("{lines}{why};\n{}{accept}\n", why.hint())
 }
 
-/// Returns `true` if PC_INFO reports another program than before.
+/// Returns `true` if PC_INFO now reports another program than before.
 fn changed(b: &UpdateResult) -> Option<bool> {
     let program = |info: BoardInfo| (info.program_id, info.date);
     Some(program(b.before?) != program(b.after?))

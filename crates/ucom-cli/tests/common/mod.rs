@@ -1,4 +1,4 @@
-//! Runs the `ucom` command as a user does, with a simulated chain.
+//! Runs the `ucom` command like a user, with a simulated chain.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
@@ -13,7 +13,7 @@ fn command() -> Command {
     program(env!("CARGO_BIN_EXE_ucom"), "UCOM_")
 }
 
-/// Runs `ucom` with these words.
+/// Runs `ucom` with these arguments.
 pub(crate) fn ucom(words: &[&str]) -> CommandOutput {
     ucom_with(words, "")
 }
@@ -23,7 +23,7 @@ pub(crate) fn ucom_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
 
-/// A simulated chain; it ends with the test.
+/// Simulated chain that ends when the test ends.
 pub(crate) struct Sim {
     child: Child,
     pub url: String,
@@ -51,14 +51,14 @@ impl Sim {
         Self { child, url: url.to_owned(), dir: tempfile::tempdir().expect("a directory") }
     }
 
-    /// Like `start`, with numbered boards.
+    /// Like `start`, but with numbered boards.
     pub(crate) fn numbered(options: &[&str]) -> Self {
         let sim = Self::start(options);
         sim.ucom(&["init"]).ends(0);
         sim
     }
 
-    /// Returns the command `ucom` on its bus.
+    /// Returns a `ucom` command for the bus of the chain.
     pub(crate) fn command(&self) -> Command {
         let mut command = command();
         command.env("UCOM_BUS", &self.url).env("UCOM_INVENTORY", self.path("inventory.toml"));
@@ -66,12 +66,12 @@ impl Sim {
         command
     }
 
-    /// Runs `ucom` on its bus, with a separate inventory and cache.
+    /// Runs `ucom` on the bus of the chain, with a separate inventory and cache.
     pub(crate) fn ucom(&self, words: &[&str]) -> CommandOutput {
         run(self.command(), words, "")
     }
 
-    /// Returns the answer of `ucom --json` with these words; panics if the command ends with another code.
+    /// Returns the output of `ucom --json` with these arguments; panics if the exit code differs from `code`.
     pub(crate) fn json(&self, words: &[&str], code: i32) -> Value {
         self.ucom(&[&["--json"], words].concat()).ends(code).json()
     }
@@ -81,19 +81,19 @@ impl Sim {
         self.json(&["status", board], 0)["boards"][0]["status_byte"].clone()
     }
 
-    /// Starts `ucom` on its bus, in parallel with the test.
+    /// Starts `ucom` on the bus of the chain; the command runs in parallel with the test.
     pub(crate) fn spawn(&self, words: &[&str]) -> Child {
         let mut command = self.command();
         command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.spawn().expect("ucom starts")
     }
 
-    /// Returns a path in its directory.
+    /// Returns a path in the directory of the chain.
     pub(crate) fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// Creates a file in its directory.
+    /// Creates a file in the directory of the chain.
     pub(crate) fn file(&self, name: &str, bytes: &[u8]) -> String {
         std::fs::write(self.path(name), bytes).expect("a file");
         self.path(name)
@@ -107,12 +107,12 @@ impl Sim {
         std::thread::sleep(Duration::from_millis(150));
     }
 
-    /// Joins its bus as a device that sends and receives plain frames.
+    /// Opens the bus of the chain as a device that sends and receives plain frames.
     pub(crate) fn peer(&self) -> Peer {
         Peer { bus: can_link::open(&self.url).expect("the bus opens") }
     }
 
-    /// Kills the simulator, as in a power cut. Its directory stays.
+    /// Kills the simulator, which has the effect of a power cut. Its directory stays.
     pub(crate) fn kill(mut self) -> tempfile::TempDir {
         self.child.kill().expect("kill");
         self.child.wait().expect("it ends");
@@ -124,7 +124,7 @@ impl Sim {
         signal(&self.child, name);
     }
 
-    /// Sends a signal, waits for the end and returns the exit code.
+    /// Sends a signal, waits until the simulator has ended, and returns its exit code.
     pub(crate) fn end(mut self, name: &str) -> i32 {
         signal(&self.child, name);
         self.child.wait().expect("it ends").code().unwrap_or(-1)
@@ -138,18 +138,18 @@ impl Drop for Sim {
     }
 }
 
-/// Sends a signal to a command and waits for its end.
+/// Sends a signal to a command and waits until the command has ended.
 pub(crate) fn ended_by(child: Child, name: &str) -> CommandOutput {
     signal(&child, name);
     ended(child)
 }
 
-/// Returns the outcome of each board of an update.
+/// Returns the update outcome of each board.
 pub(crate) fn outcomes(report: &Value) -> Vec<&str> {
     report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect()
 }
 
-/// A device on the bus that sends and receives raw frames.
+/// Device on the bus that sends and receives raw frames.
 pub(crate) struct Peer {
     bus: Box<dyn CanBus + Send>,
 }
@@ -165,12 +165,12 @@ impl Peer {
         self.bus.send(&CanFrame::classic(id, &data).expect("8 bytes")).expect("sent");
     }
 
-    /// Returns how often its controller went bus-off, as the server reported.
+    /// Returns how often the controller of the device went bus-off, as reported by the server.
     pub(crate) fn times_bus_off(&self) -> u64 {
         self.bus.times_bus_off()
     }
 
-    /// Returns the next frame within a time.
+    /// Returns the next frame that arrives within this time.
     pub(crate) fn receive(&mut self, within_ms: u64) -> Option<String> {
         self.receive_for(Duration::from_millis(within_ms))
     }
@@ -181,7 +181,7 @@ impl Peer {
         Some(format!("{}#{data}", frame.id()))
     }
 
-    /// Returns all frames within a time.
+    /// Returns all frames that arrive within this time.
     pub(crate) fn all(&mut self, within_ms: u64) -> Vec<String> {
         let end = Instant::now() + Duration::from_millis(within_ms);
         let mut received = Vec::new();
@@ -191,7 +191,7 @@ impl Peer {
         received
     }
 
-    /// Waits for a frame that begins with `start`; skips others.
+    /// Waits for a frame that begins with `start`, and skips other frames.
     pub(crate) fn wait(&mut self, start: &str) -> String {
         let mut patience = Patience::begin();
         let mut next = || patience.wait(format_args!("a frame {start}"), |time| self.receive_for(time));
@@ -208,12 +208,12 @@ impl Peer {
     }
 }
 
-/// Returns an image of `bytes` bytes, different for each seed.
+/// Returns an image of `bytes` bytes; each seed gives another image.
 pub(crate) fn image(bytes: usize, seed: u8) -> Vec<u8> {
     (0..bytes).map(|i| (i * 37 + 11) as u8 ^ seed).collect()
 }
 
-/// Returns the image of the protocol's example, whose Program ID is 0x4B3F.
+/// Returns the example image of the protocol, whose Program ID is 0x4B3F.
 pub(crate) fn golden() -> Vec<u8> {
     (0..1000_usize).map(|i| (37 * i + 11) as u8).collect()
 }

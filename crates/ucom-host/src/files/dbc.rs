@@ -1,9 +1,9 @@
-//! DBC files for cantools, SavvyCAN and similar tools. The files describe the protocol's frames, and the process data of known boards by
-//! name.
+//! DBC files for cantools, SavvyCAN and similar tools. The files describe the frames of the protocol, and the process data of known
+//! boards by name.
 //!
 //! CI, SO and PAR are multiplexed by their buffer offset: the first word selects which three words follow (D-15). Packages of strings have
-//! the same identifier as other frames, and nothing in them shows that they are strings. For DSP_INFO and the IO description the file
-//! therefore describes only the first frame. Debug texts and program data are raw bytes.
+//! the same identifier as other frames, and do not contain a mark that shows that they are strings. Therefore, for DSP_INFO and the IO
+//! description, the file describes only the first frame. Debug texts and program data are raw bytes.
 mod names;
 #[cfg(test)]
 mod tests;
@@ -15,21 +15,21 @@ use crate::master::io::{IoDescription, Kind, short};
 use names::Names;
 use ucom::{Endian, Function, Sender, Sequence, Status};
 
-/// An input, output or parameter.
+/// Input, output or parameter of a board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedSignal {
-    /// Name of the signal. The name is converted to an identifier.
+    /// Name of the signal. In the file, the name is converted to an identifier.
     pub name: String,
-    /// Meaning of its word (D-11).
+    /// Meaning of the word of this signal (D-11).
     pub signal: Signal,
 }
 
-/// A board whose process data are known.
+/// Board whose process data is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DbcBoard {
     /// Board number.
     pub number: u8,
-    /// The controller inputs, one entry each.
+    /// Controller inputs, one entry for each.
     pub ci: Vec<NamedSignal>,
     /// The sensor outputs.
     pub so: Vec<NamedSignal>,
@@ -38,7 +38,7 @@ pub struct DbcBoard {
 }
 
 impl DbcBoard {
-    /// Creates a board with its names and the meanings of their words.
+    /// Creates a board with its signal names and the meanings of their words.
     pub fn new(number: u8, description: &IoDescription, signals: &BoardSignals) -> Self {
         let of = |kind: Kind| {
             let pairs = description.names(kind).iter().zip(signals.all(kind));
@@ -50,12 +50,12 @@ impl DbcBoard {
     }
 }
 
-/// Signal of a message.
+/// Signal of a DBC message.
 struct DbcSignal {
     name: String,
     /// First byte.
     byte: usize,
-    /// First bit in that byte, for fields of less than a byte.
+    /// First bit in that byte, for fields that are shorter than a byte.
     bit: usize,
     bits: usize,
     signed: bool,
@@ -71,7 +71,7 @@ impl DbcSignal {
     }
 
     fn line(&self, endian: Endian, receiver: &str) -> String {
-        // In Motorola order the start bit is the field's most significant bit, which is in its first byte.
+        // In Motorola order, the start bit is the most significant bit of the field, which is in the first byte of the field.
         let big = endian == Endian::Big && self.bits > 8;
         let start = self.byte * 8 + if big { 7 } else { self.bit };
         let (order, sign) = (u8::from(!big), if self.signed { '-' } else { '+' });
@@ -82,7 +82,7 @@ impl DbcSignal {
         };
         let Self { name, multiplex, bits, signal, .. } = self;
         let (scale, offset, unit) = signal.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
-        // Writes the limit with as few digits as possible, without rounding errors.
+        // The limit is written with as few digits as possible, without rounding errors.
         let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
         let (low, high) = match signal {
             Some(signal) if signal.known && signal.kind != SignalType::Hex => {
@@ -99,7 +99,7 @@ impl DbcSignal {
 
 /// Returns the text of a DBC file for these boards; `endian` is the byte order of their words.
 ///
-/// Boards with numbers above 31 are left out. The broadcasts of the PC are always included.
+/// Boards with numbers above 31 are omitted. The broadcasts of the PC are always part of the file.
 pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
     let mut boards: Vec<(&DbcBoard, Sequence)> = boards
         .iter()
@@ -150,7 +150,7 @@ pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
     text
 }
 
-/// Returns the fields of a function whose layout is the same for all boards.
+/// Returns the fields of a function whose layout does not depend on the board.
 fn fields(function: Function) -> Vec<DbcSignal> {
     let status = |byte| {
         let bits = Status::NAMES.iter().enumerate();
@@ -189,7 +189,7 @@ fn fields(function: Function) -> Vec<DbcSignal> {
     }
 }
 
-/// Returns the signals of a buffer. Each offset selects three words.
+/// Returns the signals of an input, output or parameter buffer. Each buffer offset selects three words.
 fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
     let offset = DbcSignal { multiplex: " M".into(), ..DbcSignal::field("offset", 0, 16) };
     let mut fields = vec![offset];
@@ -209,7 +209,7 @@ fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
 }
 
 fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<DbcSignal>, endian: Endian) {
-    // A board without signals never sends this message, so the message needs no multiplexer.
+    // If a board has no signals, it never sends this message, so the message needs no multiplexer.
     let signals = if signals.len() == 1 && signals[0].multiplex == " M" { Vec::new() } else { signals };
     let length = match function {
         Function::Ci | Function::So | Function::Par | Function::DspCi => 8,
@@ -223,7 +223,7 @@ fn message(text: &mut String, function: Function, number: Sequence, signals: Vec
     };
     let (sender, receiver) = match function.sender() {
         Sender::Board => (board.as_str(), "PC"),
-        // The PC sends the broadcasts. Most other frames with a board's number come from that board.
+        // Broadcasts are sent by the PC. Most other frames that contain a board number are sent by that board.
         Sender::Both if number != Sequence::ZERO => (board.as_str(), "PC"),
         _ => ("PC", board.as_str()),
     };

@@ -344,7 +344,7 @@ impl Status {
         self.trajectory == TrajectoryState::Execute
     }
 
-    /// Returns the measured positions of the joints in the frame, rad. If a position is unknown, 0 is returned for it.
+    /// Returns the measured positions of the joints in the frame, rad. For an unknown position, 0 is returned.
     pub fn positions(&self) -> [f64; JOINTS] {
         self.joints.map(|joint| f64::from(joint.position))
     }

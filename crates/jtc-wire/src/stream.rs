@@ -47,7 +47,7 @@ pub const KNOWN_US: u64 = 2_000_000;
 
 /// Maximum number of stored gaps among the held bytes.
 const GAPS: usize = 64;
-/// Maximum work of one call of `poll`. The work for a skipped byte is 1; for a candidate whose CRC is checked it is `CANDIDATE`.
+/// Maximum work of one call of `poll`. The work for a skipped byte is 1; the work for a candidate whose CRC is checked is `CANDIDATE`.
 const BUDGET: usize = 2048;
 const CANDIDATE: usize = 128;
 
@@ -186,7 +186,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     /// continues the scan.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
-            // If the list of gaps is full, its last gap is at the last byte, or the list becomes shorter below.
+            // If the list of gaps is full, then either its last gap is at the last byte, or the loop below shortens the list.
             self.gaps.mark(self.end);
         }
         self.busy = false;

@@ -7,7 +7,7 @@
 //! From the position of the frame in the stream, the controller detects that the command has already taken effect. An Execute that was
 //! received before the command must no longer be executed.
 //!
-//! A disadvantage is that these seven bytes in the body of another frame also stop the arm. This error is on the safe side. In a body of
+//! A disadvantage is that these seven bytes in the body of another frame also stop the arm. This error is safe, because the arm stops. In a body of
 //! random bytes, the probability of this error is 2⁻⁵⁶ per position.
 use crate::command::ExecCommand;
 use crate::fixed;

@@ -180,7 +180,7 @@ fn scale_ends() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// A value is rounded to the nearest one or refused. A value never wraps around and is never clipped.
+    /// A value is rounded to the nearest raw value, or refused. A value never wraps around and is never clipped.
     #[test]
     fn scaling_never_wraps_or_clips(value in any::<f64>(), near in -4.0..4.0, joint in 0..6usize) {
         for value in [value, near] {

@@ -38,7 +38,7 @@ pub(crate) fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>),
     Ok(if image.is_some() { (Config::avena(), image) } else { (arm.config(), None) })
 }
 
-/// Controller on its board. The time of the board advances only when a tick runs.
+/// Controller together with its board. The time of the board advances only when a tick runs.
 #[pyclass(module = "openjtc._native")]
 pub(crate) struct Controller {
     board: Board,

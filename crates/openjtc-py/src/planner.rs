@@ -130,7 +130,7 @@ impl Planner {
     }
 }
 
-/// Returns a valid blend, or an error if it is negative or not finite.
+/// Returns a valid blend, or an error if the blend is negative or not finite.
 fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     if value.is_finite() && value >= 0.0 {
         return Ok(value);

@@ -183,7 +183,7 @@ impl Link {
         self.worker.rest(py);
     }
 
-    /// Stops the motion and teaching of this connection, and closes it.
+    /// Stops the motion and teaching of this connection, and closes the connection.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         if self.worker.is_closed() {
             return Ok(());

@@ -2,7 +2,7 @@
 //!
 //! - [`owner`], [`shared`], [`alarms`]: the thread, its requests, the waits of Python threads, and the errors that are
 //!   raised.
-//! - [`state`], [`operator`]: the session in that thread.
+//! - [`worker_state`], [`operator`]: the session in that thread.
 //! - [`procedures`], [`running`], [`values`], [`update`]: procedures of the session; Python converts their JSON results to dataclasses.
 //! - [`chain`], [`samples`], [`recording`], [`simulated`]: the classes.
 

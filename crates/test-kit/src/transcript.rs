@@ -3,8 +3,8 @@
 //! A page is executed from top to bottom in a separate folder. A comment on the page selects the program whose tests
 //! run the fenced blocks of the page, for example `<!-- commands: jtc -->`. The blocks are of the kind `console`
 //! (commands after `$ `, output below) and `sh` (commands without output). Each command must succeed, unless the next
-//! command is `echo $?`, and must print the output on the page. A line `...` stands for any number of lines. A comment
-//! directly above a block gives options, separated by semicolons:
+//! command is `echo $?`, and must print the output on the page. A line `...` stands for any number of lines. A comment directly above a
+//! block contains options, separated by semicolons:
 //!
 //! - `not run: REASON`: the block is skipped and counted with its reason.
 //! - `numbers vary`: numbers are not compared, except numbers of joints and boards.

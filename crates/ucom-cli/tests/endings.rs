@@ -12,7 +12,7 @@ use common::{Sim, ended_by};
 use serde_json::json;
 use test_kit::patience::until;
 
-/// D-50: a reader of stdout does not exist, and the pipe is full from the start. Heartbeats are still sent, the boards continue
+/// D-50: stdout has no reader, and its pipe is full from the start. Heartbeats are still sent, the boards continue
 /// to run and are stopped at the end, and the lost output is reported.
 #[test]
 fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
@@ -327,7 +327,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         &["replay", &log],
         &["sim", "--listen", "127.0.0.1:0"],
     ] {
-        // A reader does not exist and the pipe is full, so the first signal has no visible effect.
+        // The output has no reader and its pipe is full, so the first signal has no visible effect.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
         let mut command = sim.command();

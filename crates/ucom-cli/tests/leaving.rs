@@ -112,7 +112,7 @@ fn d37_boards_that_another_pc_stops_are_named() {
     assert_eq!(child.wait().unwrap().code(), Some(5));
 }
 
-/// If boards remain silent, they are stopped by policy. After that, the command has lost all boards, and the run ends by itself.
+/// If boards remain silent, they are stopped by policy. After that, the command supervises no board, and the run ends.
 #[test]
 fn d51_a_run_without_boards_ends_by_itself() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

@@ -304,8 +304,8 @@ fn d40_two_images_by_plan() {
     }
 }
 
-/// U-10 with raw files: the program is written, and the report says that it is not verified. If the user gives a
-/// Program ID, the program is verified against it.
+/// U-10 with raw files: the program is written, and the report says that it is not verified. If the user
+/// specifies a Program ID, the program is verified against it.
 #[test]
 fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = tempfile::NamedTempFile::new().unwrap();

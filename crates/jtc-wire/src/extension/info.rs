@@ -123,7 +123,7 @@ pub struct Info {
     pub boots: u32,
     /// Time since the last start, ms.
     pub uptime_ms: u64,
-    /// Number of lost response records: too many records were waiting to be sent (J-04).
+    /// Number of response records that were lost because too many records were waiting (J-04).
     pub lost_records: u32,
     /// Hash of all parameters that affect the motion of the arm ([`super::Hash`]).
     pub hash: u64,

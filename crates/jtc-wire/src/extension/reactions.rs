@@ -47,8 +47,8 @@ pub struct StopCause {
     pub kind: StopKind,
     /// Number of the first affected joint, from 1; 0 if the cause does not belong to a joint.
     pub joint: u8,
-    /// Measured or commanded value that caused the stop, in the unit of its kind: N·m, rad, rad/s or rad/s². For
-    /// [`StopKind::SpeedScale`] it is a factor.
+    /// Measured or commanded value that caused the stop, in the unit of its kind: N·m, rad, rad/s or rad/s². For [`StopKind::SpeedScale`] the
+    /// value is a factor.
     pub value: f32,
     /// Limit of the value; 0 if the value has no limit.
     pub limit: f32,

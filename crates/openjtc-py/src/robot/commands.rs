@@ -78,7 +78,7 @@ impl WorkerState {
         let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
         let due = [self.shared.moves(), self.teaching];
         for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
-            // An error is ignored, because a caller no longer exists.
+            // An error is ignored, because no caller can receive it.
             let _ = port.write_all(frame);
         }
     }

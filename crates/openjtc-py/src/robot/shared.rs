@@ -52,7 +52,7 @@ pub(crate) struct Shared {
     gone: AtomicBool,
     /// Number of statuses.
     seen: AtomicU64,
-    /// Requests to the current or next run. The run reads them while the arm moves.
+    /// Requests to the current or next run. The run reads these requests while the arm moves.
     pub wishes: Mutex<VecDeque<Wish>>,
     pub status: Mutex<Option<Status>>,
     /// Disturbances of a simulated arm, applied during any job.

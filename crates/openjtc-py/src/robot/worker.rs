@@ -1,7 +1,7 @@
 //! Thread that runs the session with a controller, and the calls from Python threads to this thread.
 //!
-//! The thread owns the session. Python threads put requests into the queue of this thread and wait without the GIL. During the wait,
-//! they check for Ctrl-C. Ctrl-C stops the arm before the exception is raised.
+//! The thread owns the session. Python threads put requests into the queue of this thread and wait without the GIL. During the wait, these
+//! threads check for Ctrl-C. Ctrl-C stops the arm before the exception is raised.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -200,7 +200,7 @@ impl Worker {
     pub(super) fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
         match self.wait_for(py, &Mutex::new(came), None)? {
             Waited::Came(result) => {
-                // Handles a Ctrl-C that came together with the result, because Python itself would not stop the arm.
+                // Handles a Ctrl-C that arrived together with the result, because Python itself would not stop the arm.
                 self.look_for_signals(py)?;
                 Ok(result)
             }
@@ -309,7 +309,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // The motion is stopped, because a caller no longer supervises it. The thread ends after the motion.
+        // The motion is stopped, because no caller supervises it any more. The thread ends after the motion.
         self.halt();
         self.shared.end();
         if !self.is_foreign() {
@@ -371,6 +371,6 @@ fn serve(state: &mut WorkerState) {
         }
     }
     shared.queue.close();
-    // An error is ignored, because a caller no longer exists.
+    // An error is ignored, because no caller can receive it.
     let _ = state.rest();
 }

@@ -148,7 +148,7 @@ impl ChainRecording {
 
 impl Drop for ChainRecording {
     fn drop(&mut self) {
-        // An error is ignored, because a caller no longer exists.
+        // An error is ignored, because no caller can receive it.
         let _ = self.finish();
     }
 }

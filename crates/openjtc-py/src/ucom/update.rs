@@ -86,7 +86,7 @@ impl Read {
         Ok((image(first, &options)?, second, self.day(profile)?))
     }
 
-    /// Returns the flash date in the format of the profile. 0: no header has a date.
+    /// Returns the flash date in the format of the profile. The result is 0 if the headers contain no date.
     fn day(&self, profile: &Profile) -> Result<u16, Failure> {
         if !has_header(profile) {
             let text = "date: the date is part of the header, but the profile sends no header";

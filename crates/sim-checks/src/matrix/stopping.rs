@@ -17,7 +17,7 @@ const LOADS: [(f64, f64, bool); 6] = [
 ];
 /// Payload masses, in kg.
 const PAYLOADS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
-/// Angle of the shoulder at which the arm with a payload is stopped, rad, and its speed, rad/s.
+/// Shoulder angle (rad) and speed (rad/s) at which the arm with a payload is stopped.
 const WITH_PAYLOAD: (f64, f64) = (-0.9, 0.3);
 
 /// Returns the results of the stop commands as Markdown tables.

@@ -45,7 +45,7 @@ impl Chain {
                 let given: Vec<_> = lines.try_iter().collect();
                 given.iter().for_each(|(line, _)| server.fault(line));
                 server.turn(Duration::from_millis(20));
-                // The fault begins during the turn. Dropping the sender resumes the waiting test.
+                // The fault has begun during this turn. Dropping the sender resumes the waiting test.
                 drop(given);
             }
         });

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// A new option must not get a variable that acts: this list contains every variable and the reason why it may exist.
+    /// A new option must not get a variable that acts. This list contains every variable and the reason why the variable may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{Caution, File, Format, Limit, Output, Place, Simulator};

@@ -15,7 +15,7 @@ use crate::args::{LinkArgs, SendArgs};
 /// frame before it is bus-off.
 const SENT: Duration = Duration::from_millis(50);
 
-/// Sends frames in the given order. All frames are checked before the first frame is sent.
+/// Sends the frames in the order of the command line. All frames are checked before the first frame is sent.
 pub(super) fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let frame = |(i, text): (usize, &String)| {
         let record = parsed(text.trim(), i + 1).unwrap_or_else(|| Err(Failure::usage("an empty frame")))?;

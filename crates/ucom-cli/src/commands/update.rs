@@ -114,7 +114,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
             .next("for several boards, ucom reads the flash ids from the inventory that ucom init writes")),
         };
     }
-    // For a single board its number is enough. To select several boards, their identities are required.
+    // A single board can be selected by its board number alone. To select several boards, their identities are required.
     if let ([board], Boards::Some(_)) = (numbers, &args.boards)
         && !args.inventory.exists()
     {

@@ -22,7 +22,7 @@ pub mod field {
     pub const HEADER: usize = 0;
     /// Type byte.
     pub const TYPE: usize = 1;
-    /// Length of the whole frame, u16.
+    /// Length of the complete frame, as a u16.
     pub const LENGTH: Range<usize> = 2..4;
     /// Position of the first byte of the body.
     pub const BODY: usize = 4;
@@ -79,7 +79,7 @@ codes! {
 /// Permitted lengths of the frames of one type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lengths {
-    /// A list of lengths.
+    /// List of permitted lengths.
     OneOf(&'static [u16]),
     /// Lengths from `first` to `last` in steps of `step` bytes.
     Steps {
@@ -184,7 +184,7 @@ impl FrameType {
         )
     }
 
-    /// Returns true if the device answers this request with an extension frame, in addition to the response record (J-50).
+    /// Returns true for an answer to an extension request, which the device sends in addition to the response record (J-50).
     pub const fn is_answer(self) -> bool {
         self as u8 >= 0x50
     }

@@ -115,7 +115,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
         }
         patience.pause(format_args!("the position 1500: {values}"));
     }
-    // A text that contains a raw word is also valid. An invalid value is refused with a list of the valid values, and changes nothing.
+    // A text that contains a raw word is also valid. An invalid name or value is refused with an explanation, and changes nothing.
     assert_eq!(set(json!("0x05DC")).1["value"], 1500.0);
     for (name, given, status, part) in [
         ("set_positon", json!(1), 422, "set_position"),

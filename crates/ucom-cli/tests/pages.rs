@@ -1,5 +1,5 @@
-//! The commands of README.md and of the pages of docs/ are run as written, against `ucom sim`, and must print the
-//! output that the pages show.
+//! The commands of README.md and of the pages of docs/ are run unchanged with `ucom sim`, and
+//! must print the output that the pages show.
 #![cfg(target_os = "linux")]
 
 #[test]

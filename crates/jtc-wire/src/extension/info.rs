@@ -193,7 +193,7 @@ fn text(bytes: &[u8; SHORT_TEXT]) -> &str {
 }
 
 impl Info {
-    /// Sets the version of the firmware and its git revision, cut off to the available length.
+    /// Sets the firmware version and the git revision, and cuts both texts to the available length.
     pub fn with_firmware(mut self, version: &str, revision: &str) -> Self {
         (self.firmware, self.revision) = (short_text(version), short_text(revision));
         self

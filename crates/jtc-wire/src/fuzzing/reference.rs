@@ -1,4 +1,4 @@
-//! A second stream parser. This parser is slow and needs the complete stream, so its correctness is easy to verify.
+//! Second stream parser, as a reference for the first. This parser is slow and needs the complete stream, so its correctness is easy to verify.
 use std::vec::Vec;
 
 use crate::{FrameRef, FrameStatus, Response};

@@ -32,7 +32,7 @@ type Given = (Option<u8>, String, String);
 /// Year, month and day.
 type Day = (u16, u8, u8);
 
-/// A chain of boards on a bus.
+/// Chain of boards on a bus.
 #[pyclass(frozen, module = "openjtc._native")]
 pub(super) struct Chain {
     pub owner: Owner,

@@ -179,7 +179,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     let mut driver = link.session()?;
     file.identities(&mut driver)?;
-    // Writing requires a running application. For a check, the cache is sufficient.
+    // Writing requires a started application. For a check, the cache is sufficient.
     let cache = args.cache.cache();
     let known = cache.all(&mut driver, &signals, &file.numbers(), |_| !args.dry_run)?;
     let checked = file.words(|number| known.iter().find(|k| k.board == number))?;

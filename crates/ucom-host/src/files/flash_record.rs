@@ -1,6 +1,6 @@
 //! Flash records in the inventory. A record describes the image that this tool wrote to a board and read back.
 //!
-//! A board answers only with Program ID and flash date. The record adds the hash of the image and its load address.
+//! A board itself reports only its Program ID and flash date. The record adds the hash of the image and its load address.
 
 use core::fmt::Write as _;
 use serde::{Deserialize, Deserializer, de};
@@ -20,7 +20,7 @@ pub struct FlashRecord {
     pub address: u32,
     /// Program ID that the board reported afterwards.
     pub program_id: u16,
-    /// Flash date that the board reported afterwards: 16 bits in the profile's form.
+    /// Flash date that the board reported afterwards, as 16 bits in the format that the profile defines.
     pub date: u16,
 }
 

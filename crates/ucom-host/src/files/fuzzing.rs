@@ -1,4 +1,4 @@
-//! Bodies of the fuzz targets: every file reader reads arbitrary bytes. A panic or a violated property is an error.
+//! Code of the fuzz targets. Each target gives arbitrary bytes to a file reader. A panic or a violated property is an error.
 
 use std::io::Cursor;
 use ucom::Profile;
@@ -32,7 +32,7 @@ pub fn image(data: &[u8]) {
 
 /// Reads recordings in every format. A recording that was read and written again in the same format is unchanged.
 pub fn recording(data: &[u8]) {
-    // Text formats have times in whole microseconds, and a written recording is complete.
+    // Text formats store times in whole microseconds, and a recording that this program writes is complete.
     let as_written = |recording: &mut Recording| {
         recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
         recording.broken_off = None;

@@ -2,9 +2,9 @@
 //! S-record file are never sent themselves.
 //!
 //! The loader's addresses count 16-bit words, so every image starts at a word and consists of complete words. In S-records of the boards'
-//! tool chain the addresses also count words; in Intel HEX and all other formats they count bytes. The reader detects files that use the
-//! other unit by their records: in the wrong unit these leave gaps or overlap, in the right unit they follow one another without gaps. The
-//! reader does not guess the unit of only one or two records. An option can always set the unit.
+//! tool chain the addresses also count words; in Intel HEX and all other formats they count bytes. The reader detects from the records if a
+//! file uses the other unit. In the wrong unit, the records leave gaps or overlap; in the right unit, each record follows the previous
+//! record without a gap. The reader does not guess the unit if the file has only one or two records. An option can always set the unit.
 mod detect;
 mod error;
 mod hex;
@@ -22,10 +22,10 @@ use segments::Segments;
 /// Largest size of an image, in bytes, unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
-/// Number of consecutive records that cannot fit by coincidence. A single gap as long as the record before it may be intended. In a table
-/// of interrupt vectors such a gap may follow every entry, but these records are short.
+/// Number of consecutive records that cannot follow one another by coincidence. A single gap as long as the record before it may be
+/// intended. In a table of interrupt vectors such a gap may follow every entry, but these records are short.
 const EVIDENCE: usize = 3;
-/// Minimum average length of these records in bytes. Linkers write 16 and more.
+/// Minimum average length, in bytes, of the records that show the unit. Linkers write records of 16 bytes and more.
 const EVIDENCE_BYTES: usize = 12;
 
 /// Format of an image file.
@@ -68,7 +68,7 @@ impl FromStr for Format {
 pub enum AddressUnit {
     /// Bytes.
     Byte,
-    /// Words of 16 bits, which are two bytes of the record each.
+    /// Words of 16 bits: each word is two bytes of the record.
     Word,
 }
 
@@ -94,17 +94,18 @@ pub enum Gaps {
 /// Options for reading an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
-    /// Format of the file; `None` derives it from content and name. Records are never read as raw bytes. A text is read as raw bytes only
-    /// if it is in a `.bin` file and the format is set.
+    /// Format of the file. If `None`, the reader detects the format from content and name. Records are never read as raw bytes. A text is
+    /// read as raw bytes only if it is in a `.bin` file and the format is set.
     pub format: Option<Format>,
-    /// Unit of record addresses. `None`: words in S-records, bytes in Intel HEX. The other unit is used if the file has at least three
-    /// records that follow one another only in that unit.
+    /// Unit of record addresses. If `None`, the unit is words in S-records and bytes in Intel HEX. The other unit is used if the file has
+    /// at least three records that follow one another only in that unit.
     pub address_unit: Option<AddressUnit>,
     /// Treatment of gaps between records.
     pub gaps: Gaps,
     /// `true` to swap the two bytes of each word, for tool chains whose byte order differs from the wire.
     pub swap_bytes: bool,
-    /// Load address in words, which replaces the address in the file. `None`: the address in the file, or 0 for raw bytes.
+    /// Load address in words, which replaces the address in the file. If `None`, the reader uses the address in the file, or 0 for raw
+    /// bytes.
     pub load_address_words: Option<u32>,
     /// Largest length of the image in bytes, including gaps.
     pub max_bytes: usize,
@@ -140,7 +141,7 @@ pub enum ImageNote {
         /// Number of data records.
         records: u32,
     },
-    /// The records follow one another only if their addresses have this unit. The unit is not the usual one of the format.
+    /// The records follow one another only if their addresses have this unit. This unit differs from the usual unit of the format.
     AddressesCount(AddressUnit),
 }
 
@@ -171,7 +172,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads the content of a file. The content is raw bytes if neither options nor content determine another format.
+    /// Reads the content of a file. The content is read as raw bytes unless the options or the content determine another format.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
         Self::parse_named(None, content, options)
     }
@@ -213,8 +214,8 @@ impl Image {
     /// Reads a file.
     pub fn read(path: &std::path::Path, options: &ImageOptions) -> Result<Self, ImageError> {
         let io = |source: std::io::Error| ImageError::Io { path: path.into(), source };
-        // 16 characters per byte are enough for records of two data bytes or more: an S-record with a 32-bit address, two data bytes and a
-        // line end has at most 20 characters.
+        // 16 characters per byte are enough for records with at least two data bytes. For example, an S-record with a 32-bit address, two
+        // data bytes and a line end has at most 20 characters.
         let most = (options.max_bytes as u64).saturating_mul(16).saturating_add(4096);
         let length = std::fs::metadata(path).map_err(io)?.len();
         if length > most {
@@ -230,7 +231,8 @@ impl Image {
         Ok(Self { bytes: content.to_vec(), address_words: 0, format: Format::Bin, notes: Vec::new() })
     }
 
-    /// Reads records in the usual unit of their format. If they follow one another only in the other unit, that unit is used.
+    /// Reads records in the usual unit of their format. If the records follow one another only in the other unit, the reader uses that
+    /// unit.
     fn records(content: &[u8], format: Format, options: &ImageOptions) -> Result<Self, ImageError> {
         let (usual, other) = match format {
             Format::SRecord => (AddressUnit::Word, AddressUnit::Byte),
@@ -270,7 +272,7 @@ impl Image {
         }
     }
 
-    /// Returns the bytes in wire order. Their number is even and at least two.
+    /// Returns the bytes in wire order. The number of bytes is even and at least two.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }

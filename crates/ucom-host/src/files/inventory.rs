@@ -76,7 +76,7 @@ pub enum InventoryError {
         /// System error.
         source: std::io::Error,
     },
-    /// The file is larger than any inventory.
+    /// The file is larger than the size limit of an inventory.
     #[error("{}: the inventory has {bytes} bytes, expected at most {MAX_BYTES}", path.display())]
     TooLarge {
         /// The file.
@@ -84,10 +84,10 @@ pub enum InventoryError {
         /// Its size.
         bytes: u64,
     },
-    /// The text is not TOML of this form. The message contains the line.
+    /// The text is not TOML in the form of an inventory. The message contains the line.
     #[error("{0}")]
     Form(String),
-    /// A number is higher than any board can have.
+    /// A number is higher than the highest possible number of a board.
     #[error("board number {number} is above 31")]
     Number {
         /// The number.
@@ -236,7 +236,7 @@ impl Inventory {
         self.boards.values()
     }
 
-    /// Returns the boards of an init. Names and flash records come from an older inventory.
+    /// Creates an inventory of the boards in the report of an init. Names and flash records come from an older inventory.
     ///
     /// # Errors
     /// Two boards have the same flash number.

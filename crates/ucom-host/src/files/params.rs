@@ -1,7 +1,7 @@
 //! Parameter files: parameters and initial inputs for boards, in YAML that users edit.
 //!
-//! The protocol has no way to read parameters back (D-35). A file therefore contains requested values, never the present values of a board.
-//! A file identifies boards by flash number or name. The names of signals apply to one Program ID.
+//! The protocol does not allow parameters to be read back (D-35). A file therefore contains requested values, never the present values of a
+//! board. A file identifies boards by flash number or name. The names of signals apply to one Program ID.
 
 mod check;
 mod read;
@@ -14,13 +14,13 @@ use super::signals::SignalValue;
 use super::text::{TextError, read_text};
 use std::path::{Path, PathBuf};
 
-/// Help page about these files.
+/// Help page about parameter files.
 pub const PARAMS_HELP: &str = include_str!("params/help.txt");
 
 /// A parameter file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParamsFile {
-    /// Boards in the order of the file. Each number occurs once.
+    /// Boards in the order of the file. Each board number occurs once.
     pub boards: Vec<ParamsBoard>,
 }
 
@@ -76,7 +76,7 @@ pub enum ParamsError {
     /// The file cannot be read.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// The text is not YAML of this form.
+    /// The text is not YAML in the form of a parameter file.
     #[error("{place}: {what}")]
     Form {
         /// Place.
@@ -84,7 +84,7 @@ pub enum ParamsError {
         /// Error text.
         what: String,
     },
-    /// The text is not YAML of this form, and the place of the error is not known.
+    /// The text is not YAML in the form of a parameter file, and the place of the error is not known.
     #[error("{0}")]
     Nowhere(String),
     /// Error in a file.

@@ -1,9 +1,9 @@
 //! Recordings of a bus in the formats `candump -L`, FZI-CAN 1.2 and MCAP.
 //!
-//! A recording can be interpreted only with the profile that was in use. MCAP stores the profile as metadata. The two text formats have no
-//! place for it that every reader accepts: python-can's candump reader, for example, reads each line as a frame. For text formats the
-//! profile is therefore stored in a separate file next to the recording, see [`profile_path`]. Comment lines `# …` with a profile are also
-//! read.
+//! A recording can be interpreted only with the profile that was used during the recording. MCAP stores the profile as metadata. The two
+//! text formats cannot store the profile in a form that every reader accepts. For example, python-can's candump reader reads each line as a
+//! frame. For text formats the profile is therefore stored in a separate file next to the recording, see [`profile_path`]. The reader also
+//! accepts comment lines `# …` with a profile.
 mod candump;
 mod error;
 mod frame;
@@ -69,11 +69,11 @@ pub fn profile_path(recording: &Path) -> PathBuf {
 /// A complete recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
-    /// Profile in use, as TOML; `None` if it is not known.
+    /// Profile of the recording, as TOML; `None` if the profile is not known.
     pub profile: Option<String>,
     /// Frames in the order of the file.
     pub records: Vec<Record>,
-    /// Place and kind of the damage if the file ends in the middle of a record, because its writer was killed; `None`: the file is
+    /// Place and kind of the damage if the file ends in the middle of a record because its writer was killed; `None` if the file is
     /// complete.
     pub broken_off: Option<String>,
 }

@@ -20,7 +20,7 @@ pub enum TextError {
         /// System error.
         source: std::io::Error,
     },
-    /// The file is larger than any file of its kind.
+    /// The file is larger than the limit for files of its kind.
     #[error("{}: the file is too large, expected at most {MAX_BYTES} bytes", path.display())]
     TooLarge {
         /// The file.

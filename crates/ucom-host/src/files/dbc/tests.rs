@@ -1,4 +1,4 @@
-//! Tests with the crate `can-dbc`: the crate reads the files, and the tests decode frames with its result.
+//! Tests with the crate `can-dbc`. The crate reads the DBC files, and the tests decode frames with the parsed files.
 
 use can_dbc::{ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, ValueType};
 use std::panic;
@@ -152,7 +152,7 @@ fn every_message_has_a_name_and_an_identifier_of_its_own() {
     ids.sort_by_key(|id| id.raw());
     ids.dedup();
     assert_eq!((names.len(), ids.len()), (count, count));
-    // Two boards × 24 functions, 128 reports, the broadcasts and the error without number.
+    // Number of messages: 24 functions for each of two boards, 128 reports, and 11 for the broadcasts and the error without a board number.
     assert_eq!(count, 2 * 24 + 128 + 11);
 }
 

@@ -1,9 +1,9 @@
 //! Detects the format of a file if no format option is set. Intel HEX and S-records are detected by their first line; other content is
 //! accepted as raw bytes only if it cannot be text.
 //!
-//! If a text were read as raw bytes, it would be flashed, read back and reported as verified, and the board would have no program any more.
-//! Therefore raw bytes are only read from a `.bin` file without printable text. With the option for raw bytes, files with other names are
-//! accepted as well, and text in a `.bin` file. Records are never read as raw bytes, even if they are damaged.
+//! If the reader accepted a text as raw bytes, the text would be flashed and reported as verified, and the board would have no program.
+//! Therefore raw bytes are only read from a `.bin` file without printable text. With the option for raw bytes, the reader also accepts
+//! files with other names, and text in a `.bin` file. Records are never read as raw bytes, even if they are damaged.
 
 use super::{Format, ImageError, segments::lines};
 use std::path::Path;
@@ -21,12 +21,12 @@ const MARKS: [(&[u8], &str); 3] =
     [(b"\xEF\xBB\xBF", "UTF-8"), (b"\xFF\xFE", "UTF-16"), (b"\xFE\xFF", "UTF-16")];
 
 impl Format {
-    /// Detects the format by content. The first line that is a record decides; content without records is raw bytes.
+    /// Detects the format by content. The first line that is a record determines the format; content without records is raw bytes.
     pub fn detect(content: &[u8]) -> Self {
         record_form(content).unwrap_or(Self::Bin)
     }
 
-    /// Returns the format of a file if no option sets it. Only a `.bin` file can be raw bytes, and a text never is.
+    /// Returns the format of a file if no option sets it. Only a `.bin` file can be raw bytes; a text is never raw bytes.
     pub(super) fn of(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         let by_name = extension(name);
         let expected = by_name.as_deref().and_then(Self::by_extension);
@@ -88,8 +88,8 @@ fn extension(name: Option<&Path>) -> Option<String> {
     name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }
 
-/// Returns the place of the first line that is a record or was one before it was damaged. The content may be a text in any encoding, with
-/// missing or damaged characters. `None`: the content is not a text, or has no such line.
+/// Returns the place of the first line that is a complete or damaged record. The content may be a text in any encoding, with missing or
+/// damaged characters. Returns `None` if the content is not a text, or has no such line.
 fn record_place(content: &[u8]) -> Option<String> {
     // Removes bytes that are not letters: zeros of two-byte encodings, padding, and end marks of old systems.
     let letters: Vec<u8> = content.iter().copied().filter(|b| !matches!(b, 0 | 0x1A)).collect();
@@ -101,8 +101,8 @@ fn record_place(content: &[u8]) -> Option<String> {
     Some(format!("line {line}"))
 }
 
-/// Returns `true` if the line has at least 8 hexadecimal digits, as in the shortest records, and they are nearly all of its characters.
-/// Half of the characters suffice if the line starts with the mark of a record.
+/// Returns `true` if the line has at least 8 hexadecimal digits, as the shortest records do, and hardly any other characters. If the line
+/// starts with the mark of a record, it is enough if half of the characters are hexadecimal digits.
 fn was_record(line: &[u8]) -> bool {
     let digits = line.iter().filter(|b| b.is_ascii_hexdigit()).count();
     let percent = match line {
@@ -112,7 +112,7 @@ fn was_record(line: &[u8]) -> bool {
     digits >= 8 && digits * 100 >= line.len() * percent
 }
 
-/// Returns the format of the first line that is a record. Lines before it are ignored.
+/// Returns the format of the first line that is a record. Lines before this record are ignored.
 fn record_form(content: &[u8]) -> Option<Format> {
     let hex = |digits: &[u8]| digits.len() >= 8 && digits.iter().all(u8::is_ascii_hexdigit);
     let line = |line: &[u8]| {

@@ -55,13 +55,13 @@ pub enum ImageError {
         /// Beginning of the text.
         starts: String,
     },
-    /// Raw bytes were requested, but the name is the name of an Intel HEX or S-record file.
+    /// The user requested raw bytes, but the file name is the name of an Intel HEX or S-record file.
     #[error("{name}: raw bytes were requested, but its name is that of an Intel HEX or S-record file")]
     RawName {
         /// The file.
         name: String,
     },
-    /// The addresses are not consistent in the usual unit, but they are in the other unit.
+    /// The addresses are consistent only in the other unit, not in the usual unit of the format.
     #[error("{error}")]
     OtherUnit {
         /// Error in the usual unit.
@@ -193,13 +193,13 @@ pub enum LineProblem {
 /// Remedy for an [`ImageError`]. No remedy bypasses a check of the file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageAdvice {
-    /// No remedy beyond the error text.
+    /// No remedy in addition to the error text.
     None,
     /// The file is damaged or not an image: create it again.
     MakeAgain,
-    /// The bytes are not text. Raw bytes need the name `.bin`, or the option for raw bytes.
+    /// The bytes are not text. Raw bytes need a file name with the extension `.bin`, or the option for raw bytes.
     NameRaw,
-    /// The name is the name of an Intel HEX or S-record file, but the file has no records: rename it to match its content.
+    /// The file has the name of an Intel HEX or S-record file, but contains no records: rename the file to match its content.
     Rename,
     /// Gaps between records can be filled.
     FillGaps,

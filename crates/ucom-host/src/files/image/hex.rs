@@ -43,7 +43,7 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
             (1, []) => ended = true,
             (2, [high, low]) => (base, wraps) = (u64::from(u16::from_be_bytes([*high, *low])) << 4, true),
             (4, [high, low]) => (base, wraps) = (u64::from(u16::from_be_bytes([*high, *low])) << 16, false),
-            // Start addresses are ignored, because the loader has its own.
+            // Start addresses are ignored, because the loader uses its own start address.
             (3 | 5, [_, _, _, _]) => {}
             (1..=5, data) => {
                 let declared = match kind {

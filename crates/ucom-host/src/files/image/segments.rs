@@ -35,7 +35,7 @@ impl Segments {
         }
         let mut rest = data;
         let mut at = start;
-        // Data that overlap earlier data must be equal to them.
+        // Data that overlap earlier data must be equal to the earlier data.
         let covering: Vec<u64> = self.covering(start, end);
         for run_start in covering {
             let Some(run) = self.runs.get(&run_start) else { continue };

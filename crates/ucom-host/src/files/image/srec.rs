@@ -2,7 +2,7 @@
 use super::segments::{Segments, hex_bytes, lines};
 use super::{Format, ImageError, ImageNote, LineProblem};
 
-/// Reads the records. Some tools write no end record; then a count record at the end shows that the file is complete.
+/// Reads the records. Some tools do not write an end record. In this case, a count record at the end shows that the file is complete.
 pub(super) fn read(
     content: &[u8],
     segments: &mut Segments,

@@ -1,4 +1,5 @@
-//! Tests against records from the published examples of the formats, and against encoders written here from the rules of the formats.
+//! Tests with records from the published examples of the formats, and with encoders that this file implements from the rules of the
+//! formats.
 
 use proptest::prelude::*;
 use std::panic;
@@ -39,7 +40,7 @@ fn s_line(kind: u8, width: usize, address: u32, data: &[u8]) -> String {
 
 #[test]
 fn intel_hex_as_published() {
-    // The example on the format's Wikipedia page. Its addresses count bytes.
+    // The example on the format's Wikipedia page. The addresses in this example count bytes.
     let text = ":10010000214601360121470136007EFE09D2190140\n\
                 :100110002146017E17C20001FF5F16002148011928\n\
                 :10012000194E79234623965778239EDA3F01B2CAA7\n\
@@ -74,7 +75,7 @@ fn s_records_as_published_count_words_here() {
     );
 }
 
-/// Records that follow one another in only one unit show the unit of the addresses; one or two records are not enough.
+/// Records that follow one another in only one unit show the unit of the addresses. One or two records are not enough.
 #[test]
 fn the_unit_of_addresses_is_taken_from_the_records() {
     let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
@@ -208,7 +209,7 @@ fn a_count_record_ends_a_file() {
     for kind in [5, 6] {
         let image = parse(&(s_line(0, 2, 0, b"name") + &whole + &count(kind, 4))).unwrap();
         assert_eq!((image.bytes().len(), image.notes()), (64, &[ImageNote::EndedByCount { records: 4 }][..]));
-        // If the file has an end record, the count record is not noted.
+        // If the file has an end record, the reader adds no note about the count record.
         let image = parse(&(whole.clone() + &count(kind, 4) + &s_line(9, 2, 0, &[]))).unwrap();
         assert!(image.notes().is_empty());
         for wrong in [0, 1, 3, 5, 0x104] {
@@ -224,8 +225,8 @@ fn a_count_record_ends_a_file() {
     assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
 }
 
-/// Damaged Intel HEX and S-record files. Each is refused because of its content, with and without the option for raw bytes, and with any
-/// name. The advice never bypasses a check.
+/// Damaged Intel HEX and S-record files. The reader refuses each of these files because of its content, with and without the option for raw
+/// bytes, and with any name. The advice never bypasses a check.
 #[test]
 fn characters_of_records_are_never_an_image() {
     let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();
@@ -333,7 +334,7 @@ fn raw_bytes_on_request_are_looked_at() {
 }
 
 proptest! {
-    /// If the three formats contain the same bytes, in records of any size and order, they give the same image.
+    /// Files of the three formats that contain the same bytes give the same image, for records of any size and order.
     #[test]
     fn three_forms_are_one_image(
         words in prop::collection::vec(any::<[u8; 2]>(), 1..300),
@@ -360,7 +361,7 @@ proptest! {
         prop_assert_eq!((from_hex.address_words(), from_srec.address_words()), (base, base));
     }
 
-    /// Random bytes, and records with a damaged byte, give an image or a specific error, never a panic.
+    /// Random bytes, and records with a damaged byte, result in an image or a specific error, never in a panic.
     #[test]
     fn anything_is_an_image_or_an_error(
         data in prop::collection::vec(any::<u8>(), 0..300),

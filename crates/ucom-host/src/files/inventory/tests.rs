@@ -51,7 +51,7 @@ fn d62_a_record_changes_one_key_of_the_file() {
         let read = Inventory::read(&path).unwrap();
         assert_eq!(read.get(1).unwrap().record(), Some(record(0x21)));
         assert!(read.get(2).is_none_or(|board| board.record().is_none()));
-        // The record is set again, and an init keeps it.
+        // The record is set again, and an init does not remove the record.
         Inventory::set_record(&path, 0x21, Some(FlashRecord { address: 0, ..record(0x21) })).unwrap();
         let again = Inventory::read(&path).unwrap();
         assert_eq!(again.get(1).unwrap().record().map(|r| r.address), Some(0));

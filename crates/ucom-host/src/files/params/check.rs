@@ -12,11 +12,11 @@ use ucom::BoardInfo;
 pub struct ParamsTarget<'a> {
     /// Answer to PC_INFO.
     pub info: &'a BoardInfo,
-    /// Name in the inventory; `None`: the inventory has no name for the board.
+    /// Name in the inventory; `None` if the inventory has no name for the board.
     pub name: Option<&'a str>,
 }
 
-/// The word for a signal that follows from a value in a file.
+/// Word of a signal, converted from a value in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParamsWord {
     /// Index of the signal in its buffer.
@@ -59,7 +59,7 @@ impl core::fmt::Display for ParamsProblem {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParamsProblemKind {
-    /// No board answers under this number.
+    /// No board answers to this number.
     #[error("the board does not answer")]
     Absent,
     /// Another board has this number.

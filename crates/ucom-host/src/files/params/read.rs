@@ -6,7 +6,7 @@ use serde_saphyr::Spanned;
 use super::{ParamsBoard, ParamsEntry, ParamsError, ParamsFile, Place};
 use crate::files::signals::SignalValue;
 
-/// Limit of YAML nodes. The limit allows more boards than a bus has and more values than a buffer has.
+/// Limit of the number of YAML nodes. The limit allows more boards than a bus has and more values than a buffer has.
 const MAX_NODES: usize = 400_000;
 
 #[derive(Deserialize)]

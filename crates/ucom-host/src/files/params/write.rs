@@ -16,7 +16,7 @@ pub struct SavedBoard {
     pub name: String,
     /// Program ID.
     pub program_id: u16,
-    /// The names of its signals.
+    /// Description with the names of the board's signals.
     pub description: IoDescription,
     /// Parameters, in the order of the buffer.
     pub par: Vec<SavedSignal>,
@@ -31,7 +31,7 @@ pub struct SavedSignal {
     pub signal: Signal,
     /// Requested word; `None`: the signal is written as a comment.
     pub word: Option<u16>,
-    /// Remark after the entry. For a requested word it is the time of writing.
+    /// Remark after the entry. For a requested word, the remark is the time of writing.
     pub remark: String,
 }
 

@@ -27,7 +27,7 @@ pub enum RecordingError {
         /// First line in the file.
         first: String,
     },
-    /// The format cannot hold this frame.
+    /// The format cannot represent this frame.
     #[error("FZI-CAN cannot store {frame}, only classic data frames with 11-bit ids")]
     NotRepresentable {
         /// The frame.

@@ -18,7 +18,7 @@ impl<R: BufRead> Lines<R> {
         Self { input, number: 0, endless: false, failed: false }
     }
 
-    /// Returns the next line without surrounding blanks; `None` at the end of the file. The memory is bounded for any input.
+    /// Returns the next line without surrounding blanks; `None` at the end of the file. The memory use is limited for any input.
     pub(super) fn line(&mut self) -> Result<Option<String>, RecordingError> {
         let mut line = Vec::new();
         self.input.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line)?;
@@ -33,8 +33,8 @@ impl<R: BufRead> Lines<R> {
         Ok(Some(String::from_utf8_lossy(&line).trim().to_owned()))
     }
 
-    /// Returns the next record. `parse` creates it from its line, and `comment` receives the comment lines before it. The sequence ends
-    /// after the first error.
+    /// Returns the next record. `parse` creates the record from its line; `comment` receives the comment lines before the record. The
+    /// sequence ends after the first error.
     pub(super) fn record(
         &mut self,
         parse: fn(&str) -> Result<Record, RecordProblem>,

@@ -148,7 +148,7 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(self.out.write_to_known_channel(&header, &json)?)
     }
 
-    /// Ends the open chunk, so that the data written so far can be read even if the rest is lost.
+    /// Ends the open chunk, so that the data written so far can be read even if later data are lost.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }

@@ -1,4 +1,4 @@
-//! C-3 and C-7 for files. The reference checks run the Python readers.
+//! Tests of C-3 and C-7 for recording files. The reference checks run the Python readers.
 
 use proptest::prelude::*;
 use std::io::Cursor;
@@ -132,7 +132,7 @@ fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     bytes
 }
 
-/// If a writer is killed, its file can be cut off at any place. All complete records are read, no record is invented, and the damage is
+/// If a writer is killed, its file can be cut off at any place. All complete records are read, no other record appears, and the damage is
 /// reported.
 #[test]
 fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
@@ -169,7 +169,7 @@ fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     }
 }
 
-/// The file of a killed writer, with an MCAP chunk that was being written. The head of the chunk does not contain its length yet.
+/// The file of a killed writer ends with an incomplete MCAP chunk. The header of the chunk does not contain its length yet.
 #[test]
 fn a_chunk_without_its_end_hides_nothing_before_it() {
     let record = |i: u64| {
@@ -239,7 +239,7 @@ proptest! {
         prop_assert_eq!(back.profile.as_deref(), Some("endian = \"big\"\n"));
     }
 
-    /// Random text gives records or a specific error.
+    /// Random text results in records or in a specific error.
     #[test]
     fn any_text_is_read_or_refused(text in "[ -~\n#()R]{0,200}", bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let _ = read(&text);

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use super::value::may_follow;
 use super::{Signal, SignalType};
 
-/// Largest scale and offset. The smallest scale is the inverse. These limits keep displayed values within the range of a number.
+/// Largest scale and offset. The smallest scale is the inverse of this limit. These limits keep displayed values within the range of a
+/// number.
 pub(super) const LARGEST: f64 = 1e9;
 
 #[derive(Deserialize)]

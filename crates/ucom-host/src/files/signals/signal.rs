@@ -38,7 +38,7 @@ pub struct Signal {
     pub max: Option<f64>,
     /// `true` if a table has an entry for the signal; otherwise its word is raw.
     pub known: bool,
-    /// `true` if a table is used that has no entry for the program. Then only raw words are accepted.
+    /// `true` if the signal table has no entry for the program. Then only raw words are accepted.
     pub raw_only: bool,
 }
 
@@ -148,8 +148,8 @@ impl Signal {
         (text(low, self.min), text(high, self.max))
     }
 
-    /// Returns the smallest and the largest word, as numbers, with values within the limits. If no word is within them, the first number is
-    /// larger than the second.
+    /// Returns, as numbers, the smallest and the largest word whose values are within the limits. If no word is within the limits, the
+    /// first number is larger than the second.
     pub(super) fn allowed(&self) -> (i32, i32) {
         let (low, high) = self.words();
         let steps = |limit: f64| (limit - self.offset) / self.scale;
@@ -168,7 +168,7 @@ impl Signal {
         !below && !above
     }
 
-    /// Returns the value that is really sent, with its unit, if the requested value lies between two words; `None` otherwise.
+    /// Returns the value that is really sent, with its unit, if the requested value lies between two words; returns `None` otherwise.
     pub fn rounded(&self, given: &SignalValue, word: u16) -> Option<String> {
         let SignalValue::Number { value, .. } = given else { return None };
         let sent = self.scaled(self.number(word));
@@ -187,7 +187,7 @@ impl Signal {
             (SignalValue::Raw(word), SignalType::Bool) if *word > 1 => {
                 return Err(ValueError::Switch { given: text() });
             }
-            // A raw word is sent unchanged, with any scale. The limits apply to it as well.
+            // A raw word is sent unchanged, with any scale. The limits also apply to raw words.
             (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {

@@ -7,7 +7,7 @@ use crate::master::io::{IoDescription, Kind, short};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Help page about these files.
+/// Help page about signal tables.
 pub const SIGNAL_HELP: &str = include_str!("help.txt");
 
 /// Tables of several programs.
@@ -36,7 +36,7 @@ pub enum SignalTableError {
     /// The file cannot be read.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// The text is not TOML of this form. The message contains the line.
+    /// The text is not TOML in the form of a signal table. The message contains the line.
     #[error("{0}")]
     Form(String),
     /// A program has no ID.
@@ -123,8 +123,8 @@ impl SignalTable {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
-    /// Returns the text of a table for programs that need one. The text contains every name, with scale and unit guessed from the texts of
-    /// the boards. An expert must review it.
+    /// Returns the text of a signal table for programs that need a table. The text contains every name, with scale and unit guessed from
+    /// the texts of the boards. An expert must review it.
     pub fn template(programs: &[(u16, &IoDescription)]) -> String {
         let mut text = String::from(
             "# What the words of inputs, outputs and parameters mean; `ucom help edges` explains the keys.\n\
@@ -149,8 +149,8 @@ impl SignalTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Skips a key that is already used: two signals share a name, and a third signal is called like the index of one of
-                    // them, such as `#2`.
+                    // Skips a key that is already used. This occurs if two signals share a name, and a third signal has the name `#2`,
+                    // which is the index of one of the two.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", keys(name));
                     }
@@ -197,7 +197,7 @@ impl ProgramSignals {
     }
 
     /// Returns a signal by its complete name, its name without the unit in brackets, or its index. The letter case is ignored if the names
-    /// are still distinct then; this is the same rule as for names given by the user.
+    /// are still distinct without it. Names from the user follow this rule too.
     pub fn signal(&self, kind: Kind, index: usize, name: &str) -> Option<&Signal> {
         let all = self.of(kind);
         let like = |wanted: &str| {
@@ -211,7 +211,7 @@ impl ProgramSignals {
             .or_else(|| all.get(&format!("#{index}")))
     }
 
-    /// Returns the names in the table that the program does not have. Most of them are typing errors.
+    /// Returns the names in the table that the program does not have. Most of these names are typing errors.
     pub fn strays(&self, description: &IoDescription) -> Vec<String> {
         let mut strays = Vec::new();
         for kind in [Kind::Ci, Kind::So, Kind::Par] {

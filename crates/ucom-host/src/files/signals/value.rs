@@ -14,7 +14,7 @@ pub enum SignalValue {
     Number {
         /// The number.
         value: f64,
-        /// Unit after the number; empty if none was given.
+        /// Unit after the number; empty if the text has no unit.
         unit: String,
     },
     /// `on`, `off`, `true`, `false`, `yes`, `no`.
@@ -27,7 +27,7 @@ pub enum SignalValueError {
     /// The text is hexadecimal, but not a 16-bit word.
     #[error("\"{0}\" is not a 16-bit word, expected 0x0000 to 0xFFFF")]
     Hex(String),
-    /// The text has none of the forms of a value.
+    /// The text is not in any form of a value.
     #[error(
         "\"{0}\" is not a value, expected a number (15.5deg, or 15.5 if the signal has no unit), a word \
          (0x05DC), on or off"
@@ -55,7 +55,7 @@ impl FromStr for SignalValue {
         if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || text.len() > 64 {
             return Err(wrong());
         }
-        // The number is the longest valid beginning. The remainder is the unit.
+        // The number is the longest valid part at the start of the text. The remainder is the unit.
         let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
         let mut parts = ends.map(|end| text.split_at(end));
         let (value, unit) =
@@ -94,7 +94,7 @@ impl fmt::Display for SignalValue {
             Self::Raw(word) => write!(f, "0x{word:04X}"),
             Self::Number { value, unit } => {
                 let size = value.abs();
-                // Without this, 1e300 would be printed with 300 zeros.
+                // Without the exponent, 1e300 would be printed with 300 zeros.
                 if *value != 0.0 && !(1e-6..1e15).contains(&size) {
                     write!(f, "{value:e}")?;
                 } else {

@@ -3,7 +3,7 @@
 use std::format;
 use std::string::String;
 
-/// Returns `1 board`, `3 boards` and so on. For nouns whose plural is formed with an s.
+/// Returns `1 board`, `3 boards` and so on. Supports only nouns whose plural is formed with an s.
 pub fn counted(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

@@ -1,4 +1,4 @@
-//! Findings about bus, chain and boards, each with the next command.
+//! Findings about bus, chain and boards. Each finding names the next command.
 use crate::master::engine::{Boards, Life, Statistics};
 use crate::master::error::SHARED_CAUSE;
 use crate::master::reports::{InitFinding, InitReport, ScanFinding, ScanReport};
@@ -189,7 +189,7 @@ fn initialised(init: &InitReport, f: &mut Findings) {
     }
 }
 
-/// Returns the next command after a finding of an init.
+/// Returns the command that the user should run next after a finding of an init.
 fn after_init(finding: &InitFinding) -> String {
     match finding {
         InitFinding::NoBoards => "check power, cable and bit rate, then `ucom doctor` again".to_owned(),

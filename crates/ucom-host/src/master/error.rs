@@ -1,5 +1,5 @@
-//! Errors with the facts, the kind of failure and the next command. Each operation has a small error type of its own. The error of a
-//! procedure can be any of them.
+//! Errors with the facts, the kind of failure and the next command. Each operation has its own small error type. A procedure can return any
+//! of these errors.
 mod address;
 mod exchange;
 mod identity;

@@ -11,7 +11,7 @@ use crate::master::procedures::work::{Work, work};
 use crate::master::reports::{ProcedureId, Request};
 use ucom::{Foreign, Frame, Function, Profile, Sequence};
 
-/// The PC side of one bus.
+/// PC side of one bus.
 pub struct Master {
     core: Arc<Mutex<Core>>,
     work: BTreeMap<ProcedureId, Work>,
@@ -19,12 +19,13 @@ pub struct Master {
 }
 
 impl Master {
-    /// Creates a master that only listens until it is told to do more.
+    /// Creates a master that only listens until a caller requests more.
     pub fn new(profile: Profile) -> Self {
         Self { core: Arc::new(Mutex::new(Core::new(profile))), work: BTreeMap::new(), next_id: 1 }
     }
 
-    /// Starts a procedure. Its end is reported as [`Event::Done`]. Refused while another procedure works with the same board.
+    /// Starts a procedure. The end of the procedure is reported as [`Event::Done`]. Returns an error while another procedure works with the
+    /// same board.
     pub fn start(&mut self, now: u64, request: Request) -> Result<ProcedureId, Error> {
         let (id, name, claims) = (ProcedureId(self.next_id), request.name(), request.claims());
         {
@@ -53,8 +54,9 @@ impl Master {
         self.run();
     }
 
-    /// Ends a procedure without sending another frame, because the bus is lost. [`Event::Done`] is reported at once. For an update it
-    /// contains the known state of each board, for conformance tests the finished tests, and for all other procedures [`MasterError::Bus`].
+    /// Ends a procedure without sending another frame, because the bus is lost. [`Event::Done`] is reported at once. For an update, the
+    /// event contains the known state of each board; for conformance tests, the finished tests; and for all other procedures,
+    /// [`MasterError::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.bus_gone = Some(reason.into());
@@ -72,13 +74,13 @@ impl Master {
         self.run();
     }
 
-    /// Returns the next frame to send. Call it until it returns `None`.
+    /// Returns the next frame to send. Call `poll` until it returns `None`.
     pub fn poll(&mut self, now: u64) -> Option<Frame> {
         self.poll_behind(now, now)
     }
 
-    /// Like `poll`, for a driver that has delivered only the frames received before the time `received`, not those between `received` and
-    /// `now`. Waits do not end later than `received`, but heartbeats are sent up to `now`.
+    /// Like `poll`, for a driver that has delivered the frames received before the time `received`, but not the later frames. Waits do not
+    /// end later than `received`, but heartbeats are sent up to `now`.
     pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -90,8 +92,8 @@ impl Master {
         lock(&self.core).pop()
     }
 
-    /// Returns the time at which [`Master::poll`] must be called next, unless a frame arrives earlier. `None`: the call is needed only when
-    /// a frame arrives.
+    /// Returns the time at which [`Master::poll`] must be called next, unless a frame arrives earlier. If `None`, `poll` is needed only
+    /// when a frame arrives.
     pub fn next_deadline(&self) -> Option<u64> {
         let core = lock(&self.core);
         if !core.idle() {
@@ -154,7 +156,7 @@ impl Master {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns the numbers that two boards share, each as the error of a procedure that ends for this reason.
+    /// Returns the numbers that two boards share. Each number is returned as the error of a procedure that ends because of it.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
@@ -214,8 +216,8 @@ impl Master {
         lock(&self.core).data.get(&board).is_some_and(|data| data.repeat.is_some())
     }
 
-    /// Returns the inputs of a board: the values that were set last, or the board's initial values. `None`: neither is known since the
-    /// application started.
+    /// Returns the inputs of a board: the values that were set last, or the board's initial values. Returns `None` if neither is known
+    /// since the application started.
     pub fn inputs(&self, board: u8) -> Vec<Option<u16>> {
         lock(&self.core).data.get(&board).map(ProcessData::inputs).unwrap_or_default()
     }
@@ -244,8 +246,8 @@ impl Master {
     }
 
     /// Stops control loops (ADMIN_DATA, all 0) ahead of all queued frames, and sends the stop twice more shortly afterwards. The stop is
-    /// sent to these boards, the last one first, or to all boards by broadcast. Does not wait for an answer; [`Request::Stop`] checks each
-    /// board.
+    /// sent to the given boards, in reverse order, or to all boards by broadcast. Does not wait for an answer; [`Request::Stop`] checks
+    /// each board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);

@@ -4,8 +4,8 @@ use core::fmt;
 
 use ucom::{Dimensions, Profile};
 
-/// Returns the length of a classic frame in bits, with worst-case stuffing and the pause after it: 55 for DLC 0, 75 for DLC 2, 135 for DLC
-/// 8.
+/// Returns the length of a classic frame in bits, including worst-case stuffing and the pause after the frame: 55 for DLC 0, 75 for DLC 2,
+/// 135 for DLC 8.
 pub const fn frame_bits(dlc: u8) -> u64 {
     let data = 8 * if dlc > 8 { 8 } else { dlc as u64 };
     // Stuff bits can occur in 34 of the 44 bits outside the data. Three more bits separate frames.
@@ -27,7 +27,7 @@ pub struct LoadForecast {
 }
 
 impl LoadForecast {
-    /// Creates a forecast for boards with these dimensions.
+    /// Creates a forecast for boards with the given dimensions.
     pub fn new<'a>(dimensions: impl IntoIterator<Item = &'a Dimensions>, profile: &Profile) -> Self {
         let per_second = |period_ms: u32| 1000.0 / f64::from(period_ms.max(1));
         let full = frame_bits(8) as f64;
@@ -70,7 +70,7 @@ impl fmt::Display for LoadForecast {
 mod tests {
     use super::*;
 
-    /// The frame lengths that the requirements list.
+    /// Frame lengths that the requirements list.
     #[test]
     fn worst_case_lengths() {
         assert_eq!([frame_bits(0), frame_bits(2), frame_bits(8)], [55, 75, 135]);

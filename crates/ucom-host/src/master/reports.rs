@@ -1,4 +1,4 @@
-//! Data that enter and leave procedures: requests with options, outcomes with reports and findings. This module neither sends frames nor
+//! Data that procedures receive and return: requests with options, outcomes with reports and findings. This module neither sends frames nor
 //! waits.
 mod conformance;
 mod flags;

@@ -17,7 +17,7 @@ pub enum Life {
     Lost,
 }
 
-/// Time for which a last heartbeat of a board may still arrive after its application has ended, µs.
+/// Time in µs after the end of a board's application during which a last heartbeat may still arrive.
 const UNDER_WAY: u64 = 100_000;
 
 /// State of a board as last received.
@@ -33,7 +33,7 @@ pub struct Board {
     pub life: Life,
     /// Time of the last heartbeat, µs.
     pub alive_at: Option<u64>,
-    /// Time of the last frame of any kind in µs, and its function.
+    /// Time (µs) and function of the last frame of any kind.
     pub last: Option<(u64, Function)>,
     /// Time of the last sensor outputs, µs. The control loop was running at that time.
     pub so_at: Option<u64>,
@@ -49,7 +49,7 @@ pub struct Board {
     pub ready_count: u64,
     /// Time since when the application is known to be stopped, with no automatic start pending.
     pub(crate) stopped_at: Option<u64>,
-    /// Time of the last start command. Cleared when the board shows that it has started.
+    /// Time of the last start command. The time is cleared when the board shows that it has started.
     pub(crate) starting_since: Option<u64>,
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
@@ -107,7 +107,8 @@ impl Board {
         self.info.map(|info| info.status)
     }
 
-    /// Returns `true` if the board sends its outputs. Its control loop then runs now, even if its last answer showed another state.
+    /// Returns `true` if the board sends its outputs. The outputs show that the control loop runs, even if the last answer of the board
+    /// showed another state.
     pub fn sends_outputs(&self, now: u64) -> bool {
         self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000)
     }

@@ -92,15 +92,16 @@ pub enum Event {
     },
     /// A frame is not of this protocol (D-02). Only the first frame of each kind is reported, but all are counted.
     Foreign(Foreign),
-    /// A competing master: another PC sent a frame (D-08), after at least one second without frames of another PC.
-    /// [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that sends all the time.
+    /// Another PC sent a frame and is therefore a competing master (D-08). The event is reported only after at least one second without
+    /// frames of another PC. [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that sends all the
+    /// time.
     CompetingMaster {
         /// Function of the frame.
         function: Function,
         /// Number that the frame was sent to.
         to: u8,
     },
-    /// Two boards have the same number (D-24). This is reported once until numbers are assigned again.
+    /// Two boards have the same number (D-24). The event is reported only once until numbers are assigned again.
     NumberShared {
         /// The number.
         board: u8,

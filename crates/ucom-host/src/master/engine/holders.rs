@@ -8,8 +8,8 @@ use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
-/// Number of consecutive questions that the same flash number must answer twice. A single double answer is not enough, because a gateway
-/// may double a frame now and then.
+/// Number of consecutive PC_INFO requests that the same flash number must answer twice. A single double answer is not enough, because a
+/// gateway may double a frame now and then.
 const TWICE: u32 = 3;
 /// Limit of flash numbers stored per number. Damaged answers may contain any flash number.
 const MOST: usize = 8;
@@ -33,14 +33,15 @@ pub(crate) struct Holders {
 struct Holder {
     /// Time of the last PC_INFO, µs.
     asked_at: Option<u64>,
-    /// Answers to the last PC_INFO: number of first frames by flash number, number of other frames, and number of other frames that one
-    /// answer has.
+    /// Counts of the answers to the last PC_INFO: first frames of each flash number, other frames, and other frames that one answer
+    /// contains.
     heads: BTreeMap<u16, u32>,
     packages: u32,
     of_one: Option<u32>,
-    /// Number of consecutive earlier questions that one flash number answered twice.
+    /// Number of consecutive earlier PC_INFO requests that one flash number answered twice.
     twice: u32,
-    /// Number of questions that each flash number answered, the flash number that answered last, and how often this changed.
+    /// Number of PC_INFO requests that each flash number answered, the flash number that answered last, and the number of changes of this
+    /// flash number.
     seen: BTreeMap<u16, u32>,
     last: Option<u16>,
     changes: u32,
@@ -49,7 +50,7 @@ struct Holder {
 }
 
 impl Holder {
-    /// Returns `true` if one flash number sent two complete answers to the last question.
+    /// Returns `true` if one flash number sent two complete answers to the last PC_INFO.
     fn answered_twice(&self) -> bool {
         let two = self.heads.len() == 1 && self.heads.values().all(|count| *count > 1);
         two && self.of_one.is_some_and(|of_one| self.packages >= 2 * of_one)
@@ -91,8 +92,8 @@ impl Holder {
     /// Returns the flash numbers of the boards that share the number, according to the answers received so far. The list is empty if no
     /// boards share it.
     ///
-    /// A single damaged answer is not mistaken for another board, and neither is a board that has replaced another one. If flash numbers
-    /// answer different questions, each must answer repeatedly, and they must alternate.
+    /// A single damaged answer, or a board that has replaced another board, is not mistaken for a shared number. If flash numbers answer
+    /// different PC_INFO requests, each flash number must answer repeatedly, and the flash numbers must alternate.
     fn sharing(&self) -> Vec<u16> {
         if self.heads.len() > 1 {
             return self.heads.keys().copied().collect();
@@ -116,7 +117,7 @@ pub(crate) enum Open {
     Wait(u64),
     /// No board has answered.
     Ask,
-    /// A flash number answered twice, so one more question is needed.
+    /// A flash number answered twice, so one more PC_INFO is needed.
     AskAgain,
 }
 
@@ -183,7 +184,7 @@ impl Holders {
         self.numbers.clear();
     }
 
-    /// Returns the lowest of these numbers that boards share. Each bit of `numbers` is a number.
+    /// Returns the lowest number in `numbers` that boards share. Each bit of `numbers` is a number.
     pub(crate) fn shared(&self, numbers: u32) -> Option<IdentityError> {
         let mine =
             |(number, holder): &(&u8, &Holder)| numbers >> **number & 1 == 1 && !holder.shared.is_empty();
@@ -202,8 +203,8 @@ impl Holders {
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// Returns the step that is missing for a number. All frames up to the time `received` have been delivered. Answers to questions older
-    /// than `oldest` µs are not accepted.
+    /// Returns the step that is missing for a number. All frames up to the time `received` have been delivered. Answers to PC_INFO requests
+    /// older than `oldest` µs are not accepted.
     pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
         match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {

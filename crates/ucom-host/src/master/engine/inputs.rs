@@ -7,7 +7,7 @@ use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
 /// Percentage of the bus that repeated inputs may use.
 const INPUTS_SHARE: u64 = 70;
-/// Longest delay of the repetitions that is caught up later, µs.
+/// Longest delay of the repetitions, in µs, for which the master later compensates.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
@@ -80,7 +80,7 @@ impl Core {
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
             data.ci_known.clear();
-            // The application may be another one now.
+            // The board may run another application now.
             data.sent = false;
         }
     }

@@ -1,8 +1,8 @@
 //! Actions of a procedure: sending, waiting for frames, sleeping.
 //!
-//! Procedures are `async` functions without an executor: the compiler turns each into a state machine, and
-//! [`Master`](crate::master::Master) advances it when a frame arrives or its time has come. A procedure can therefore be read as a sequence
-//! of steps. No lock is ever held during a wait.
+//! Procedures are `async` functions without an executor. The compiler turns each procedure into a state machine, and
+//! [`Master`](crate::master::Master) advances it when a frame arrives or a wait ends. A procedure can therefore be read as a sequence of
+//! steps. No lock is ever held during a wait.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use core::future::{Future, poll_fn};
@@ -55,20 +55,20 @@ impl Link {
         self.with(|core| core.event(Event::Note { id: self.id, text }));
     }
 
-    /// Sends a frame and waits until it has left.
+    /// Sends a frame and waits until the frame has left the queue.
     pub(crate) async fn send(&self, to: Sequence, message: ToBoard) {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Nothing));
         self.left(serial).await;
     }
 
-    /// Like [`Link::send`], but discards frames that were received before the frame left.
+    /// Like [`Link::send`], but discards frames that were received before the frame left the queue.
     pub(crate) async fn ask(&self, to: Sequence, message: ToBoard) {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::All));
         self.left(serial).await;
     }
 
-    /// Like [`Link::ask`], but keeps errors. This is for program data, because a board may report an error in the middle of a block.
-    /// Returns the time at which the frame left.
+    /// Like [`Link::ask`], but keeps errors. `feed` is for program data, because a board may report an error in the middle of a block.
+    /// Returns the time at which the frame left the queue.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
@@ -81,7 +81,7 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// Waits until all frames that any procedure has queued so far have left.
+    /// Waits until all frames that any procedure has queued so far have left the queue.
     pub(crate) async fn flush(&self) {
         let serial = self.with(|core| core.queued());
         self.left(serial).await;
@@ -91,7 +91,7 @@ impl Link {
         poll_fn(|_| if self.with(|core| core.left(serial)) { Poll::Ready(()) } else { Poll::Pending }).await;
     }
 
-    /// From now on, receives frames with these functions from these boards, and errors of these boards.
+    /// Sets the filter of the mailbox to these functions from these boards, and to errors of these boards.
     pub(crate) fn listen(&self, boards: u32, functions: &[Function]) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -106,7 +106,7 @@ impl Link {
         self.next_of(until, |mailbox| mailbox.received.pop_front()).await
     }
 
-    /// Waits until `take` returns a result for the mailbox; `None` if it does not before `until`.
+    /// Waits until `take` returns a result for the mailbox; returns `None` if `take` has no result before `until`.
     pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Mailbox) -> Option<T>) -> Option<T> {
         poll_fn(|_| {
             self.with(|core| {
@@ -163,7 +163,7 @@ impl Link {
         .await;
     }
 
-    /// Waits until no frame for this procedure has arrived for `us` µs, but at most 20 times as long.
+    /// Waits until no frame for this procedure has arrived for `us` µs, but at most for 20 times `us`.
     pub(crate) async fn quiet(&self, us: u64) {
         let limit = self.now() + 20 * us;
         while self.next((self.now() + us).min(limit)).await.is_some() {
@@ -190,7 +190,7 @@ impl Link {
                 let mut ended = gone.or(cancelled);
                 if ended.is_none() && !mailbox.bears_shared_numbers {
                     ended = core.holders.shared(mailbox.claims).map(Error::from);
-                    // The procedure now undoes its changes, which must not be ended for the same reason.
+                    // The procedure now undoes its changes. The reason that ended the procedure must not end this step.
                     mailbox.bears_shared_numbers = ended.is_some();
                 }
                 if ended.is_some() {
@@ -206,7 +206,7 @@ impl Link {
         .await
     }
 
-    /// Sets whether the procedure tolerates two boards with the same number from now on, or is ended.
+    /// Sets if the procedure tolerates two boards with the same number from now on, or ends.
     pub(crate) fn bear_shared_numbers(&self, bears: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {

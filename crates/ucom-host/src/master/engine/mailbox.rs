@@ -48,14 +48,14 @@ pub(crate) struct Mailbox {
     pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
-    /// `true` if two boards with the same number do not end the procedure. This is the case for a stop, for a step that undoes changes, and
-    /// for a procedure that checks numbers itself.
+    /// `true` if two boards with the same number do not end the procedure. The value is `true` for a stop, for a step that undoes changes,
+    /// and for a procedure that checks numbers itself.
     pub bears_shared_numbers: bool,
     /// Reason why frames can no longer be sent or received.
     pub bus_gone: Option<String>,
 }
 
-/// Received frames that a procedure discards when one of its frames leaves, because they cannot be answers to that frame.
+/// Received frames that a procedure discards when one of its frames leaves the queue, because they cannot be answers to that frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Forget {
     Nothing,

@@ -19,7 +19,7 @@ const MAX_EVENTS: usize = 4096;
 struct Outgoing {
     serial: u64,
     owner: Option<ProcedureId>,
-    /// Received frames that the owner discards when this frame leaves.
+    /// Received frames that the owner discards when this frame leaves the queue.
     forget: Forget,
     what: What,
 }
@@ -37,7 +37,7 @@ enum What {
 /// Role of this PC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Session {
-    /// The PC only listens and asks questions.
+    /// The PC only listens and sends queries.
     Quiet,
     /// The PC sends heartbeats.
     Master { next_alive: u64 },
@@ -51,12 +51,12 @@ pub(crate) struct Core {
     /// Time at which waits end: the time of the last `poll`. The caller has then delivered all frames received before. If the caller is
     /// late, frames received between this time and `now` are not delivered yet.
     pub fired: u64,
-    /// Time that has certainly passed between received frames: the sum of the times from a last frame to the next `poll`. If the caller
-    /// delivers simultaneous frames late, this adds no time, so it causes no gap in a string.
+    /// Time that has certainly passed between received frames: the sum of the times from a last frame to the next `poll`. Simultaneous
+    /// frames that the caller delivers late do not increase this time, so they do not cause a gap in a string.
     pub passed: u64,
     /// Time at which the last frame was delivered.
     handed_over: u64,
-    /// Time since when this PC has listened to the bus.
+    /// Time at which this PC started to listen to the bus.
     pub since: Option<u64>,
     pub session: Session,
     /// Last frame of another PC.
@@ -80,7 +80,7 @@ pub(crate) struct Core {
     waiting_inputs: BTreeSet<(u8, u16)>,
     queued: u64,
     sent: u64,
-    /// Time at which the last frame of a procedure left.
+    /// Time at which the last frame of a procedure left the queue.
     pub sent_at: u64,
     events: VecDeque<Event>,
     dropped: u64,
@@ -141,12 +141,12 @@ impl Core {
         event
     }
 
-    /// Queues a frame ahead of all others. For heartbeats and stops.
+    /// Queues a frame ahead of all others. Used for heartbeats and stops.
     pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
 
-    /// Queues a frame. Returns its serial number for [`Core::left`].
+    /// Queues a frame. Queues a frame. Returns the serial number of the frame for [`Core::left`].
     pub(crate) fn queue(
         &mut self,
         owner: Option<ProcedureId>,
@@ -179,7 +179,7 @@ impl Core {
         self.queued
     }
 
-    /// Returns `true` if the frame with this serial number has left.
+    /// Returns `true` if the frame with this serial number has left the queue.
     pub(crate) fn left(&self, serial: u64) -> bool {
         self.sent >= serial
     }

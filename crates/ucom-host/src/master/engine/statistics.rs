@@ -9,10 +9,10 @@ pub const WINDOW_US: u64 = 1_000_000;
 const SLOTS: usize = 10;
 const SLOT_US: u64 = WINDOW_US / SLOTS as u64;
 
-/// Rate: the sum of the amounts in the last second.
+/// Rate, computed as the sum of the amounts in the last second.
 #[derive(Clone, Debug, Default)]
 pub struct Rate {
-    /// Slots with their number and sum.
+    /// Time slots, each with its number and sum.
     slots: VecDeque<(u64, u64)>,
 }
 
@@ -71,7 +71,7 @@ impl Statistics {
         self.boards.entry(number).or_default().add(now, 1);
     }
 
-    /// Counts a foreign frame. Returns `true` if it is the first of its kind.
+    /// Counts a foreign frame. Returns `true` if the frame is the first of its kind.
     pub(crate) fn foreign(&mut self, now: u64, foreign: Foreign) -> bool {
         self.bits.add(now, frame_bits(8));
         if let Some((_, count)) = self.foreign.iter_mut().find(|(kind, _)| *kind == foreign) {

@@ -25,7 +25,7 @@ impl Core {
         {
             self.send_alive();
             let period = self.times.alive_pc;
-            // If the caller paused for a long time, the period begins again; missed heartbeats are not sent.
+            // If the caller paused for a long time, a new period begins; missed heartbeats are not sent.
             let next = if now - next_alive >= period { now + period } else { next_alive + period };
             self.session = Session::Master { next_alive: next };
         }
@@ -33,7 +33,7 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // The age is not computed up to `now`, because the caller may not have delivered the heartbeat yet.
+            // The age is not computed up to `now`, because the caller may have received a heartbeat that it has not delivered yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
@@ -252,7 +252,7 @@ impl Core {
                     self.event(Event::Debug { board: from, text });
                 }
             }
-            // After PC_START this frame is an answer. Otherwise it does not mean anything (D-30).
+            // After PC_START, this frame is the answer of the board. At other times, the frame has no meaning (D-30).
             FromBoard::McaReady => {
                 let board = self.boards.of(from);
                 board.ready_count += 1;

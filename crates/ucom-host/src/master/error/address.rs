@@ -17,7 +17,7 @@ pub enum AddressError {
         /// Number in the data.
         data: u8,
     },
-    /// The first board of the chain does not answer and could take the number.
+    /// The first board of the chain does not answer, and could take the number of another board.
     #[error("board {other} does not answer; if it has no number, it would take number {board}")]
     MayTakeNumber {
         /// Number to be assigned.
@@ -25,7 +25,8 @@ pub enum AddressError {
         /// The first board.
         other: u8,
     },
-    /// The boards that report are not the boards that have a number. A new address assignment could give boards other numbers than before.
+    /// The boards that report differ from the boards that have a number. A new address assignment could give boards other numbers than
+    /// before.
     #[error(
         "boards that report: {reports}, boards with a number: {boards}; these counts must be equal, and \
          each flash id must be unique"

@@ -160,7 +160,7 @@ pub enum Incomplete {
         /// Number of the string, from 0.
         string: u32,
     },
-    /// There are more frames than the announced totals.
+    /// The answer contains more frames than its totals announce.
     #[error("the board sent more frames than it had announced")]
     Surplus,
     /// The answer announces more strings than possible.

@@ -33,7 +33,7 @@ pub enum IdentityError {
         /// Byte order of the profile.
         endian: Endian,
     },
-    /// Two boards have the same number, so both carry out every command to it.
+    /// Two boards have the same number, so both boards carry out every command to this number.
     #[error(
         "two boards answer to number {board}: {}{}",
         Sharing(found),
@@ -42,9 +42,10 @@ pub enum IdentityError {
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash numbers of the boards that answered to it. The list has the same number twice if the boards cannot be distinguished.
+        /// Flash numbers of the boards that answered to this number. The list has the same number twice if the boards cannot be
+        /// distinguished.
         found: Vec<u16>,
-        /// `true` if the number was withdrawn and no board answers to it any more.
+        /// `true` if the number was withdrawn and no board answers to this number any more.
         given_back: bool,
     },
 }

@@ -2,7 +2,7 @@
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::profile::Plan;
 
-/// Reasons why it is not clear which boards an update is for.
+/// Reasons why the selection of boards for an update is not clear.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
     /// No board is selected.
@@ -42,7 +42,7 @@ pub enum PlanError {
         /// Program ID that the user expects.
         expected: u16,
     },
-    /// Program ID and date have the values that mean "no application".
+    /// Program ID and date have the values that stand for "no application".
     #[error("Program ID 0xFFFF with date 0xFFFF means `no application`: choose another date")]
     Void,
     /// The plan and the second image do not match.

@@ -9,7 +9,7 @@ use crate::master::error::signal::SignalError;
 use crate::master::error::status::StatusError;
 use host_kit::{Diagnose, Diagnosis, Facts};
 
-/// Reasons why a procedure failed. A failed update gives a report instead; its kind of failure is
+/// Reasons why a procedure failed. A failed update returns a report instead; the kind of failure is in
 /// [`UpdateReport::failure`](crate::master::update::UpdateReport::failure).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(transparent)]
@@ -27,7 +27,7 @@ pub enum Error {
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
-    /// The request does not show which boards the update is for.
+    /// The request does not show which boards the update must write.
     Target(#[from] TargetError),
     /// An update cannot be planned.
     Plan(#[from] PlanError),
@@ -85,7 +85,7 @@ impl Diagnose for Error {
     }
 }
 
-/// Returns the facts about some boards. If there is exactly one board, the facts contain it.
+/// Returns the facts about some boards. For exactly one board, the facts contain its number.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

@@ -33,9 +33,9 @@ impl Kind {
 pub struct DescriptionKey {
     /// Flash number of the board.
     pub flash_number: u16,
-    /// Checksum of its program.
+    /// Checksum of the board's program.
     pub program_id: u16,
-    /// Date of the program in its 16-bit form.
+    /// Date of the program as a 16-bit word.
     pub date: u16,
 }
 
@@ -46,7 +46,7 @@ impl DescriptionKey {
     }
 }
 
-/// The description that an application sends of itself and of every signal. The description is stored under a [`DescriptionKey`].
+/// Description that an application sends about itself and about every signal. The description is stored under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
     /// Text about the application. The text may differ from the board's own description in DSP_INFO.
@@ -90,7 +90,7 @@ impl IoDescription {
         if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
             return Ok(index);
         }
-        // Units in brackets do not make names less similar.
+        // Units in brackets do not reduce the similarity of names.
         let like = |n: &str| similarity(n, name).max(similarity(short(n), name));
         let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
         near.retain(|(similarity, _)| *similarity > 0.6);

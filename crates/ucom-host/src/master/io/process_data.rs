@@ -1,4 +1,4 @@
-//! The known contents of a board's buffers.
+//! Known contents of a board's buffers.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ pub(crate) struct ProcessData {
     pub sent: bool,
     /// Values of the inputs that were set last.
     pub ci: Vec<u16>,
-    /// Indices in `ci` that were set or read since the application started. The other values are not known.
+    /// Indices, in `ci`, of the inputs that were set or read since the application started. The other values are not known.
     pub ci_known: BTreeSet<u16>,
     /// Time of the next repetition; `None` if the inputs are not repeated.
     pub repeat: Option<u64>,

@@ -1,4 +1,4 @@
-//! Parameters that this PC assumes for a board. The protocol has no way to read them back (D-35).
+//! Parameters that this PC assumes for a board. The protocol does not allow parameters to be read back (D-35).
 /// A parameter's value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ParValue {

@@ -16,7 +16,7 @@ pub struct Snapshot {
 #[derive(Clone, Debug, Default)]
 pub struct SnapshotAssembler {
     words: Vec<u16>,
-    /// Offset of the next expected package; `None`: a package with offset 0 is expected.
+    /// Offset of the next expected package; `None` if a package with offset 0 is expected.
     next: Option<u16>,
     incomplete_now: u64,
     /// Number of incomplete snapshots.
@@ -88,7 +88,7 @@ mod tests {
         Packages::new(&words).collect()
     }
 
-    /// D-33: incomplete snapshots are not reported. The next complete snapshot contains their number.
+    /// D-33: incomplete snapshots are not reported. The next complete snapshot contains the number of incomplete snapshots.
     #[test]
     fn d33_gaps_are_counted_and_never_shown() {
         for lost in 0..3 {
@@ -99,7 +99,7 @@ mod tests {
             let whole: Vec<_> = packages(200).iter().filter_map(|p| assembler.push(5, p)).collect();
             assert_eq!(whole.len(), 1);
             assert_eq!(whole[0].words, (200..208).collect::<Vec<u16>>());
-            // A lost first package cannot be distinguished from a start in the middle.
+            // If the first package is lost, the assembler cannot distinguish this from a start in the middle of a snapshot.
             assert_eq!(whole[0].incomplete_before, u64::from(lost > 0));
         }
     }

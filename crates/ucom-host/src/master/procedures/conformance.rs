@@ -1,8 +1,8 @@
 //! Acceptance tests for real boards. The tests check that boards follow the protocol page.
 //!
-//! By default the tests only ask questions, which change nothing. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions)
-//! can allow more: a new address assignment, running applications with safe outputs, programming. Each test exchanges a few frames that it
-//! builds itself, so the procedures of this crate are not used to check themselves.
+//! By default, the tests only send queries, which change nothing. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions)
+//! can allow three more kinds of test: a new address assignment, running applications with safe outputs, and programming. Each test builds
+//! its few frames itself, so the procedures of this crate do not check themselves.
 
 mod application;
 mod ask;

@@ -56,7 +56,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         match numbers(link, board).await {
             Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
-                // The board can no longer answer, so the returned status is the one that the rules require (D-22).
+                // The board can no longer answer. Therefore the function returns the status that the rules require (D-22).
                 let status = expected_status(&before, mask.0, value.0);
                 return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
             }
@@ -98,14 +98,15 @@ pub(crate) async fn wait_status(
     }
 }
 
-/// Sends PC_RESET to one board or to all boards, and returns the reports. The command is never repeated; the user decides about that.
+/// Sends PC_RESET to one board or to all boards, and returns the reports. The command is never repeated automatically; only the user may
+/// repeat it.
 pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<Outcome, Error> {
     let to = match board {
         Some(board) => link.board(board)?,
         None => link.broadcast_number(),
     };
     link.become_master(force).await?;
-    // Checks that the board exists. Without this check, a reset of a board that does not exist would look like a reset without an answer.
+    // Checks that the board exists. Without this check, the reset of a missing board would look like a reset that no board confirmed.
     let before = match board {
         Some(board) => {
             let before = confirmed(&link, board).await?.info;
@@ -137,7 +138,7 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
     Ok(Outcome::Reset(reports))
 }
 
-/// Checks that a board was reset: it has reported and has no number any more. If its report was lost, asks for another report.
+/// Checks that a board was reset: it has reported, and it no longer has a number. If the report was lost, requests another report.
 async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Reports) -> Result<(), Error> {
     let since = link.now().saturating_sub(link.times().report_window);
     let ucom_id = before.flash_number as u8;
@@ -179,9 +180,9 @@ pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome
     Ok(Outcome::Status { board, info })
 }
 
-/// Sends PC_XRESET, waits, and polls PC_INFO until the exloader runs. If PROG is then not set, sets it with PC_SETSTATUS (U-4).
+/// Sends PC_XRESET, waits, and polls PC_INFO until the exloader runs. If PROG is still not set, sets PROG with PC_SETSTATUS (U-4).
 ///
-/// If the board no longer answers and its flash number is known, the board is repaired. If another board answers instead, it is refused.
+/// If the board no longer answers and its flash number is known, repairs the board. If another board answers instead, returns an error.
 pub(crate) async fn enter_exloader(
     link: &Link,
     board: u8,
@@ -196,7 +197,7 @@ pub(crate) async fn enter_exloader(
         (result, _) => result?,
     };
     if let Some(wanted) = flash_number.filter(|wanted| *wanted != info.flash_number) {
-        // A single damaged answer must not be mistaken for another board.
+        // A single damaged answer must not be interpreted as another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -217,7 +218,7 @@ async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, 
 }
 
 /// Sends PC_XRESET until the board executes it. The command has no answer. If a board answers PC_INFO from its application, it did not
-/// receive the command. If it is silent, it is rebooting or has lost its number, and gets no further PC_XRESET.
+/// receive the command. If the board is silent, it is rebooting or has lost its number, and gets no further PC_XRESET.
 async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     let soon = EXLOADER_WAIT / 3;
@@ -244,7 +245,8 @@ async fn send_xreset(link: &Link, to: Sequence) {
     link.sleep(link.times().xreset_wait).await;
 }
 
-/// Sends PC_START and waits until the application is up. This is shown by MCA_DSP_READY, or by MSTART in the answer to PC_INFO (D-30).
+/// Sends PC_START and waits until the application runs. MCA_DSP_READY, or MSTART in the answer to PC_INFO, shows that the application runs
+/// (D-30).
 pub(crate) async fn start_application(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     let before = info(link, board).await?;
     start_from(link, before).await
@@ -263,7 +265,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
-        // This is set before the frame leaves, so that a cancel takes the start into account.
+        // The start is recorded before the frame leaves the queue, so that a cancel considers it.
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
@@ -279,7 +281,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                     }
                     .into());
                 }
-                // Errors caused by a bad bus are only to be logged. The last one is returned if all attempts fail.
+                // Errors that a bad bus causes are only logged. If all attempts fail, the last error is returned.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }
@@ -307,7 +309,7 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// Returns the flags before a change: those that the board sent last. If the board has sent none, derives them from the status, with the
+/// Returns the flags before a change, as the board sent them last. If the board has not sent flags, derives them from the status, with the
 /// outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
@@ -328,7 +330,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }))
 }
 
-/// Changes the flags: reads, modifies and writes them.
+/// Reads, modifies and writes the flags.
 pub(crate) async fn change_flags(link: &Link, board: u8, change: AdminChange) -> Result<Admin, Error> {
     let wanted = change.apply(flags(link, board, change.only_ends()).await?);
     admin(link, board, wanted).await

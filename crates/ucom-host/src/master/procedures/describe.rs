@@ -1,5 +1,5 @@
 //! Reading of descriptions and initial inputs. A request has no side effect and is sent at most three times. An answer is accepted only if
-//! its totals are right (D-14).
+//! its totals are correct (D-14).
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, Incomplete, SignalError};
 use crate::master::io::{DescriptionKey, IoDescription, SnapshotAssembler};
@@ -10,10 +10,10 @@ use ucom::{
     Assembled, BoardInfo, Dimensions, FromBoard, Function, Payload, Status, StringAssembler, ToBoard,
 };
 
-/// Limit of strings that a description may announce. A bus could not carry more signals.
+/// Limit of strings that a description may announce. A bus could not carry the data of more signals.
 const MAX_STRINGS: u32 = 4096;
 
-/// The received parts of one answer.
+/// Received parts of one answer.
 struct Collector {
     dimensions: Option<Dimensions>,
     strings: Vec<String>,
@@ -62,7 +62,7 @@ impl Collector {
         Incomplete::Silence { complete: self.strings.len() as u32, of }
     }
 
-    /// Returns the problem of the answer. If the byte order is probably wrong, returns that as the problem.
+    /// Returns the problem of the answer. If the byte order is probably wrong, returns this as the problem.
     fn problem(&self, problem: Incomplete) -> Incomplete {
         let exchanged = |d: &Dimensions| {
             let all = [d.ci, d.so, d.par];
@@ -83,7 +83,7 @@ impl Collector {
     }
 }
 
-/// Sends the request once. `None`: no frame arrived.
+/// Sends the request once. Returns `None` if no frame arrived.
 async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescription, Incomplete>>, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::DumpIo).await;
@@ -102,7 +102,7 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
                 if let Err(problem) = collector.push(received.at, &payload, link) {
                     return Ok(Some(Err(collector.problem(problem))));
                 }
-                // A surplus frame would follow immediately.
+                // An additional frame would follow immediately.
                 until = link.now() + if collector.done() { times.quiet } else { times.gap };
             }
             message => {
@@ -138,8 +138,8 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
 
 /// Returns the description of a board whose application runs. The board must have sent it since the application started.
 ///
-/// A description that is only stored for this Program ID and date (D-36) may belong to another application, so its names are not used to
-/// write values.
+/// A description that is only stored for this Program ID and date (D-36) may belong to another application. Therefore its names are not
+/// used to write values.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
     let key = DescriptionKey::of(known);
     let kept = link.with(|core| {
@@ -185,11 +185,11 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         if tries > 0 {
             link.quiet(times.gap).await;
         }
-        // The attempts are independent of each other, because a board may change its values.
+        // The attempts are independent of one another, because a board may change its values between them.
         let mut words = vec![0; dimension.into()];
         let mut seen = vec![false; packages as usize];
         link.ask(to, ToBoard::DumpCi).await;
-        // The time is limited, even if a board repeats its frames for ever.
+        // The time is limited, even if a board repeats its frames endlessly.
         let limit = link.now() + times.gap * u64::from(packages + 1);
         while missing_packages(&seen) > 0
             && let Some(received) = link.next((link.now() + times.gap).min(limit)).await

@@ -1,10 +1,10 @@
-//! The requests that procedures use, each with a limited number of repetitions.
+//! Requests that procedures use, each with a limited number of repetitions.
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, IdentityError, Incomplete, StatusError};
 use crate::master::reports::BoardSeen;
 use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
 
-/// Number of times that a request is sent at most. Only requests whose repetition has no further effect are repeated.
+/// Maximum number of times that a request is sent. Only requests whose repetition has no further effect are repeated.
 pub(crate) const TRIES: u32 = 3;
 
 /// Result of one PC_INFO.
@@ -14,7 +14,7 @@ pub(crate) enum Answer {
     Silence,
     /// The frames were not a valid answer.
     Broken(Incomplete),
-    /// The values of the first frame. The description is included only if it was complete.
+    /// Values of the first frame. The description is included only if it was complete.
     Info(BoardInfo, Option<String>),
 }
 
@@ -28,7 +28,7 @@ pub(crate) struct InfoCollector {
 }
 
 impl InfoCollector {
-    /// Handles a frame. `Err`: the frame does not belong to an answer.
+    /// Handles a frame. `Err` if the frame does not belong to an answer.
     pub(crate) fn push(&mut self, at: u64, payload: &Payload, link: &Link) -> Result<(), Incomplete> {
         let profile = link.profile();
         if self.info.is_none() {
@@ -58,7 +58,7 @@ impl InfoCollector {
     }
 }
 
-/// Sends a single PC_INFO. The mailbox must listen to DSP_INFO.
+/// Sends a single PC_INFO. The mailbox must accept DSP_INFO.
 pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::Info).await;
@@ -119,10 +119,10 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
     });
 }
 
-/// Sends PC_INFO and reads the answer with the description. Tries up to three times.
+/// Sends PC_INFO and reads the answer with the description. Makes at most three attempts.
 ///
-/// If the description is never complete, the values of the first frame are returned without it. If an answer contains another number, the
-/// board is asked again. If the same wrong number comes again, the procedure ends at once with an error (D-24).
+/// If the description is never complete, returns the values of the first frame without it. If an answer contains another number, the
+/// request is sent again. If the next answer contains this wrong number too, the procedure ends at once with an error (D-24).
 pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     info_for(link, board, true).await
 }
@@ -139,7 +139,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     let mut mismatch = None;
     for tries in 0..TRIES {
         if tries > 0 {
-            // The remainder of a truncated answer must not mix with the next answer.
+            // The remaining frames of a truncated answer must not mix with the next answer.
             link.quiet(link.times().gap).await;
         }
         match ask_info(link, board).await {
@@ -149,7 +149,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Info(info, _)) => numbers = Some(info),
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
-            // A single damaged frame may contain anything, so the board is asked again.
+            // A single damaged frame may contain any values, so the request is sent again.
             Err(e @ Error::Identity(IdentityError::WrongSequence { .. }))
                 if mismatch.as_ref() != Some(&e) =>
             {
@@ -171,7 +171,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     }
 }
 
-/// Reads a board until two consecutive answers agree, so that one damaged answer is never mistaken for another board.
+/// Reads a board until two consecutive answers agree. Therefore one damaged answer is never mistaken for another board.
 pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     let mut first = info(link, board).await?;
     for _ in 0..TRIES {
@@ -191,8 +191,8 @@ pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
     (info.flash_number, info.program_id, info.date)
 }
 
-/// Sends PC_SETSTATUS and reads the status back with PC_INFO. Repeats both if the board did not execute the command (D-22). Value bits
-/// outside the mask are never sent.
+/// Sends PC_SETSTATUS and reads the status back with PC_INFO. Repeats the command and the query if the board did not execute the command
+/// (D-22). Value bits that are outside the mask are never sent.
 pub(crate) async fn set_status(
     link: &Link,
     board: u8,
@@ -227,8 +227,8 @@ pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
-/// Sends a request that is answered with flags. An error from the board does not end the exchange: errors caused by a bad bus are only to
-/// be logged, and come just when the request itself was lost. The error is returned if all attempts fail.
+/// Sends a request that is answered with flags. An error from the board does not end the exchange. A bad bus can cause such errors, and
+/// they often come when the request itself was lost. If all attempts fail, the error is returned.
 async fn ask_admin(
     link: &Link,
     board: u8,
@@ -246,7 +246,7 @@ async fn ask_admin(
         while let Some(received) = link.next(until).await {
             match received.message {
                 FromBoard::Admin(is) if taken(is) => return Ok(is),
-                // The board sent these flags by itself before it received the request.
+                // The board sent these flags without a request, before it received the request.
                 FromBoard::Admin(is) => other = Some(is),
                 message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
             }

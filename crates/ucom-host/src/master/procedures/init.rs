@@ -1,8 +1,8 @@
 //! Assigns numbers to the boards of a chain, in the order of the wire (section on initialisation: D-21, D-24).
 //!
-//! PC_INIT(n) is taken by the board that has no number and whose incoming pin is active. After this PC has confirmed the number, it raises
-//! the board's outgoing pin, which enables the next board. PC_INIT is repeated only after a PC_INFO. Otherwise, if a board raises its pin
-//! by itself, the next board would take the same number.
+//! The board that has no number and whose incoming pin is active takes PC_INIT(n). After this PC has confirmed the number, it switches on
+//! the board's outgoing pin, which enables the next board. PC_INIT is repeated only after a PC_INFO. Without this query, the next board
+//! would take the same number if a board switches on its pin by itself.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -41,8 +41,8 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
     Ok(Outcome::Init(report))
 }
 
-/// Stops boards that did not receive the reset. Such a board has kept its number and continues to run, but this PC does not repeat its
-/// inputs any more.
+/// Stops boards that did not receive the reset. Such a board has kept its number and continues to run, but this PC no longer repeats its
+/// inputs.
 async fn stop_unreset(link: &Link, report: &mut InitReport) {
     for seen in report.boards.iter_mut().filter(|seen| runs_on(seen.info.status)) {
         let stopped = stop_board(link, seen.number, StopLevel::Application).await;
@@ -59,7 +59,7 @@ fn runs_on(status: Status) -> bool {
     status.has(Status::MCARUN) || (status.has(Status::MSTART) && !status.has(Status::ASTART))
 }
 
-/// Sends PC_RESET to all boards and collects their reports. If boards are present but none has reported, the reset was lost and is
+/// Sends PC_RESET to all boards and collects their reports. If boards exist but none of them has reported, the reset was lost and is
 /// repeated.
 async fn reset_all(link: &Link, reports: &mut Reports) {
     for _ in 0..2 {
@@ -82,14 +82,15 @@ async fn reset_all(link: &Link, reports: &mut Reports) {
     }
 }
 
-/// Assigns a number to the next board of the chain; `None` if no board took it.
+/// Assigns a number to the next board of the chain; returns `None` if no board took the number.
 async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error> {
     if !take_number(link, number, false).await? {
         return Ok(None);
     }
     let seen = info(link, number).await?;
     one_board_each(link, &[number]).await?;
-    // The pin is also raised if the board reports that it has already done so. This is harmless, and the status must be read back anyway.
+    // The pin is also switched on if the board reports that its pin is already on. The additional command is harmless, and the status must
+    // be read back in any case.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {
         // Either an answer was damaged, or two boards have this number.
@@ -103,7 +104,7 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
     let low = |seen: &BoardSeen| seen.info.flash_number as u8;
     let reached: BTreeSet<u8> = report.boards.iter().map(low).collect();
     if reached != report.reports.ids {
-        // A report may have been lost, so the boards are asked again.
+        // A report may have been lost, so reports are requested again.
         ask_reports(link, &mut report.reports).await;
     }
     if exchanged(&report.reports, &flash_numbers(&report.boards)) {

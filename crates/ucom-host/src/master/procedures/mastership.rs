@@ -5,8 +5,8 @@ use crate::master::procedures::exchange::numbers;
 use ucom::Function;
 
 impl Link {
-    /// Becomes master before the first command that changes something (D-08). Listens for another master, then sends ALIVE until the
-    /// session ends.
+    /// Makes this PC the master before the first command that changes something (D-08). Listens for another master, then sends ALIVE until
+    /// the session ends.
     pub(crate) async fn become_master(&self, force: bool) -> Result<(), Error> {
         self.look_for_master(force).await?;
         self.with(|core| {
@@ -22,14 +22,14 @@ impl Link {
         self.with(|core| core.session != Session::Quiet)
     }
 
-    /// Waits until this PC has listened to the bus for `master.listen`. Returns an error if it received a frame of another PC in that time
-    /// (D-08). Does nothing if this PC already is the master or if `force` is set.
+    /// Waits until this PC has listened to the bus for `master.listen`. Returns an error if it received a frame of another PC during this
+    /// time (D-08). Does nothing if this PC is already the master or if `force` is set.
     pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
         let already = self.with(|core| core.session != Session::Quiet);
         if !already && !force {
             let (since, listen, now) =
                 self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
-            // Time before the command is included if this PC has listened to the bus.
+            // The listening time includes the time before the command.
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }
@@ -53,7 +53,7 @@ impl Link {
 
     /// Reports heartbeats of another PC. A heartbeat with the number of a board may come from the board, or from another PC that sends it
     /// only to this board. The status of the board decides: a board that is not started sends no heartbeats. If the board does not answer,
-    /// the heartbeat is assumed to be its own.
+    /// the heartbeat is assumed to come from the board.
     async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);

@@ -8,17 +8,17 @@ use ucom::{Function, ToBoard};
 
 /// Maximum age of an answer to PC_INFO that still shows which board has a number, µs.
 const FRESH: u64 = 2_000 * MS;
-/// Time between two questions in µs. The pause keeps the answers of 31 boards from arriving as one burst.
+/// Time between two PC_INFO requests in µs. Because of this pause, the answers of 31 boards do not arrive as one burst.
 const SPACING: u64 = 2 * MS;
 
-/// Checks that each of these numbers belongs to only one board: no other board answers PC_INFO within the allowed time. A number to which
-/// no board answers is not an error.
+/// Checks that each of the given numbers belongs to only one board, so no other board answers PC_INFO within the allowed time. A number to
+/// which no board answers is not an error.
 pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), IdentityError> {
     let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
         let patience = link.times().info;
-        // After the first wait, answers of any age are accepted: an old answer then only means that the driver is late.
+        // After the first wait, answers of any age are accepted, because an old answer then only means that the driver is late.
         let oldest = if round == 0 { FRESH } else { u64::MAX };
         let mut until = None;
         let mut ask = Vec::new();
@@ -72,7 +72,7 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Identit
     link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
 }
 
-/// Waits until the last questions to these boards can no longer be answered, because a board that shares a number may answer late. Each bit
+/// Waits until the last PC_INFO to these boards can no longer be answered, because a board that shares a number may answer late. Each bit
 /// of `boards` is a board.
 pub(crate) async fn last_answers(link: &Link, boards: u32) {
     let patience = link.times().info;
@@ -81,7 +81,7 @@ pub(crate) async fn last_answers(link: &Link, boards: u32) {
     }
 }
 
-/// Waits until the time `until`, and until an answer in progress has ended.
+/// Waits until the time `until`, and until an answer that is being received has ended.
 async fn out_of_words(link: &Link, mut until: u64) {
     let (gap, limit) = (link.times().gap, until + 20 * link.times().gap);
     while link.next(until).await.is_some() && link.now() < limit {

@@ -1,8 +1,9 @@
-//! Gives a board its lost number back while the other boards keep theirs (section on initialisation: D-21, D-24).
+//! Assigns a lost number to its board again while the other boards keep their numbers (section on initialisation: D-21, D-24).
 //!
-//! PC_INIT(n) is taken by *every* board that has no number and whose incoming pin is active. At that moment only the outgoing pin of the
-//! board before n may be on. The incoming pin of the first board is always active, so the first board must have its number. Other pins may
-//! stay low, for example after a cancel. This does no harm: only PC_INIT depends on them, and a repair raises the pin that it needs.
+//! *Every* board that has no number and whose incoming pin is active takes PC_INIT(n). Therefore only the outgoing pin of the board before
+//! n may be on at that moment. The incoming pin of the first board is always active, so the first board must have its number. Other pins
+//! may stay off, for example after a cancel. Pins that are off do no harm: only PC_INIT depends on them, and a repair switches on the pin
+//! that it needs.
 
 use crate::master::engine::{Link, MS, head};
 use crate::master::error::{AddressError, Error, IdentityError};
@@ -17,12 +18,12 @@ use ucom::{FromBoard, Function, Sequence, Status, ToBoard};
 /// Limit of rounds in which PC_INFO is sent to find the boards with a number.
 const ROUNDS: u32 = 6;
 
-/// Gives board `number` its number back if the board no longer answers. Returns an error if the board has another flash number, or if
-/// another board has taken the number as well.
+/// Assigns the number `number` to its board again if the board no longer answers. Returns an error if the board has another flash number,
+/// or if another board has taken the number as well.
 pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
     link.board(number)?;
     let mut lowered = Vec::new();
-    // If two boards take the number, the steps below detect this and take the number from both.
+    // If two boards take the number, the steps below detect this and remove the number from both boards.
     link.bear_shared_numbers(true);
     let given = give(link, number, flash_number, &mut lowered).await;
     for board in lowered {
@@ -36,7 +37,7 @@ pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result
     Ok(BoardSeen { info: raised, ..seen })
 }
 
-/// Gives the number to the intended board only. Boards whose pin was on and is switched off here are added to `lowered`.
+/// Assigns the number to the intended board only. Boards whose pin was on and is switched off here are added to `lowered`.
 async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>) -> Result<BoardSeen, Error> {
     let since = link.now();
     only_its_pin(link, number, lowered).await?;
@@ -50,7 +51,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             Err(shared) => Err(given_back(link, number, shared.into()).await?),
         },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
-        // A wrong board must not keep the number. Otherwise the next command would reach that board.
+        // A wrong board must lose the number. Otherwise the next command would reach that board.
         [other] => {
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give up number {number}"));
@@ -67,15 +68,15 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
 
 /// Switches off all outgoing pins except the pin of the board before `number`, which must be on.
 ///
-/// The command is sent to every number three times, even if no board answers, because a board may work although its answers are lost. The
-/// status of boards that answer is read back.
+/// The command is sent to every number three times, even if no board answers: a board may work although its answers are lost. The status of
+/// boards that answer is read back.
 async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let before = statuses(link, &numbers).await;
     let first = numbers.first().map_or(number, |n| n.number());
     let feeder = (number > first).then(|| number - 1);
     if let Some(feeder) = feeder {
-        // The board before keeps its pin on only if it has a number. Without that pin no board could take this number.
+        // The pin of the board before `number` stays on only if that board has a number. Without that pin no board could take this number.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
             return Err(AddressError::MayTakeNumber { board: number, other: first }.into());
@@ -92,7 +93,7 @@ async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<
     }
     for (board, status) in statuses(link, &others).await {
         if !status.is_ok_and(|status| !status.has(Status::OPINIT)) {
-            // This makes three more attempts and reads the status back each time. If they fail, the repair ends.
+            // The function makes three more attempts and reads the status back each time. If all attempts fail, the repair ends.
             set_status(link, board, Status::OPINIT, Status(0)).await?;
         }
     }
@@ -115,7 +116,7 @@ async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(seen.into_iter().filter(|(_, times)| *times > 1).map(|(flash_number, _)| flash_number).collect())
 }
 
-/// Sends one PC_INFO. Returns the flash numbers of all answers to it, not only of the first one.
+/// Sends one PC_INFO. Returns the flash numbers in all answers to this number, not only in the first answer.
 async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
     link.listen(1 << number, &[Function::DspInfo]);
@@ -137,14 +138,14 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(found)
 }
 
-/// Takes a number from both boards that have it.
+/// Removes a number from both boards that have it.
 pub(crate) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
     let Error::Identity(IdentityError::NumberShared { board, found, .. }) = error else { return Ok(error) };
     let given_back = take_back(link, number).await?;
     Ok(Error::Identity(IdentityError::NumberShared { board, found, given_back }))
 }
 
-/// Takes a number from its board. Returns `true` if no board answers to the number afterwards.
+/// Removes a number from its board. Returns `true` if no board answers to the number after the removal.
 async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
     let to = link.board(number)?;
     for _ in 0..TRIES {
@@ -171,7 +172,7 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The board works. Only its outgoing pin must be on, so only the pin is set.
+        // The board works. Only the outgoing pin of this board must be on, so the command sets only the pin.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

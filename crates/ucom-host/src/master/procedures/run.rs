@@ -1,5 +1,5 @@
-//! Brings a board to a running control loop, in the order of the protocol: description, initial inputs, inputs, parameters, heartbeats,
-//! loop, outputs.
+//! Starts the control loop of a board in the order of the protocol: description, initial inputs, inputs, parameters, heartbeats, loop,
+//! outputs.
 
 use crate::master::engine::{Core, Life, Link};
 use crate::master::error::{Error, MasterError, RunningError, SignalError};
@@ -59,7 +59,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         link.board(plan.board)?;
     }
     link.become_master(options.force).await?;
-    // Checks that can refuse the run (names, load) come first, if their data are known before a board is started.
+    // Checks that can refuse the command (names, load) come first, if their data are known before a board is started.
     let mut found = Vec::new();
     let mut described = BTreeMap::new();
     for plan in &options.boards {
@@ -71,7 +71,8 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
     }
     one_board_each(link, &options.boards.iter().map(|plan| plan.board).collect::<Vec<_>>()).await?;
     for (plan, seen) in options.boards.iter().zip(found) {
-        // If the run fails, a board that did not run before is stopped to its previous state. A board that was running is not stopped.
+        // If the procedure fails, each board that did not run before is stopped to its previous state. A board that was running is not
+        // stopped.
         let status = seen.info.status;
         let back = match (status.has(Status::MSTART), status.has(Status::MCARUN)) {
             (false, _) => Some(StopLevel::Application),
@@ -81,7 +82,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         begun.push(Begun { board: plan.board, back, ran: back.is_none() });
         let seen = start_from(link, seen).await?;
         let description = describe(link, plan.board, &seen.info).await?;
-        // The user has chosen the values by the names that were known before.
+        // The user selected the values by the names that were known before.
         if described.get(&plan.board).is_some_and(|known| *known != description) {
             return Err(SignalError::StaleNames { board: plan.board }.into());
         }
@@ -130,8 +131,8 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    // If the board was running, only the values that this PC itself sent to it are known. Initial values must not replace the values of
-    // another PC unless the user requests it.
+    // If the board was already running, this PC knows only the values that it sent to the board itself. Initial values must not replace the
+    // values of another PC unless the user requests it.
     let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
     let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
     let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;
@@ -154,7 +155,7 @@ async fn start_loop(
         let index = description.find(board, Kind::Par, &setting.name)?;
         link.with(|core| core.send_parameter(board, index, setting.value));
     }
-    // The board must not start before its values have left.
+    // The board must not start before its values have been sent.
     link.flush().await;
     let flags = mca_start(link, board).await?;
     if begun.back.is_none() && !flags.active && options.active {
@@ -171,7 +172,7 @@ async fn start_loop(
     change_flags(link, board, AdminChange { active: Some(true), ..running }).await
 }
 
-/// Returns an error if a board was lost and `on_lost` stops all boards. Then no further board is started.
+/// Returns an error if a board was lost and `on_lost` stops all boards. In this case, no further board is started.
 fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
     let lost = |core: &mut Core, number: u8| {
         core.boards.get(number).is_some_and(|b| b.life == Life::Lost || b.rebooted)

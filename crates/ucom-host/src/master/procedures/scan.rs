@@ -18,10 +18,10 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     ask_reports(&link, &mut report.reports).await;
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let slots = ask_all(&link, &numbers).await;
-    // Numbers that may be shared are asked again. Numbers that are certainly shared are reported below.
+    // Numbers that two boards may share get another PC_INFO. Numbers that two boards certainly share are reported below.
     let doubtful = link.with(|core| core.holders.doubtful());
     let _ = one_board_each(&link, &doubtful).await;
-    // If a board has answered but did not report, its report may have been lost.
+    // If a board has answered without a report, the report may have been lost.
     let missing = |boards: &[BoardSeen], reports: &Reports| {
         boards.iter().any(|b| !reports.ids.contains(&(b.info.flash_number as u8)))
     };

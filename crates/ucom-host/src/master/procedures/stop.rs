@@ -17,8 +17,8 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     Ok(Outcome::Status { board, info: info? })
 }
 
-/// Switches off the outputs, then stops the loop, then the application, which is the reverse order of a start. If a step is not answered,
-/// the next steps are still taken. The first failure is returned.
+/// Switches off the outputs, then stops the loop, then the application. This is the reverse order of a start. If a board does not answer a
+/// step, the next steps are still performed. The first failure is returned.
 pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
     let mut known = match info(link, board).await {
         Ok(seen) => seen.info,
@@ -48,8 +48,8 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// Stops a board that was commanded to start and does not show this yet. Such a board may start at any time until `start.timeout` has
-/// passed. Therefore it gets the stop command in any state, and is read again after that time.
+/// Stops a board that received a start command and does not show the start yet. Such a board may start at any time until `start.timeout`
+/// has passed. Therefore the board gets the stop command in any state, and its state is read again after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;
@@ -62,7 +62,7 @@ async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<Board
     Ok(now)
 }
 
-/// Stops a board that does not answer PC_INFO, because it may still be running. Does not read its flags first.
+/// Stops a board that does not answer PC_INFO, because it may still be running. The board's flags are not read first.
 async fn stop_silent(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
     let to = link.board(board)?;
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();

@@ -7,10 +7,10 @@ use crate::master::procedures::exchange::{Answer, InfoCollector, TRIES, identity
 use crate::master::reports::BoardSeen;
 use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 
-/// Time between two requests of a round in µs. The pause keeps the answers of 31 boards from arriving as one burst.
+/// Time between two requests of a round in µs. Because of this pause, the answers of 31 boards do not arrive as one burst.
 const SPACING: u64 = 2_000;
 
-/// The answers to one number.
+/// Answers to one number.
 #[derive(Default)]
 pub(crate) struct Slot {
     /// Answers so far, which may differ in their identity.
@@ -40,7 +40,7 @@ impl Slot {
 
     pub(crate) fn seen(&self, number: u8) -> Option<BoardSeen> {
         let (info, _) = self.answers.last()?;
-        // Uses the latest answer whose identity another answer confirms.
+        // Uses the latest answer whose identity agrees with another answer.
         let agreed =
             |i: &BoardInfo| self.answers.iter().filter(|(o, _)| identity(o) == identity(i)).count() > 1;
         let info = self.answers.iter().rev().map(|(i, _)| i).find(|i| agreed(i)).unwrap_or(info);
@@ -50,8 +50,8 @@ impl Slot {
     }
 }
 
-/// Sends PC_INFO to all these numbers in at most four rounds. A number is asked again until its board has given two answers that agree and
-/// a complete description, or was silent three times.
+/// Sends PC_INFO to all given numbers in at most four rounds. PC_INFO is repeated until the board has sent a complete description and two
+/// answers that agree, or has been silent three times.
 pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Slot> {
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());
     let times = link.times();
@@ -98,7 +98,7 @@ pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, S
 fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, received: &Received) {
     if let FromBoard::Info(payload) = received.message {
         let collector = collectors.entry(received.from).or_default();
-        // If this is not a first frame, the collector stays empty and the number is asked again in the next round.
+        // If this frame is not a first frame, the collector stays empty, and the next round sends PC_INFO to the number again.
         let _ = collector.push(received.at, &payload, link);
     }
 }
@@ -119,8 +119,8 @@ pub(crate) async fn statuses(
     slots.into_iter().map(status).collect()
 }
 
-/// Returns the status of every board that answers. All boards are asked at once, and twice, because a frame can be lost. A board that sends
-/// sensor outputs is considered to be running, even if its status shows another state.
+/// Returns the status of every board that answers. All boards get PC_INFO at the same time, and twice, because a frame can be lost. A board
+/// that sends sensor outputs is considered to be running, even if its status shows another state.
 pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());

@@ -5,8 +5,9 @@ use crate::master::procedures::exchange::TRIES;
 use crate::master::procedures::exchange::{Answer, ask_info};
 use ucom::{ErrorCode, FromBoard, Function, Status, ToBoard};
 
-/// Sends PC_INIT at most three times, until the board acknowledges it or answers PC_INFO. If `lower` is set, the board's own pin is lowered
-/// before each repetition. Otherwise, if the board raises its pin by itself, the next board would take the number as well.
+/// Sends PC_INIT at most three times, until the board acknowledges it or answers PC_INFO. If `lower` is set, the board's own pin is
+/// switched off before each repetition. Without this step, the next board would take the number as well if the board switches on its pin by
+/// itself.
 pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<bool, Error> {
     let to = link.board(number)?;
     let nobody = link.profile().unnumbered().number();
@@ -28,7 +29,7 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
                     acknowledged = true;
                     break;
                 }
-                // The board's previous acknowledgement has not left yet (D-24), so this waits for it.
+                // The board may not have sent its previous acknowledgement yet (D-24), so the procedure waits for it.
                 FromBoard::Error(ErrorCode::Reinit) if received.from == nobody || received.from == number => {
                     until = until.max(link.now() + 100 * MS);
                 }
@@ -38,7 +39,7 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
         if acknowledged {
             return Ok(true);
         }
-        // The acknowledgement may have been lost, so PC_INIT is not repeated without a question. An incomplete answer is enough, because it
+        // The acknowledgement may have been lost, so PC_INIT is not repeated without a query. An incomplete answer is enough, because it
         // shows that a board has this number. The board's identity is read later.
         link.listen(1 << number, &[Function::DspInfo]);
         if !matches!(ask_info(link, number).await?, Answer::Silence) {

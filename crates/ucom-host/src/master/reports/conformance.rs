@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// Permissions for the tests, and the selection of tests and boards.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConformanceOptions {
-    /// The boards to test. Empty: all boards that answer.
+    /// Boards to test. If empty, the tests cover all boards that answer.
     pub boards: Vec<u8>,
     /// Permission to reset and renumber the chain, and to set and clear status bits.
     pub init: bool,
@@ -48,9 +48,9 @@ pub struct ConformanceProgram {
 pub enum Verdict {
     /// The board behaves as expected.
     Pass,
-    /// The test failed, with this actual result.
+    /// The test failed; the text describes the actual result.
     Fail(String),
-    /// The test was skipped, for this reason.
+    /// The test was skipped; the text contains the reason.
     Skipped(String),
 }
 
@@ -75,13 +75,13 @@ pub struct ConformanceTest {
 }
 
 impl ConformanceTest {
-    /// Returns what was tested, in words: `board 3` or `chain`.
+    /// Returns the tested part in words: `board 3` or `chain`.
     pub fn subject(&self) -> String {
         self.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
     }
 }
 
-/// Results of all tests.
+/// Results of all tests of a bus.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ConformanceReport {
     /// Tests in the order of execution.
@@ -122,8 +122,8 @@ impl ConformanceReport {
         by_option
     }
 
-    /// Returns the kind of failure. If an error ended the tests, it is the kind of that error; if a test failed or a board is not in its
-    /// previous state, it is `Device`. `None` if every test passed.
+    /// Returns the kind of failure. If an error ended the tests, returns the kind of that error. If a test failed or a board is not in its
+    /// previous state, returns `Device`. Returns `None` if every test passed.
     pub fn failure(&self) -> Option<ErrorKind> {
         match &self.error {
             Some(error) => Some(error.kind()),

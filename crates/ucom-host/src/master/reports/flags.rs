@@ -1,7 +1,7 @@
 //! Changes to the flags of a board, and levels of a stop.
 use ucom::Admin;
 
-/// Changes to the flags of a board; `None` leaves a flag unchanged (D-37).
+/// Changes to the flags of a board; `None` does not change a flag (D-37).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AdminChange {
     /// The control loop runs.
@@ -34,7 +34,7 @@ impl AdminChange {
     }
 }
 
-/// How far a board is stopped.
+/// Level to which a board is stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopLevel {
     /// The outputs are switched off; the control loop continues.

@@ -9,7 +9,7 @@ use ucom::profile::Endian;
 /// Options for an init.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InitOptions {
-    /// Expected board numbers and flash numbers, from an inventory. A difference is reported as a finding.
+    /// Expected board numbers and flash numbers, from an inventory. A difference from the inventory is reported as a finding.
     pub expected: Vec<(u8, u16)>,
     /// Permission to assign numbers although another PC is on the bus.
     pub force: bool,
@@ -64,13 +64,13 @@ pub enum InitFinding {
         /// Low bytes of the flash numbers of boards that have reported but got no number.
         ids: Vec<u8>,
     },
-    /// The flash numbers match the reports only if their bytes are swapped (D-10).
+    /// The flash numbers match the reports only after their bytes are swapped (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
         /// Byte order of the profile.
         endian: Endian,
     },
-    /// There are more boards than reports, so boards have the same low byte in their flash numbers.
+    /// The number of boards is higher than the number of reports, so boards have the same low byte in their flash numbers.
     #[error(
         "more boards than reports: {}, {}; flash ids must be unique in their low byte",
         counted(*boards as usize, "board"),
@@ -93,7 +93,7 @@ pub enum InitFinding {
     NotReset {
         /// Board number.
         board: u8,
-        /// `true` if the board has confirmed since that its application is stopped.
+        /// `true` if the board has later confirmed that its application is stopped.
         stopped: bool,
     },
     /// Two boards have the same flash number.
@@ -126,7 +126,7 @@ pub enum InitFinding {
         /// Flash number of the board.
         expected: u16,
     },
-    /// A board was refused, so only the boards before it got numbers.
+    /// A board was refused, so only the boards that come before it in the chain got numbers.
     #[error("position {board}: {error}")]
     Refused {
         /// Position.

@@ -9,24 +9,24 @@ use crate::master::reports::init::InitReport;
 /// Permissions of a probe.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProbeOptions {
-    /// Permission to reset and renumber the chain. The probe then also finds out whether boards raise their pin by themselves.
+    /// Permission to reset and renumber the chain. The probe then also determines if boards switch on their pin by themselves.
     pub init: bool,
-    /// Permission to start a control loop with inactive outputs. The probe then also finds out which heartbeats keep the loop running.
+    /// Permission to start a control loop with inactive outputs. The probe then also determines which heartbeats keep the loop running.
     pub alive: bool,
-    /// The image that a board has, as it was sent. The probe then also finds out how the Program ID is computed.
+    /// Image that a board contains, as it was sent. The probe then also determines how the Program ID is computed.
     pub image: Option<Arc<[u8]>>,
     /// Permission to probe although another PC is on the bus. With `init` and `alive`, also permission to end running control loops.
     pub force: bool,
 }
 
-/// A property that the published description leaves open, and its measurement.
+/// Property that the published description does not define, and its measurement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ProbeRow {
     /// Key of the profile.
     pub key: &'static str,
     /// The property.
     pub unknown: &'static str,
-    /// Statement about it in the published description.
+    /// Statement about the property in the published description.
     pub published: &'static str,
     /// The observation.
     pub observed: String,
@@ -39,13 +39,13 @@ pub struct ProbeRow {
 /// Result of a probe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeReport {
-    /// Profile with the measured values. The master does not use it by itself.
+    /// Profile with the measured values. The master does not apply this profile automatically.
     pub profile: Profile,
-    /// The table: one row per property.
+    /// Table with one row per property.
     pub rows: Vec<ProbeRow>,
     /// Boards that answered.
     pub boards: Vec<u8>,
-    /// Number of different UCoM ids in the reports. Boards without a number are included.
+    /// Number of different UCoM ids in the reports. The number includes boards without a number.
     pub reports: usize,
     /// Report of the new numbers, if the probe has assigned numbers.
     pub init: Option<InitReport>,

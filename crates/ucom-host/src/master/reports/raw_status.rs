@@ -15,7 +15,7 @@ pub struct RawStatus {
 }
 
 impl RawStatus {
-    /// Returns `true` if the board's state is the required one. If INIT was cleared, the board must be silent, because it has forgotten its
+    /// Returns `true` if the board has the required state. If INIT was cleared, the board must be silent, because it has forgotten its
     /// number.
     pub fn as_expected(&self) -> bool {
         match self.after {
@@ -31,7 +31,7 @@ pub fn expected_status(before: &BoardInfo, mask: u8, value: u8) -> Status {
     let new = old.set(mask, value);
     let kept = new & Status::ASTART;
     if !new.has(Status::INIT) || !old.has(Status::INIT) {
-        // The board loses its number and therefore also its application, PROG and its outgoing pin.
+        // The board loses its number. Therefore it also ends its application, clears PROG and switches off its outgoing pin.
         return kept | Status::EXLRUN | (old & Status::IPINIT);
     }
     let started = new.has(Status::MSTART) && (old.has(Status::MSTART) || before.has_application());
@@ -53,7 +53,7 @@ mod tests {
     use ucom::{Frame, Profile, Sequence, ToBoard};
     use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
-    /// Creates a board that has a number. The parameters define its application and its state.
+    /// Creates a board that has a number. The parameters define the application and the state of the board.
     fn board(application: bool, started: bool, history: &[(u8, u8)]) -> (Board, u64) {
         let mut flash = MemoryFlash::default();
         if application {

@@ -15,8 +15,7 @@ use ucom::{Admin, BoardInfo, Status};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ProcedureId(pub(crate) u64);
 
-/// Request that starts a procedure. With `force` the procedure runs although another PC is on the bus, or although another check would
-/// refuse it.
+/// Request that starts a procedure. With `force`, the procedure also runs if another PC is on the bus, or if another check would refuse it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
@@ -24,11 +23,11 @@ pub enum Request {
     Scan,
     /// Assigns numbers to the whole chain.
     Init(InitOptions),
-    /// Gives one board its number back.
+    /// Assigns a lost number to one board again.
     Repair {
         /// Board number.
         board: u8,
-        /// The flash number that the board at this position must have.
+        /// Flash number that the board at this position must have.
         flash_number: u16,
         /// See above.
         force: bool,
@@ -44,27 +43,27 @@ pub enum Request {
         board: u8,
         /// Bits to change.
         mask: Status,
-        /// Requested values of these bits. Bits outside the mask are not sent.
+        /// Requested values of the bits in the mask. Bits outside the mask are not sent.
         value: Status,
         /// See above.
         force: bool,
     },
     /// Sends one PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask. Never repeated.
     RawStatus {
-        /// The board; `None` for a broadcast to all boards.
+        /// Board that gets the command; `None` for a broadcast to all boards.
         board: Option<u8>,
-        /// Boards to read before and after.
+        /// Boards whose status is read before and after the command.
         seen: Vec<u8>,
         /// First byte of PC_SETSTATUS.
         mask: u8,
         /// Second byte of PC_SETSTATUS.
         value: u8,
-        /// See above. With `force` the command is also sent although control loops run.
+        /// See above. With `force`, the command is also sent if control loops run.
         force: bool,
     },
     /// Sends PC_RESET.
     Reset {
-        /// The board; `None` for all boards.
+        /// Board that gets the command; `None` for all boards.
         board: Option<u8>,
         /// See above.
         force: bool,
@@ -76,7 +75,7 @@ pub enum Request {
         /// See above.
         force: bool,
     },
-    /// Sends PC_START until the application is up.
+    /// Sends PC_START until the application runs.
     Start {
         /// The board.
         board: u8,
@@ -115,7 +114,7 @@ pub enum Request {
         /// The board.
         board: u8,
     },
-    /// Runs boards: takes all steps to a running control loop.
+    /// Runs boards: performs all steps up to a running control loop.
     Run(RunOptions),
     /// Measures properties in which a board may differ from the profile.
     Probe(ProbeOptions),
@@ -146,8 +145,8 @@ impl Request {
         }
     }
 
-    /// Returns `true` if the request is not ended when two boards have the same number. A stop must not wait, and reaches both boards. The
-    /// other requests detect such boards themselves and report them in more detail.
+    /// Returns `true` if the request continues when two boards have the same number. A stop must not wait, and reaches both of these
+    /// boards. The other requests detect such boards themselves and report them in more detail.
     pub(crate) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,

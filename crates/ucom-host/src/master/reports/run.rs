@@ -2,7 +2,7 @@
 use crate::master::load::LoadForecast;
 use ucom::Admin;
 
-/// A value for an input or a parameter.
+/// Value for an input or a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     /// Name or index of the signal.
@@ -29,7 +29,7 @@ pub struct RunOptions {
     pub boards: Vec<RunBoard>,
     /// `true` to enable the outputs at the end.
     pub active: bool,
-    /// Permission to run although the bus load would be too high or another PC is on the bus.
+    /// Permission to run if the bus load would be too high or another PC is on the bus.
     pub force: bool,
 }
 

@@ -9,7 +9,7 @@ use ucom::profile::Endian;
 /// Reports of the boards after PC_RESET or PC_REPORT.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reports {
-    /// Low bytes of the flash numbers. These bytes distinguish the boards.
+    /// Low bytes of the flash numbers. The low bytes distinguish the boards.
     pub ids: BTreeSet<u8>,
     /// Number of report frames from each board.
     pub frames: BTreeMap<u8, u32>,
@@ -26,7 +26,7 @@ impl Reports {
         }
     }
 
-    /// Returns pairs of flash ids that differ only in bit 7. Such boards use the same identifier (D-07).
+    /// Returns pairs of flash ids that differ only in bit 7. Two boards of such a pair use the same identifier (D-07).
     pub fn ambiguous(&self) -> Vec<(u8, u8)> {
         self.ids
             .iter()
@@ -89,7 +89,7 @@ pub enum ScanFinding {
         /// UCoM id in the data.
         ucom_id: u8,
     },
-    /// The flash numbers match the reports only if their bytes are swapped (D-10).
+    /// The flash numbers match the reports only after their bytes are swapped (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
         /// Byte order of the profile.
@@ -108,7 +108,7 @@ pub enum ScanFinding {
         board: u8,
         /// Flash number of the first board.
         first: u16,
-        /// Flash number of the second board. The same as `first` if the boards cannot be distinguished.
+        /// Flash number of the second board. Equal to `first` if the boards cannot be distinguished.
         second: u16,
     },
     /// A board reports an impossible status.
@@ -132,7 +132,7 @@ fn shared(board: u8, found: [u16; 2]) -> Error {
 }
 
 impl ScanFinding {
-    /// Returns the error of other commands that refuse such a chain; `None` if they accept it.
+    /// Returns the error with which other commands refuse such a chain; returns `None` if they accept the chain.
     pub fn error(&self) -> Option<Error> {
         match self {
             Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),

@@ -1,4 +1,4 @@
-//! The answer of a board.
+//! Answer of a board.
 use ucom::BoardInfo;
 
 /// Answer of a board to PC_INFO.

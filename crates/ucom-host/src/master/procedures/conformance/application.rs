@@ -88,7 +88,7 @@ pub(super) async fn inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
         return Ok(Verdict::Fail(format!("at the dimension {}: {}", d.ci, list(&came))));
     }
     if let Some(last) = d.ci.checked_sub(1) {
-        // Sending zeros is harmless: the loop does not run, and it begins with the initial inputs.
+        // Inputs of zero are harmless: the loop does not run, and it begins with the initial inputs.
         bench.send(Function::Ci, board, &package(last)).await;
         let came = bench.receive(100 * MS).await;
         if !came.is_empty() {
@@ -169,7 +169,7 @@ pub(super) async fn alive(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
 async fn pause(bench: &mut Bench<'_>, us: u64) {
     bench.heartbeats(false);
     bench.heartbeats(true);
-    // Gives the last heartbeat time to leave.
+    // Waits until the last heartbeat has been sent.
     bench.link.sleep(5 * MS).await;
     bench.heartbeats(false);
     bench.link.sleep(us - 5 * MS).await;

@@ -67,7 +67,7 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
         }
         other => other?,
     }
-    // If a board has rebooted since, it would take any number.
+    // If a board has rebooted in the meantime, it would take any number.
     if bench.info(board).await.is_none() {
         return Ok(Verdict::Fail(
             "the board does not answer PC_INFO; it may have rebooted: `ucom scan`".into(),
@@ -96,8 +96,8 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     let answers = move |all: Vec<Frame>| -> Vec<Frame> {
         all.into_iter().filter(|f| f.id() == u16::from(id) << 6 | u16::from(board)).collect()
     };
-    // A frame of this function with data is always a board's answer, never a request (D-12). Only the board itself may send it with its
-    // number. An answer of the board must therefore not be pending now.
+    // A frame of this function with data is always a board's answer, never a request (D-12). Only the board itself may send this frame with
+    // its number. An answer of the board must therefore not be pending now.
     bench.send(Function::DumpIo, board, &[0]).await;
     let came = answers(bench.receive(150 * MS).await);
     if !came.is_empty() {
@@ -180,7 +180,7 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
             continue;
         };
         wrong |= usize::from(profile.endian.word([*a, *b])) != first;
-        // With pd.short_last a package may end with the last word.
+        // With `pd.short_last`, a package may end with the last word.
         let surplus = 2 * usize::from(dimensions.ci).saturating_sub(first).min(3);
         wrong |= words.len() < surplus || words.iter().skip(surplus).any(|byte| *byte != 0);
     }
@@ -191,7 +191,7 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
 pub(super) async fn dimensions(bench: &mut Bench<'_>, board: u8) -> Option<Dimensions> {
     bench.send(Function::DumpIo, board, &[]).await;
     let first = bench.wait(Function::DumpIo, board, bench.link.times().info).await;
-    // The remainder of this answer must not be mistaken for another answer.
+    // Waits for the remaining frames of this answer, so that they are not mistaken for another answer.
     while !bench.receive(bench.link.times().gap).await.is_empty() {}
     let endian: Endian = bench.profile().endian;
     Dimensions::parse(&first?.payload(), endian)

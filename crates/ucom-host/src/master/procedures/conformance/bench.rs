@@ -42,7 +42,7 @@ impl<'a> Bench<'a> {
         (self.sent, self.came)
     }
 
-    /// Sends a frame. Frames received before are discarded.
+    /// Sends a frame. Frames that were received earlier are discarded.
     pub(super) async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
         let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
         let Some(frame) = Frame::new(function.id(number), data) else { return };
@@ -53,7 +53,7 @@ impl<'a> Bench<'a> {
         self.link.left(serial).await;
     }
 
-    /// Returns all frames that boards send within `us` µs, except those that they send without a request.
+    /// Returns all frames that boards send within `us` µs, except frames that boards send without a request.
     pub(super) async fn receive(&mut self, us: u64) -> Vec<Frame> {
         let all = self.hear_all(us).await;
         let answer = |f: &Frame| f.address().is_ok_and(|(function, _)| !NOISE.contains(&function));
@@ -100,7 +100,7 @@ impl<'a> Bench<'a> {
         for _ in 0..3 {
             self.send(Function::Info, board, &[]).await;
             let first = self.wait(Function::DspInfo, board, self.link.times().info).await;
-            // The description that follows must not be mistaken for the next answer.
+            // Waits for the description that follows, so that it is not mistaken for the next answer.
             self.receive(self.link.times().gap).await;
             if let Some(frame) = first {
                 return BoardInfo::parse(&frame.payload(), self.profile().endian);
@@ -130,7 +130,7 @@ impl<'a> Bench<'a> {
         });
     }
 
-    /// Starts the application, but not its loop.
+    /// Starts the application, but does not start its loop.
     pub(super) async fn started(&mut self, board: u8) -> Result<Result<(), Verdict>, Error> {
         match start_application(self.link, board).await {
             Ok(_) => {}
@@ -162,7 +162,7 @@ pub(super) fn list(frames: &[Frame]) -> String {
     }
 }
 
-/// Returns a pass, or a failure with the received frames.
+/// Returns a pass, or a failure that lists the received frames.
 pub(super) fn verdict(pass: bool, came: &[Frame]) -> Verdict {
     if pass { Verdict::Pass } else { Verdict::Fail(list(came)) }
 }

@@ -70,7 +70,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
         if !pass {
             return Ok(Verdict::Fail(format!("PC_INIT({n}): {}", list(&came))));
         }
-        // At this point no later board may take a number.
+        // At this point, no board after this one in the chain may take a number.
         if let Some(next) = numbers.get(i + 1) {
             for function in [Function::Init, Function::Info] {
                 bench.send(function, *next, &[]).await;
@@ -133,8 +133,8 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-/// Tests the autostart. In this test the first board on the wire takes the number `board` after a reset. So the chain must have been
-/// renumbered just before: `board` must be the first board.
+/// Tests the autostart. In this test the first board on the wire takes the number `board` after a reset. Therefore the chain must have been
+/// renumbered immediately before, and `board` must be the first board.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
         return Ok(Verdict::Skipped("this board does not exist".into()));

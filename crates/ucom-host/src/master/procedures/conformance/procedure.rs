@@ -92,8 +92,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
     Ok(Found { boards, strangers: !all })
 }
 
-/// Returns the number of reports. Also returns `true` if the reports match the boards with numbers and each board has a flash id of its
-/// own.
+/// Returns the number of reports. Also returns `true` if the reports match the numbered boards and each flash id is unique.
 async fn who_reports(link: &Link, boards: &[BoardSeen]) -> (usize, bool) {
     let mut reports = Reports::default();
     for _ in 0..2 {

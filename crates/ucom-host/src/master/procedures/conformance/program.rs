@@ -7,7 +7,7 @@ use crate::master::reports::{ConformanceProgram, Verdict};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{BLOCK_LEN, Frame, Function, Header, checksum, data_block};
 
-/// Returns the reason why these tests cannot run with this profile; `None` if they can.
+/// Returns the reason why these tests cannot run with this profile; returns `None` if they can run.
 fn unfit(bench: &Bench<'_>) -> Option<Verdict> {
     let profile = bench.profile();
     let fits = profile.prog_plan == Plan::VerifyWrite && profile.prog_header == HeaderForm::V1;

@@ -9,7 +9,7 @@ use crate::master::procedures::repair::repair;
 use crate::master::reports::{BoardSeen, ConformanceOptions, InitOptions, Outcome};
 use ucom::{Admin, BoardInfo, Status, ToBoard};
 
-/// Renumbers the chain. Every board must get its previous number.
+/// Renumbers the chain. Every board must get its previous number again.
 pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     // This PC is already the master of the bus.
     let outcome = init(link.clone(), InitOptions { force: true, ..Default::default() }).await?;
@@ -98,8 +98,8 @@ pub(super) async fn put_back(
     Ok(())
 }
 
-/// Checks that the board answers and is the same board as before. A board may be silent for a long time because it erases its memory, or
-/// because it has rebooted and lost its number.
+/// Checks that the board answers and is the same board as before. A board may be silent for a long time, either because it erases its
+/// memory or because it has rebooted and lost its number.
 async fn answering(
     link: &Link,
     before: &BoardSeen,

@@ -8,7 +8,7 @@ use crate::master::procedures::exchange::set_status;
 use crate::master::reports::{ConformanceOptions, ConformanceReport, ConformanceTest, Verdict};
 use ucom::Status;
 
-/// A test and its board; `None` for the whole chain.
+/// Test and its board; `None` for the whole chain.
 type Planned = (&'static Test, Option<u8>);
 
 /// State of the running tests.
@@ -48,7 +48,7 @@ impl<'a> Runner<'a> {
         let boards = self.found.boards.iter().map(|b| b.number);
         match test.scope {
             Scope::Chain | Scope::Numbers => vec![None],
-            // Without the permission, the test is listed once and not for each board.
+            // Without the permission, the test is listed only once, not once per board.
             _ if test.level == Level::Init && !self.options.init => vec![None],
             Scope::First => boards.min().into_iter().map(Some).collect(),
             Scope::Board | Scope::Programmed => boards.map(Some).collect(),
@@ -126,7 +126,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Records the tests that were skipped because the run ended early.
+    /// Records the tests that were skipped because the series of tests ended early.
     pub(super) fn skip_rest(&mut self, why: &str) {
         for (test, board) in self.planned() {
             if self.report.tests.iter().any(|t| t.id == test.id && t.board == board) {

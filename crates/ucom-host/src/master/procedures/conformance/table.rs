@@ -36,11 +36,11 @@ impl Level {
 pub(super) enum Scope {
     /// The whole chain.
     Chain,
-    /// The whole chain. Boards may be without their numbers before and after the test.
+    /// The whole chain. Before and after the test, boards may have no number.
     Numbers,
     /// Each board.
     Board,
-    /// The board with the first number. Boards may be without their numbers afterwards.
+    /// The board with the first number. After the test, boards may have no number.
     First,
     /// The board to be programmed.
     Programmed,
@@ -54,7 +54,7 @@ pub(super) type Talk =
 pub(super) enum Run {
     /// An exchange with a board.
     Talk(Talk),
-    /// The test cannot be run here, for this reason.
+    /// The test cannot be run on this bus, for this reason.
     Elsewhere(&'static str),
 }
 
@@ -69,7 +69,7 @@ pub(super) struct Test {
 }
 
 impl Test {
-    /// Returns `true` if a board runs both tests before the next board runs them.
+    /// Returns `true` if a board must finish both tests before the next board begins them.
     pub(super) fn goes_with(&self, next: &Self) -> bool {
         let board = |test: &Self| matches!(test.scope, Scope::Board | Scope::Programmed);
         board(self) && board(next) && (self.level == next.level || next.level == Level::Program)

@@ -1,5 +1,5 @@
-//! Derives a profile from the received frames. If an observation decides the value of a key, the value is reported; other keys keep their
-//! values.
+//! Derives a profile from the received frames. If an observation determines the value of a key, the value is reported; other keys keep
+//! their values.
 
 use crate::master::counted::counted;
 use crate::master::reports::{ProbeReport, ProbeRow};
@@ -11,14 +11,14 @@ use ucom::{Checksum, Payload, Profile, Report, Sequence, Status, checksum};
 /// Answers of one board to PC_INFO. Each answer is a list of frames.
 pub(super) type Answers = Vec<Vec<Payload>>;
 
-/// The received frames and answers.
+/// Received frames and answers.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     pub before: Profile,
     pub image: Option<Arc<[u8]>>,
     pub reports: Vec<Report>,
     pub raised: Option<bool>,
-    /// Number of boards that answered a PC_INFO to number 0, and to number 31.
+    /// Number of boards that answered a PC_INFO to number 0, and number of boards that answered a PC_INFO to number 31.
     pub broadcast: [usize; 2],
     /// `true` if a board has number 0.
     pub zero_answers: bool,
@@ -65,7 +65,7 @@ struct Rows {
 }
 
 impl Rows {
-    /// Adds a row to the table. `value` is the measured value, if there is one.
+    /// Adds a row to the table. `value` is the measured value, or `None` without a measurement.
     fn add(
         &mut self,
         key: &'static str,
@@ -132,7 +132,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
     let broadcast = match (zero, top) {
         (1.., _) => Some(Broadcast::Zero),
         (0, 1..) => Some(Broadcast::ThirtyOne),
-        // Silence means something only if there are boards that could have answered.
+        // Silence is evidence only if there are boards that could have answered.
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };
@@ -141,7 +141,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         seen.infos.len()
     );
     let value = broadcast.map(|b| b.to_string());
-    // Decided after the broadcast number, because 0 cannot be both the broadcast number and the number of the first board.
+    // Decided after the broadcast number, because 0 cannot be both the broadcast number and the first board's number.
     let first = if seen.zero_answers {
         Some("0")
     } else {
@@ -262,7 +262,7 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     }
 }
 
-/// Decides which heartbeats keep a control loop running: broadcast heartbeats, or heartbeats to the board's own number.
+/// Determines which heartbeats keep a control loop running: broadcast heartbeats, or heartbeats to the board's own number.
 pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
     let mut rows = Rows { rows: core::mem::take(&mut report.rows), profile: report.profile };
     let mode = match (broadcast, unicast) {

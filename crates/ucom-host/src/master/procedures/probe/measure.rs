@@ -1,4 +1,4 @@
-//! Questions of a probe. The answers are stored as raw payloads, because their interpretation is being measured.
+//! Queries of a probe. The answers are stored as raw payloads, because their interpretation is being measured.
 
 use crate::master::engine::{Core, Link, MS, Times};
 use crate::master::error::{Error, MasterError, RunningError};
@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use ucom::profile::AliveMode;
 use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status, ToBoard};
 
-/// Number of questions to each board. There are several, so that one lost frame does not decide the result.
+/// Number of queries to each board. Several queries are sent, so that the loss of one frame does not determine the result.
 const ROUNDS: usize = 3;
 
-/// Returns the findings of a probe, or the error that ended it. In both cases the session keeps its profile, and every board that the probe
-/// started is stopped again.
+/// Returns the findings of a probe, or the error that ended it. In both cases, the profile of the session does not change, and every board
+/// that the probe started is stopped again.
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
     let (before, mut begun) = (link.profile(), None);
     let result = link.or_cancel(measure(&link, &options, &mut begun)).await;
@@ -35,7 +35,7 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
     result.map(Outcome::Probe)
 }
 
-/// While control loops run, refuses steps that end control loops or keep heartbeats from them.
+/// While control loops run, refuses steps that end control loops or interrupt their heartbeats.
 fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     let running = |core: &mut Core| {
         let running = core.boards.iter().filter(|(_, board)| board.is_known() && board.running(core.now));
@@ -48,7 +48,7 @@ fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     }
 }
 
-/// Collects the observations. If a board is started, the board and the level of the stop that undoes this are stored in `begun`.
+/// Collects the observations. If a board is started, `begun` stores the board and the level of the stop that undoes the start.
 async fn measure(
     link: &Link,
     options: &ProbeOptions,
@@ -63,7 +63,7 @@ async fn measure(
         no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
         seen.raised = pin_raised(link).await?;
-        // The whole chain gets numbers. Values that are read wrong with the present profile are corrected below.
+        // All boards of the chain get numbers. Values that the present profile interprets wrongly are corrected below.
         let whole = InitOptions { force: options.force, ..Default::default() };
         link.bear_shared_numbers(true);
         if let Outcome::Init(report) = init(link.clone(), whole).await? {
@@ -118,7 +118,7 @@ fn use_profile(link: &Link, profile: Profile) {
     });
 }
 
-/// Collects the raw reports of all boards. Requests them several times, because a board may be booting and a frame may be lost.
+/// Collects the raw reports of all boards. Requests the reports several times, because a board may be booting and a frame may be lost.
 async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     let mut reports = Vec::new();
     for _ in 0..ROUNDS {
@@ -137,8 +137,8 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     reports
 }
 
-/// Sends PC_RESET, then PC_INIT to the first board. Returns `true` if the board's status then already shows OPINIT; `None` if no board took
-/// the number.
+/// Sends PC_RESET, then PC_INIT to the first board. Returns `true` if the board's status then already shows OPINIT; returns `None` if no
+/// board took the number.
 async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     link.listen(0, &REPORTS);
     link.ask(link.broadcast_number(), ToBoard::Reset).await;
@@ -156,7 +156,8 @@ async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     Ok(status.map(|status| status.has(Status::OPINIT)))
 }
 
-/// Sends PC_INFO with `padding` additional bytes to some numbers. Returns the frames of each answer, which ends after 100 ms of silence.
+/// Sends PC_INFO with `padding` additional bytes to some numbers. Returns the frames of each answer. An answer ends after 100 ms of
+/// silence.
 async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8, Vec<Payload>> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let mut answers: BTreeMap<u8, Vec<Payload>> = BTreeMap::new();
@@ -166,7 +167,7 @@ async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8,
         if let Some(frame) = Frame::new(Function::Info.id(*number), data) {
             link.send_frame(frame).await;
         }
-        // The pause keeps the answers of many boards from arriving as one burst.
+        // Because of this pause, the answers of many boards do not arrive as one burst.
         link.sleep(2 * MS).await;
     }
     let (times, limit) = (link.times(), link.now() + 5_000 * MS);

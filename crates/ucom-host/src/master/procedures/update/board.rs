@@ -40,7 +40,7 @@ pub(super) async fn one(
         }
         match again {
             None => break,
-            // After an overrun the pause between frames is made longer.
+            // After an overrun, the pause between frames is increased.
             Some(Broken::Device { code: ErrorCode::Overrun | ErrorCode::CanOverrun, .. }) => {
                 gap_us = (gap_us * 2).max(500);
             }
@@ -54,15 +54,15 @@ pub(super) async fn one(
     Ok(())
 }
 
-/// Brings a board that has been checked into its exloader with programming enabled.
+/// Starts the exloader, with programming enabled, of a board that has been checked.
 ///
-/// Reads the board before each XRESET, because another board may have its number since the check or the previous attempt.
+/// Reads the board before each XRESET, because another board may have received its number since the previous step.
 pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Result<(), Error> {
     let flash_number = session.flash_number(board);
     if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
         && seen.flash_number != wanted
     {
-        // A single damaged answer must not be mistaken for another board.
+        // A single damaged answer must not be interpreted as another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -86,7 +86,7 @@ async fn leave_programming(link: &Link, board: u8) {
     }
 }
 
-/// Makes one attempt with one board. Returns `Some` if another attempt may succeed; the result of the board contains the failure.
+/// Makes one attempt with one board. Returns `Some` if another attempt may succeed. The result of the board contains the failure.
 async fn attempt(
     link: &Link,
     session: &mut UpdateSession,
@@ -138,10 +138,10 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    // The board must not use the next program data as the remainder of this transfer. The command is sent while the board is still listed
-    // as in progress, so a cancel at this moment also sends it.
+    // The board must not interpret the next program data as the remainder of this transfer. The command is sent while the board is still
+    // listed as in progress. Therefore a cancel at this moment also sends the command.
     leave_programming(link, board).await;
-    // If another board has taken the number meanwhile, it reports errors about program data, or receives them in the wrong order.
+    // If another board has taken the number in the meantime, it reports errors about program data, or receives the data in the wrong order.
     if let Err(error) = one_board_each(link, &[board]).await {
         session.fail_with(board, error.into());
         return None;
@@ -152,15 +152,15 @@ pub(super) async fn judge(
     broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
 }
 
-/// U-10: checks that the board shows the new program. Then starts it if the options require it.
+/// U-10: checks that the board shows the new program. Starts the program if the options require this.
 pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) {
     session.reach(board, Stage::Written);
     let known = match confirmed(link, board).await {
         Ok(seen) => seen.info,
-        // The board reported that it is done. Only the read-back failed.
+        // The board reported that the program is written. Only the read-back failed.
         Err(e) => return session.fail_with(board, e),
     };
-    // If another board shares the number, it was also written, or it may have given the last answer.
+    // If another board shares the number, that board was also written, or the last answer may come from that board.
     if let Err(error) = one_board_each(link, &[board]).await {
         return session.fail_with(board, error.into());
     }
@@ -180,7 +180,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
             let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
             return session.fail(board, failure);
         }
-        // The expected program is not known. The board must at least show an application, and must be in its exloader.
+        // The expected program is not known. The board must at least show an application and must be in its exloader.
         None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
         None => return session.fail(board, UpdateFailure::NotValid { program_id, date, status }),
     };

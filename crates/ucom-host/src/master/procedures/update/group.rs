@@ -11,10 +11,10 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::UpdatePlan;
 use ucom::{Sequence, Status, ToBoard};
 
-/// Updates all boards that are not done yet at once by broadcast. A board that drops out of the group gets further attempts on its own.
+/// Updates all boards that are not done yet by one broadcast transfer. A board that leaves the group gets further attempts on its own.
 ///
 /// If a board outside the group keeps PROG = 1, the update is refused. If a selected board fails before the transfer and may still accept
-/// program data, there is no broadcast, and the others are updated one by one.
+/// program data, there is no broadcast. The other boards are then updated one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("the boards are updated one by one, because `addr.broadcast` is none".into());
@@ -33,7 +33,7 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
             "a board that does not answer may receive a broadcast: the other boards are updated one by one"
                 .into(),
         );
-        // The boards that are in their exloaders stay listed as in progress, so a cancel ends their programming mode.
+        // The boards in their exloaders stay listed as in progress, so that a cancel ends their programming mode.
         return Ok(());
     }
     for board in &boards {
@@ -70,9 +70,9 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     Ok(())
 }
 
-/// Checks whether a board whose READY was lost has continued with the others and is done. If so, verifies it. Otherwise the session stores
-/// whether the board's flash was erased, as far as its answer shows this. If the board already had this program before, its answer does not
-/// show whether it is done.
+/// Checks a board whose READY was lost: it may have received the whole transfer together with the other boards. If the board is done,
+/// verifies it. Otherwise the session stores whether the board's flash was erased, as far as its answer shows this. If the board already
+/// had this program, its answer does not show if it is done.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));
@@ -91,7 +91,7 @@ async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, 
 
 /// Ends the programming mode of every number that is not selected, and reads the status back.
 ///
-/// The command is sent three times to each number, whether it answers or not. Boards without a number ignore PC_PROG.
+/// The command is sent three times to each number, even if no board answers. Boards without a number ignore PC_PROG.
 async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     let others: Vec<Sequence> =
         link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();
@@ -103,15 +103,15 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     }
     for (board, status) in statuses(link, &others).await {
         if status?.has(Status::PROG) {
-            // This makes three more attempts and reads the status back each time. If they fail, the update is refused.
+            // The function makes three more attempts and reads the status back each time. If all attempts fail, the update is refused.
             set_status(link, board, Status::PROG, Status(0)).await?;
         }
     }
     Ok(())
 }
 
-/// Brings the selected boards into their exloaders. Returns `true` if a board failed and did not confirm that its programming mode has
-/// ended. Frames to the group would then erase that board unnoticed.
+/// Starts the exloaders of the selected boards. Returns `true` if a board failed and did not confirm that its programming mode has ended.
+/// Frames to the group would then erase that board without any report.
 async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {

@@ -1,4 +1,4 @@
-//! Sequence of an update: checks U-1 to U-3, then the boards one by one or as a group. Cleans up if the update ends early.
+//! Sequence of an update: checks U-1 to U-3, then the transfer to single boards or to a group. Cleans up if the update ends early.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError, MasterError, RunningError, TargetError};
@@ -14,7 +14,7 @@ use crate::master::reports::update::{UpdateFailure, UpdateMode, UpdateOptions, U
 use std::collections::BTreeSet;
 use ucom::{BoardInfo, Status};
 
-/// Updates all boards that need it.
+/// Updates all boards that need the program.
 pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome, Error> {
     let mut seen = BTreeSet::new();
     if options.targets.is_empty() {
@@ -43,12 +43,12 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     }
     match end {
         Ok(()) => {}
-        // After a second cancel the rest of the clean-up is skipped.
+        // After a second cancel, the remaining steps of the clean-up are skipped.
         Err(Error::Master(MasterError::Cancelled)) => {
             session.unfinished().into_iter().for_each(|board| session.cancel(board));
             session.cancel_starts();
         }
-        // Frames can no longer be sent, but the known state of the boards is still reported.
+        // Frames can no longer be sent, but the report still contains the known state of the boards.
         Err(error @ Error::Master(MasterError::Bus { .. })) => {
             let waiting = core::mem::take(&mut session.to_start);
             for board in session.unfinished().into_iter().chain(waiting) {
@@ -70,11 +70,11 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     Ok(Outcome::Update(report))
 }
 
-/// Commands the boards in progress to drop the transfer. A partly written image is never valid. `why` is a cancel by the user, or the error
-/// that two boards have the same number.
+/// Commands the boards in progress to drop the transfer. A partly written image is never valid. `why` is the cause: a cancel by the user,
+/// or two boards with the same number.
 async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
     for board in session.active.clone() {
-        // The board may have received PC_START already. The update stops boards that it has started.
+        // The board may have received PC_START already. The update stops boards whose application it has started.
         if session.starting == Some(board) && set_status(link, board, Status::MSTART, Status(0)).await.is_ok()
         {
             session.starting = None;
@@ -120,8 +120,8 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
     Ok(())
 }
 
-/// The update ends early. If this PC is already the master, ends the programming mode of boards that were found in it. Otherwise nothing
-/// may be sent to them (D-08), so they are reported.
+/// The update ends early. If this PC is already the master, ends the programming mode of boards that were found in it. If this PC is not
+/// the master, it may not send frames to these boards (D-08), so they are reported.
 async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
     while let Some(board) = session.programming.first().copied() {
         let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
@@ -161,14 +161,14 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         session.refuse(&error.into());
         return Ok(());
     }
-    // U-2: program data have priority over the process data of running boards.
+    // U-2: program data have a higher priority than the process data of running boards.
     let states = board_states(link).await;
     let running: Vec<u8> = states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b).collect();
     if !running.is_empty() && !session.options.force {
         session.refuse(&Error::Running(RunningError::Running { boards: running }));
         return Ok(());
     }
-    // D-08: this is also checked in a dry run, because its report must show the result of a real update.
+    // D-08: a dry run checks this too, because its report must show the result of a real update.
     if let Err(error) = link.look_for_master(session.options.force).await {
         session.refuse(&error);
         return Ok(());
@@ -225,7 +225,7 @@ fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<Up
     if other_date && !options.any_date {
         return None;
     }
-    // If the board's answer differs from its answer after the recorded update, it has had another program since.
+    // If the board's answer differs from its answer after the recorded update, the board has received another program in the meantime.
     let holds = record.is_some_and(|r| (r.program_id, r.date) == (known.program_id, known.date));
     Some(if holds { UpdateOutcome::UpToDate } else { UpdateOutcome::ProgramUpToDate })
 }

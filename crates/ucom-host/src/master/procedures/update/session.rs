@@ -7,7 +7,7 @@ use host_kit::{Diagnose, ErrorKind};
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Header};
 
-/// How much of a board's memory has changed. The stage only increases, except in [`UpdateSession::proved_untouched`].
+/// Extent to which a board's memory has changed. The stage only increases, except in [`UpdateSession::proved_untouched`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
     /// The memory is unchanged.
@@ -15,7 +15,7 @@ pub(super) enum Stage {
     Untouched,
     /// Frames that erase the memory were sent, and the board may have received them.
     MaybeErased,
-    /// The board was commanded to erase.
+    /// The board received the command to erase its memory.
     Erased,
     /// The board reported that the program is written.
     Written,
@@ -23,13 +23,13 @@ pub(super) enum Stage {
     Verified,
 }
 
-/// The state of all boards of an update.
+/// State of all boards of an update.
 pub(super) struct UpdateSession {
     pub options: UpdateOptions,
     pub results: Vec<UpdateResult>,
-    /// Boards that have got an XRESET and whose update has not ended.
+    /// Boards that received an XRESET and whose update has not ended.
     pub active: Vec<u8>,
-    /// The board that is commanded to start its application.
+    /// Board that received the command to start its application.
     pub starting: Option<u8>,
     /// Boards that already show the program and will be started at the end.
     pub to_start: Vec<u8>,
@@ -49,7 +49,7 @@ impl UpdateSession {
         self.results.iter_mut().find(|r| r.board == board)
     }
 
-    /// Marks the board as in progress. Other boards of its group may be in progress as well.
+    /// Marks the board as in progress. Other boards in the group of this board may be in progress as well.
     pub(super) fn begin(&mut self, board: u8) {
         if !self.active.contains(&board) {
             self.active.push(board);
@@ -70,7 +70,7 @@ impl UpdateSession {
         *known = stage.max(*known);
     }
 
-    /// Records that PC_INFO shows the same state as before the update, so the frames that might have erased the board did not do so.
+    /// Records that PC_INFO shows the same state as before the update. The frames that could have erased the board therefore had no effect.
     pub(super) fn proved_untouched(&mut self, board: u8) {
         if self.stage(board) == Stage::MaybeErased {
             self.stages.remove(&board);
@@ -127,7 +127,7 @@ impl UpdateSession {
         self.fail(board, failure);
     }
 
-    /// Records a cancel by the user. If the board was commanded to start and is not known to be stopped, it may be running.
+    /// Records a cancel by the user. If the board received a start command and is not known to be stopped, it may be running.
     pub(super) fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
         let started = self.starting == Some(board);
@@ -137,7 +137,7 @@ impl UpdateSession {
         }
     }
 
-    /// Cancels the starts of boards that are otherwise done.
+    /// Cancels the starts of boards whose update is done except for the start.
     pub(super) fn cancel_starts(&mut self) {
         for board in core::mem::take(&mut self.to_start) {
             let left = self.outcome(board);

@@ -1,4 +1,4 @@
-//! Attempt to transfer both cycles, block by block. Each block must be answered before the next one is sent (U-5).
+//! Attempt to transfer both cycles to the boards, block by block. Each block must be answered before the next one is sent (U-5).
 use crate::master::engine::{Event, Link, MS};
 use crate::master::reports::update::{Progress, UpdatePlan};
 use ucom::{BLOCK_LEN, ErrorCode, FromBoard, Function, Sequence, ToBoard};
@@ -16,15 +16,15 @@ pub(super) enum Broken {
         block: usize,
         waited_ms: u64,
     },
-    /// No answer to the very last block. PC_INFO must show the result (U-9).
+    /// No answer to the very last block arrived. PC_INFO must show the result (U-9).
     NoFinish {
         waited_ms: u64,
     },
 }
 
 impl Broken {
-    /// Returns `true` if the board drops the following frames (D-43), because it has reported a programming error. After any other error,
-    /// and after silence, the board may still accept frames.
+    /// Returns `true` if the board discards the following frames (D-43), because it has reported a programming error. After any other
+    /// error, and after silence, the board may still accept frames.
     pub(super) fn ended_transfer(self) -> bool {
         use ErrorCode::{CanReceive, Checksum, Data, ExloadCycle, Flash, MemProtected, Overrun};
         let Self::Device { code, .. } = self else { return false };
@@ -45,7 +45,7 @@ pub(super) struct Attempt<'a> {
     pub since: u64,
 }
 
-/// Results of the boards of an attempt.
+/// Results of an attempt, for each board.
 #[derive(Debug, Default)]
 pub(super) struct Transferred {
     pub finished: Vec<u8>,
@@ -53,8 +53,8 @@ pub(super) struct Transferred {
 }
 
 impl Attempt<'_> {
-    /// Sends both cycles. Calls `erasing` before the first frame of a cycle that may erase, with the boards that still take part and the
-    /// boards that have dropped out.
+    /// Sends both cycles. Calls `erasing` before the first frame of a cycle that may erase. The arguments are the boards that still take
+    /// part and the boards that have dropped out.
     pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8], &[(u8, Broken)])) -> Transferred {
         let mut out = Transferred::default();
         let mask = self.boards.iter().fold(0, |mask, b| mask | 1 << b);
@@ -84,7 +84,8 @@ impl Attempt<'_> {
         out
     }
 
-    /// Sends the eight frames of a block. A frame that was received before the last of them left is not an answer to the block.
+    /// Sends the eight frames of a block. A frame that was received before the last of these frames left the queue is not an answer to the
+    /// block.
     async fn send(&self, block: &[u8; BLOCK_LEN]) {
         let (frames, _) = block.as_chunks::<8>();
         let mut next = 0;
@@ -95,7 +96,7 @@ impl Attempt<'_> {
         }
     }
 
-    /// Waits for the answers of all boards. A board that reports an error or stays silent drops out of the attempt.
+    /// Waits for the answers of all boards. A board that reports an error or stays silent does not take part in the attempt any more.
     async fn wait(&mut self, cycle: u32, block: usize, slow: bool, last: bool, out: &mut Transferred) {
         let times = self.link.times();
         let timeout = if slow { times.erase } else { times.ready };

@@ -27,7 +27,7 @@ pub enum UpdateFailure {
         block: usize,
         /// Number of attempts.
         attempts: u32,
-        /// `true` if something was erased.
+        /// `true` if memory was erased.
         erased: bool,
     },
     /// The board did not confirm a block in time.
@@ -43,10 +43,10 @@ pub enum UpdateFailure {
         waited_ms: u64,
         /// Number of attempts.
         attempts: u32,
-        /// `true` if something was erased.
+        /// `true` if memory was erased.
         erased: bool,
     },
-    /// The board reported that it is done, or should have done so, but it shows another program.
+    /// The board reported, or should have reported, that it is done, but it shows another program.
     #[error(
         "the board shows Program ID 0x{program_id:04X}, date 0x{date:04X} instead of 0x{wanted_id:04X}{}",
         wanted_date.map_or_else(String::new, |date| format!(", 0x{date:04X}"))
@@ -61,7 +61,7 @@ pub enum UpdateFailure {
         /// Flash date of the image; `None` if it is not known.
         wanted_date: Option<u16>,
     },
-    /// The board reported that it is done, but in its exloader it shows no application.
+    /// The board reported that it is done, but it is in its exloader and shows no application.
     #[error(
         "the board reports that programming is complete, but shows no valid application in its exloader: \
          Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
@@ -77,25 +77,25 @@ pub enum UpdateFailure {
     /// The board shows the program, but the application did not start.
     #[error("the board shows the program, but the start failed: {0}")]
     NotRunning(Box<Error>),
-    /// The board already showed the program but was in programming mode, and this mode could not be ended.
+    /// The board already showed the program, but it was in programming mode and did not leave this mode.
     #[error("the board already shows the program, but may still be in programming mode: {0}")]
     StillProgramming(Box<Error>),
-    /// A step failed after something was erased.
+    /// A step failed after memory was erased.
     #[error("{0}")]
     After(Box<Error>),
-    /// The board had dropped out of the group and does not answer. Frames to the group may have erased it.
+    /// The board no longer takes part in the group and does not answer. Frames to the group may have erased it.
     #[error("the board may be erased, because it could receive frames of the group: {0}")]
     MayBeErased(Box<Error>),
     /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]
     Cancelled {
-        /// State after the cancel. This is the board's outcome, or `Running` if the application may be running.
+        /// State after the cancel. The state is the outcome of the board, or `Running` if the application may be running.
         left: UpdateOutcome,
     },
     /// An earlier board of the list failed, so this board was skipped.
     #[error("not started, because the update of board {after} failed")]
     Skipped {
-        /// The board that failed.
+        /// Board that failed.
         after: u8,
     },
 }

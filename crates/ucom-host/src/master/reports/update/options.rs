@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use crate::files::{FlashRecord, Image};
 
-/// An image and its load address.
+/// Image and its load address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateImage {
-    /// Bytes in wire order. All plans and cycles share them.
+    /// Bytes in wire order. All plans and cycles share these bytes.
     pub bytes: Arc<[u8]>,
     /// Load address in words.
     pub address_words: u32,
@@ -19,12 +19,12 @@ impl From<Image> for UpdateImage {
     }
 }
 
-/// A board to be updated.
+/// Board to be updated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UpdateTarget {
     /// Board number.
     pub board: u8,
-    /// Flash number that the board must have (U-1); `None` for any.
+    /// Flash number that the board must have (U-1); `None` if any flash number is accepted.
     pub flash_number: Option<u16>,
 }
 
@@ -34,7 +34,7 @@ pub enum UpdateMode {
     /// One board after the other.
     #[default]
     OneByOne,
-    /// All boards at once by broadcast. Boards that drop out of the group are updated one by one afterwards.
+    /// All boards at once by broadcast. Boards that leave the group are updated one by one afterwards.
     Group,
 }
 
@@ -47,8 +47,8 @@ pub struct UpdateOptions {
     pub image: UpdateImage,
     /// Image of the other cycle. With the plan `exloader-app` this is the first cycle, with `pmem-xmem` and `raw` the second.
     pub second: Option<UpdateImage>,
-    /// Program ID. If the image does not determine it (plan `raw`, `prog.header` or `prog.checksum` `none`), the board must show this
-    /// Program ID at the end. Otherwise the image must have it.
+    /// Program ID. If the image does not determine the Program ID (plan `raw`, `prog.header` or `prog.checksum` `none`), the board must
+    /// show this ID at the end. Otherwise the image must have this Program ID.
     pub expect_program_id: Option<u16>,
     /// Flash date in 16 bits, see [`DateForm`](ucom::DateForm).
     pub date: u16,
@@ -60,18 +60,17 @@ pub struct UpdateOptions {
     pub name_target: bool,
     /// Order of the updates.
     pub mode: UpdateMode,
-    /// `true` to make only the checks, including the check for another PC. Only questions are sent.
+    /// `true` to perform only the checks, including the check for another PC. Only queries are sent.
     pub dry_run: bool,
-    /// Permission to update although boards are running (U-2), although another PC is on the bus, or although the board already shows the
-    /// program (U-3).
+    /// Permission to update if boards are running (U-2), if another PC is on the bus, or if the board already shows the program (U-3).
     pub force: bool,
-    /// Permission to update although the board already shows the program (U-3). Other checks still apply.
+    /// Permission to update if the board already shows the program (U-3). Other checks still apply.
     pub rewrite: bool,
     /// `true` to start the application at the end.
     pub start: bool,
-    /// `true` to report no failure for an image that cannot be verified (plan `raw`, or `prog.header` or `prog.checksum` `none`, without
-    /// [`expect_program_id`](Self::expect_program_id)). This also applies to a board that already shows the program but whose flash content
-    /// is not known (D-62).
+    /// `true` to accept an image that cannot be verified: with plan `raw`, or with `prog.header` or `prog.checksum` `none`, and without
+    /// [`expect_program_id`](Self::expect_program_id). The value also applies to a board that already shows the program but whose flash
+    /// content is not known (D-62).
     pub accept_unverified: bool,
     /// `true` to continue with the next board after a failure.
     pub keep_going: bool,

@@ -8,23 +8,22 @@ pub enum UpdateOutcome {
     /// Nothing was erased. The board is unchanged.
     #[default]
     NotStarted,
-    /// The user cancelled the update before anything was erased. The board is unchanged.
+    /// The user cancelled the update before memory was erased. The board is unchanged.
     Cancelled,
     /// The board shows the program, and the flash record has the same image at the same address (U-3, D-62). No program data were sent.
     UpToDate,
-    /// The board shows the program, but a flash record that shows its load address and content is missing (D-62). No program data were
-    /// sent.
+    /// The board shows the program, but no flash record confirms its load address and content (D-62). No program data were sent.
     ProgramUpToDate,
     /// Memory was erased and no image is complete. The board stays in its exloader and can be programmed again.
     Incomplete,
-    /// The old program of the board may be lost, and the board has not reported its state since.
+    /// The old program of the board may be lost, and the board has not reported its state afterwards.
     Unknown,
-    /// The board reported that the program is written, but PC_INFO did not confirm Program ID and date: it showed other values, did not
+    /// The board reported that the program is written, but PC_INFO did not confirm Program ID and date. PC_INFO showed other values, had no
     /// answer, or the expected values are not known ([`UpdateReport::unverifiable`](crate::master::update::UpdateReport::unverifiable)).
     Written,
     /// PC_INFO showed the new Program ID and date (U-10).
     Verified,
-    /// The application is running. [`UpdateResult::verified`](crate::master::update::UpdateResult::verified) shows whether the image is
+    /// The application is running. [`UpdateResult::verified`](crate::master::update::UpdateResult::verified) shows if the image is
     /// verified.
     Running,
 }

@@ -30,7 +30,7 @@ impl Cycle {
     }
 }
 
-/// Program that a board must show at the end.
+/// Program that a board must show at the end of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expected {
     /// Program ID.
@@ -46,7 +46,7 @@ impl Expected {
     }
 }
 
-/// Reasons why it is not known which program a board must show after the update.
+/// Reasons why the program that a board must show after the update is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unverifiable {
     /// Plan `raw`: the files do not show the Program ID.
@@ -68,13 +68,13 @@ impl fmt::Display for Unverifiable {
 }
 
 impl Unverifiable {
-    /// Returns how to make a verification possible.
+    /// Returns the change that makes a verification possible.
     pub fn hint(&self) -> &'static str {
         "for a verification, give the Program ID that the board must show: `--expect-program-id 0x…`"
     }
 }
 
-/// An image as it is sent.
+/// Image in the form in which it is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedImage {
     /// First and last cycle in which the image is sent: 1, 2 or both.
@@ -90,7 +90,7 @@ pub struct PlannedImage {
 }
 
 impl Unverifiable {
-    /// Returns the reason why PC_INFO cannot verify an update with this profile; `None` if it can.
+    /// Returns the reason why PC_INFO cannot verify an update with this profile; returns `None` if PC_INFO can verify it.
     fn by_profile(profile: &Profile) -> Option<Self> {
         match (profile.prog_plan, profile.prog_header, profile.prog_checksum) {
             (Plan::Raw, ..) => Some(Self::RawPlan),
@@ -133,7 +133,7 @@ fn parts<'a>(
     })
 }
 
-/// The data to send to a board, and the program that the board must show afterwards.
+/// Data to send to a board, and the program that the board must show afterwards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdatePlan {
     pub(crate) cycles: [Cycle; 2],
@@ -143,7 +143,7 @@ pub struct UpdatePlan {
     pub expected: Option<Expected>,
     /// Reason why the expected program is not known.
     pub unverifiable: Option<Unverifiable>,
-    /// First cycle that may erase flash, 1 or 2. Nothing is lost before that cycle.
+    /// First cycle that may erase flash, 1 or 2. Earlier cycles do not erase any data.
     pub erases_from: u32,
 }
 
@@ -158,9 +158,9 @@ impl UpdatePlan {
         let other = options.second.as_ref();
         let [first, last] = parts(plan, image, other)?;
         let erases_from = match plan {
-            // The first cycle only checks the image, or fills RAM. The application in flash stays valid.
+            // The first cycle only checks the image or fills RAM. The application in flash stays valid.
             Plan::VerifyWrite | Plan::ExloaderApp => 2,
-            // The first cycle writes program flash. The effect of raw files is known only to their author.
+            // The first cycle writes program flash. Only the author of raw files knows their effect.
             Plan::PmemXmem | Plan::Raw => 1,
         };
         let unverifiable = Unverifiable::by_profile(profile);
@@ -237,7 +237,7 @@ mod tests {
         UpdateOptions::new(vec![UpdateTarget { board: 1, flash_number: None }], image, 0x3AC1)
     }
 
-    /// The golden update: 1000 bytes, 17 blocks and 136 frames per cycle, Program ID 0x4B3F.
+    /// Golden update: 1000 bytes, 17 blocks and 136 frames per cycle, Program ID 0x4B3F.
     #[test]
     fn d41_golden_plan() {
         let bytes: Vec<u8> = (0..1000).map(|i| (37 * i + 11) as u8).collect();

@@ -20,7 +20,7 @@ pub struct UpdateResult {
     /// Outcome of the update.
     pub outcome: UpdateOutcome,
     /// `true` if PC_INFO shows the Program ID and date of the image, and this tool has written exactly this image to this address. The
-    /// image was written now, or earlier according to the flash record.
+    /// image was written in this update, or earlier according to the flash record.
     pub verified: bool,
     /// Number of attempts.
     pub attempts: u32,
@@ -51,11 +51,11 @@ impl UpdateResult {
 pub struct UpdateReport {
     /// Results in the order of the boards in the options.
     pub boards: Vec<UpdateResult>,
-    /// `true` if only questions were sent.
+    /// `true` if only queries were sent.
     pub dry_run: bool,
     /// Program ID that the boards must show; `None` if it is not known.
     pub program_id: Option<u16>,
-    /// Reason why it is not known, so that the written program cannot be verified.
+    /// Reason why this Program ID is not known, so that the written program cannot be verified.
     pub unverifiable: Option<Unverifiable>,
     /// `true` if programs that were written but not verified are accepted.
     pub accept_unverified: bool,
@@ -68,7 +68,7 @@ pub struct UpdateReport {
 }
 
 impl UpdateReport {
-    /// Returns the kind of failure, which is the most serious one of all boards. `None` if the update succeeded.
+    /// Returns the most serious kind of failure of all boards. Returns `None` if the update succeeded.
     pub fn failure(&self) -> Option<ErrorKind> {
         let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
         let unproven = self.boards.iter().filter(|b| !self.accept_unverified && b.failure.is_none());
@@ -102,14 +102,14 @@ impl UpdateReport {
         is_shown.then(|| format!("flashed {}", date_text(profile, before.date)))
     }
 
-    /// Returns the outcome of a board in words. If the board keeps another date, the words contain it: `up-to-date (flashed 2026-11-25)`
-    /// (U-3).
+    /// Returns the outcome of a board in words. If the board keeps another date, the text contains the date: `up-to-date (flashed
+    /// 2026-11-25)` (U-3).
     pub fn outcome_words(&self, result: &UpdateResult, profile: &Profile) -> String {
         let name = result.outcome.name();
         self.flashed(result, profile).map_or_else(|| name.into(), |flashed| format!("{name} ({flashed})"))
     }
 
-    /// Returns how it is known that a board already has the program; `None` for boards that did not already show it.
+    /// Returns the evidence that a board already has the program; returns `None` for boards that did not already show the program.
     pub fn shown_already(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let same = match self.flashed(result, profile) {
             Some(flashed) => format!("same Program ID, {flashed}"),

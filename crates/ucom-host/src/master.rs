@@ -8,9 +8,9 @@
 //! 3. handle [`Master::take_event`];
 //! 4. wait for the next frame, at most until [`Master::next_deadline`].
 //!
-//! Deliver all received frames before you call `poll`. Waits end only in `poll`, so a late driver never mistakes an answer for silence.
-//! [`Master::poll_behind`] is for frames that arrive during the delivery. Time is in microseconds since any start and must not go back (a
-//! monotonic clock).
+//! Deliver all received frames before you call `poll`. A wait ends only in `poll`. A late driver therefore does not treat a board as silent
+//! although its answer has arrived. [`Master::poll_behind`] is for frames that arrive during the delivery. Times are in microseconds since
+//! an arbitrary start, from a monotonic clock.
 //!
 //! ```
 //! use ucom_host::master::{Event, Master, Outcome, Request};

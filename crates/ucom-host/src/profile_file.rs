@@ -14,9 +14,9 @@ pub enum ProfileFileError {
     /// The key does not exist.
     #[error("profile: unknown key `{key}`{}; the keys are: {}", near(.nearest), known())]
     UnknownKey {
-        /// The key in the file.
+        /// Key in the file.
         key: String,
-        /// The most similar key.
+        /// Most similar key.
         nearest: Option<&'static str>,
     },
     /// A value is outside the key's range.
@@ -24,7 +24,7 @@ pub enum ProfileFileError {
     Value {
         /// The key.
         key: &'static str,
-        /// The value in the file.
+        /// Value in the file.
         value: String,
         /// Allowed values.
         range: &'static str,
@@ -70,7 +70,7 @@ pub trait ProfileFile: Sized {
     ///
     /// # Errors
     ///
-    /// The text is not TOML, a key is unknown, or a value is out of range. Each error lists the allowed values.
+    /// The text is not TOML, a key is unknown, or a value is out of range. Each error message lists the allowed values.
     fn from_toml(text: &str) -> Result<Self, ProfileFileError>;
 
     /// Returns all keys as TOML, each with its meaning in a comment.

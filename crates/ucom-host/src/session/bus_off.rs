@@ -1,13 +1,13 @@
-//! Bus-off (ISO 11898-1): the message when the CAN controller of this computer has left the bus, and the next command.
+//! Bus-off (ISO 11898-1). The message reports that the CAN controller of this computer has left the bus, and names the next command.
 
-/// Minimum time between two messages in µs. With a bad wire the controller is bus-off again and again.
+/// Minimum time between two messages in µs. With a bad wire, the controller enters bus-off repeatedly.
 const AGAIN_US: u64 = 5_000_000;
 
 /// The likely causes.
 pub const WHY: &str =
     "too many of its frames failed: a wrong bit rate, no termination, or CAN_H and CAN_L swapped or shorted";
 
-/// Bus-off events reported so far.
+/// Number of bus-off events reported so far.
 #[derive(Debug, Default)]
 pub struct BusOff {
     reported: u64,
@@ -15,7 +15,7 @@ pub struct BusOff {
 }
 
 impl BusOff {
-    /// Returns the message for a new bus-off; `None` without a new bus-off, or if one was reported in the last 5 s.
+    /// Returns the message for a new bus-off. Returns `None` if there is no new bus-off, or if a bus-off was reported in the last 5 s.
     pub fn look(&mut self, times: u64, now_us: u64, url: &str) -> Option<String> {
         let new = times.saturating_sub(self.reported);
         if new == 0 || self.reported_us.is_some_and(|at| now_us.saturating_sub(at) < AGAIN_US) {
@@ -31,7 +31,7 @@ impl BusOff {
     }
 }
 
-/// Returns the command that ends the bus-off or finds its cause. Only the kernel's CAN interfaces stay off the bus until a command restarts
+/// Returns the command that ends the bus-off or shows its cause. Only the kernel's CAN interfaces stay off the bus until a command restarts
 /// them.
 pub fn next(url: &str) -> String {
     match url.strip_prefix("socketcan:") {
@@ -47,7 +47,7 @@ pub fn next(url: &str) -> String {
 mod tests {
     use super::*;
 
-    /// The first bus-off is reported at once, later ones at most every 5 s. The report contains the number of bus-offs.
+    /// The first bus-off is reported at once. Later bus-offs are reported at most every 5 s. The report contains the number of bus-offs.
     #[test]
     fn it_is_reported_once_and_counted() {
         let mut off = BusOff::default();

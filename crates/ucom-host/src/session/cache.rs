@@ -7,14 +7,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Size limit of a file that is read in advance, in bytes.
 const FILE_MAX: u64 = 1 << 20;
-/// Limit of files that wait to be written. Files beyond it are not stored on the disk.
+/// Limit of files that wait to be written. Further files are not stored on the disk.
 const WAITING_MAX: usize = 64;
 
 /// Cache of names, and a flag to ignore it.
 #[derive(Clone, Debug, Default)]
 pub struct Cache {
     place: Place,
-    /// `true` to ask the boards for their names although the names are cached.
+    /// `true` to request the names from the boards although the names are cached.
     pub fresh: bool,
 }
 
@@ -27,7 +27,7 @@ enum Place {
     Memory(Memory),
 }
 
-/// The files of a directory in memory, and the channel to the thread that writes new files.
+/// Files of a directory in memory, and the channel to the thread that writes new files.
 #[derive(Clone, Debug)]
 struct Memory {
     texts: Arc<Mutex<BTreeMap<String, String>>>,
@@ -35,7 +35,7 @@ struct Memory {
 }
 
 impl Cache {
-    /// Creates a cache in this directory; `None` for a session without a cache.
+    /// Creates a cache in this directory. With `None`, creates no cache for the session.
     pub fn new(directory: Option<PathBuf>, fresh: bool) -> Self {
         Self { place: directory.map_or(Place::Nowhere, Place::Directory), fresh }
     }
@@ -46,18 +46,18 @@ impl Cache {
         let Self { place: Place::Directory(directory), fresh } = self else { return self };
         let texts = Arc::new(Mutex::new(all(&directory)));
         let (writer, written) = sync_channel::<(String, String)>(WAITING_MAX);
-        // The thread ends with the last clone of this cache, but the clone does not wait for it. If data are not stored in time, they are
-        // read from the boards again.
+        // The thread ends with the last clone of this cache. The clone does not wait for the thread. If data are not stored in time, they
+        // are read from the boards again.
         std::thread::spawn(move || written.iter().for_each(|(name, text)| write(&directory, &name, text)));
         Self { place: Place::Memory(Memory { texts, writer }), fresh }
     }
 
-    /// Returns a cache that ignores the stored names, so that the boards are asked again.
+    /// Returns a cache that ignores the stored names, so that the names are requested from the boards again.
     pub(super) fn refreshed(&self) -> Self {
         Self { fresh: true, ..self.clone() }
     }
 
-    /// Reads a file; `None` if it does not exist or cannot be read.
+    /// Reads a file; returns `None` if the file does not exist or cannot be read.
     pub(super) fn read(&self, name: &str) -> Option<String> {
         match &self.place {
             Place::Nowhere => None,
@@ -68,7 +68,7 @@ impl Cache {
         }
     }
 
-    /// Stores a file. If writing fails, the failure is ignored.
+    /// Stores a file. An error while writing is ignored.
     pub(super) fn write(&self, name: String, text: String) {
         match &self.place {
             Place::Nowhere => {}
@@ -90,7 +90,7 @@ fn all(directory: &Path) -> BTreeMap<String, String> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let text = |entry: fs::DirEntry| {
         let name = entry.file_name().into_string().ok().filter(|name| name.ends_with(".json"))?;
-        // Only regular files are read. Reading from other files could block for ever.
+        // Only regular files are read. Reading from other files could block endlessly.
         let about = entry.metadata().ok().filter(|about| about.is_file() && about.len() <= FILE_MAX);
         about.and_then(|_| Some((name, fs::read_to_string(entry.path()).ok()?)))
     };

@@ -10,7 +10,7 @@ use super::error::SessionError;
 use super::selection::Boards;
 use crate::master::{Error, MasterError, Outcome, RawStatus, Request, StopLevel};
 
-/// Board number, with the board's answer to PC_INFO.
+/// Board number and the board's answer to PC_INFO.
 pub type Numbered = (u8, BoardInfo);
 
 /// Result of a stop of several boards, or of switching off their outputs.
@@ -22,7 +22,7 @@ pub struct Stopped {
     pub failed: Vec<(u8, SessionError)>,
 }
 
-/// Returns the board of an outcome, which must have exactly one.
+/// Returns the board of an outcome. The outcome must contain exactly one board.
 fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
     match outcome {
         Outcome::Status { board, info } => Ok((board, info)),
@@ -32,7 +32,7 @@ fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
 }
 
 impl SessionError {
-    /// Adds the boards that were changed before this error, if there are any.
+    /// Adds the boards that were changed before this error.
     #[must_use]
     pub fn after(self, done: impl IntoIterator<Item = u8>) -> Self {
         let done: Vec<u8> = done.into_iter().collect();
@@ -96,14 +96,14 @@ impl Driver {
         Ok(all)
     }
 
-    /// If there are several boards, checks that each of them answers before the first one is changed.
+    /// For several boards, checks that each board answers before the first board is changed.
     fn all_there(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let mut several = boards.iter().filter(|_| boards.len() > 1);
         several.try_for_each(|board| self.seen(*board).map(drop))
     }
 
-    /// Stops boards down to `level`. Sends all stop commands before it asks any board, so that a silent board does not delay the others.
-    /// Failures are collected.
+    /// Stops boards down to `level`. Sends all stop commands before it sends a query to any board, so that a silent board does not delay
+    /// the others. Failures are collected.
     ///
     /// # Errors
     /// The boards on the bus are not known, or no board answers.
@@ -129,12 +129,12 @@ impl Driver {
         Ok(stopped)
     }
 
-    /// Makes the outputs of boards safe; their control loops continue. Every board gets the command, even if this board or another one does
-    /// not answer. Failures are collected.
+    /// Makes the outputs of boards safe; their control loops continue. Every board gets the command, even if some boards do not answer.
+    /// Failures are collected.
     pub fn outputs_safe(&mut self, boards: &[u8], force: bool) -> Stopped {
         let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
         for board in boards {
-            // After Ctrl-C the remaining boards get no command, so their state is unknown.
+            // After Ctrl-C, the remaining boards do not get a command, so their state is unknown.
             let done = match self.stop_asked() {
                 true => Err(Error::Master(MasterError::Cancelled).into()),
                 false => self.run(Request::Stop { board: *board, level: StopLevel::Outputs, force }),
@@ -150,8 +150,8 @@ impl Driver {
         stopped
     }
 
-    /// Ends a run: first all control loops at once, then the applications in reverse order, then the session. Returns the boards that may
-    /// still run. Each reason is shown once, and the reason in `known` is not shown again.
+    /// Ends a run. First stops all control loops at once, then the applications in reverse order, and then ends the session. Returns the
+    /// boards that may still run. Each reason is shown once, and the reason in `known` is not shown again.
     pub fn halt(&mut self, boards: &[u8], known: Option<String>) -> Vec<u8> {
         self.stop_at_once(Some(boards));
         // A lost bus gives the same reason for all boards, so it is shown once.

@@ -1,11 +1,11 @@
-//! List of work that would remain if the process ended now, and of the commands that finish it.
+//! List of work that would remain undone if the process ended now, and of the commands that finish this work.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::master::{Request, StopLevel};
 
-/// Work that would remain if the process ended now, and the next command.
+/// Work that would remain undone if the process ended now, and the next command.
 type Cleanup = (String, String);
 
 /// List of unfinished work. Clones share one list, including the clone in the thread that receives Ctrl-C.
@@ -14,7 +14,7 @@ pub struct CleanupList(Arc<Mutex<State>>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Work that would remain of the requests in progress, the outermost request first.
+    /// Work of the requests in progress that would remain undone, the outermost request first.
     now: Vec<Option<Cleanup>>,
     /// Boards that a finished request left running.
     running: Vec<u8>,
@@ -47,12 +47,13 @@ impl State {
 }
 
 impl CleanupList {
-    /// Returns lines for the operator: the work that would remain if the process ended now, and the commands that finish it.
+    /// Returns lines for the operator. The lines name the work that would remain undone if the process ended now, and the commands that
+    /// finish it.
     pub fn words(&self) -> String {
         self.lock().words()
     }
 
-    /// Begins an action that is not a request. `what` is the work that would remain, `next` the next command.
+    /// Begins an action that is not a request. `what` is the work that would remain undone; `next` is the next command.
     pub fn begin_other(&self, what: &str, next: &str) {
         let mut state = self.lock();
         state.changed = true;
@@ -67,7 +68,7 @@ impl CleanupList {
         state.now.push(cleanup);
     }
 
-    /// Ends the request that began last. Boards that it has started or that run stay on the list until they are stopped.
+    /// Ends the request that began last. Boards that the request has started, or that run, stay on the list until they are stopped.
     pub fn end(&self, request: &Request, done: bool) {
         let mut state = self.lock();
         state.now.pop();
@@ -108,7 +109,7 @@ fn several(count: usize, list: &str) -> String {
     format!("board{} {list}", if count == 1 { "" } else { "s" })
 }
 
-/// Returns the work that would remain of a request; `None` if the request changes no board.
+/// Returns the work that would remain undone; returns `None` if the request changes no board.
 fn cleanup_of(request: &Request) -> Option<Cleanup> {
     let (what, next) = match request {
         Request::Scan | Request::Info { .. } | Request::Describe { .. } | Request::InitialInputs { .. } => {

@@ -21,7 +21,7 @@ use crate::master::{
 pub trait Operator {
     /// Returns `true` if the operator requested an end (Ctrl-C).
     fn stop_asked(&self) -> bool;
-    /// Shows a line. Must not wait until the line is read.
+    /// Shows a line. Must return without waiting until the line is read.
     fn note(&self, text: String);
     /// Handles an event that is not a result of the running procedure. `text` is the note for it.
     fn happened(&self, _event: &Event, text: Option<String>) {
@@ -29,13 +29,13 @@ pub trait Operator {
             self.note(text);
         }
     }
-    /// Called in each turn, even during procedures. For work that cannot wait for their end.
+    /// Called once per loop iteration, even during procedures. Used for work that cannot wait until the procedures end.
     fn turned(&self, _master: &mut Master, _link: &mut Link) {}
 }
 
-/// PC side on an open bus.
+/// Connection of the PC side to an open bus.
 pub struct Driver {
-    /// The master: procedures and boards.
+    /// Master: procedures and boards.
     pub master: Master,
     link: Link,
     pump: Pump,
@@ -51,7 +51,7 @@ struct Loss {
 }
 
 impl Driver {
-    /// Creates the PC side on a bus. `cleanup` lists the work that would remain of its requests.
+    /// Creates the PC side on a bus. `cleanup` lists the work of its requests that would remain undone.
     pub fn new(profile: Profile, link: Link, operator: Box<dyn Operator>, cleanup: CleanupList) -> Self {
         let (master, pump) = (Master::new(profile), Pump::default());
         Self { master, link, pump, operator, cleanup, lost: RefCell::default() }
@@ -72,7 +72,7 @@ impl Driver {
         self.operator.stop_asked()
     }
 
-    /// Delivers received frames and sends the frames that are due. Waits for either at most `patience`.
+    /// Delivers received frames and sends the frames that are due. Waits at most `patience` until a frame arrives or is due.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
         self.operator.turned(&mut self.master, &mut self.link);
@@ -101,7 +101,7 @@ impl Driver {
         self.ask(board, true)
     }
 
-    /// Like `seen`, but is not cancelled by Ctrl-C, because a cancelled procedure may have left the board in any state.
+    /// Like `seen`, but Ctrl-C does not cancel the read, because a cancelled procedure may have left the board in any state.
     pub fn seen_for_certain(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
         self.ask(board, false)
     }
@@ -113,12 +113,12 @@ impl Driver {
         }
     }
 
-    /// Stops the control loops of these boards, or of all boards by broadcast, before anything else is sent.
+    /// Stops the control loops of these boards, or of all boards by broadcast, before any other frame is sent.
     pub fn stop_at_once(&mut self, boards: Option<&[u8]>) {
         self.master.stop_at_once(self.link.now_us(), boards);
     }
 
-    /// Stops a board. Ctrl-C does not prevent this, so that no started board is left running.
+    /// Stops a board. Ctrl-C does not prevent this stop, so that no started board continues to run.
     pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), SessionError> {
         let request = Request::Stop { board, level, force: true };
         self.drive(request, false, &mut |_, _| {}).map(drop)
@@ -137,7 +137,7 @@ impl Driver {
             Err(error) => Err(error.into()),
         };
         self.cleanup.end(&request, result.is_ok());
-        // A board that does not answer may not have received the request, if this computer was bus-off.
+        // If this computer was bus-off, a board that does not answer may not have received the request.
         let was_off = self.link.times_bus_off() > times_off;
         result.map_err(|failure| match was_off && failure.kind() == ErrorKind::NoLink {
             true => SessionError::BusOff { failure: Box::new(failure), url: self.link.url().into() },
@@ -155,7 +155,7 @@ impl Driver {
         loop {
             let broken = self.turn(LOOK).err();
             if let Some(failure) = &broken {
-                // The bus has failed. The procedure ends at once with the results that are known.
+                // The bus has failed. The procedure ends at once, and its report contains the results that are known.
                 self.master.abandon(id, &failure.to_string());
             }
             while let Some(event) = self.master.take_event() {
@@ -196,7 +196,8 @@ impl Driver {
         self.operator.note(text);
     }
 
-    /// Returns an error if a board was lost, or if one of these boards has rebooted. The error is based on the supervision events so far.
+    /// Returns an error if a board was lost, or if one of these boards has rebooted. The check uses the supervision events that were
+    /// received so far.
     pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), SessionError> {
         let losses = self.lost.borrow();
         let lost = losses.iter().filter(|l| !l.rebooted).count();
@@ -231,7 +232,7 @@ impl Driver {
         }
     }
 
-    /// Like `numbers`, but accepts numbers that two boards share, because a stop reaches both.
+    /// Like `numbers`, but accepts numbers that two boards share, because a stop reaches both boards.
     pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         match boards {
             Boards::Some(numbers) => Ok(numbers.clone()),
@@ -245,7 +246,7 @@ impl Driver {
                 }));
                 numbers.sort_unstable();
                 if !numbers.is_empty() {
-                    // Boards that are not among these numbers are reported, so that they are not left out silently.
+                    // Reports boards that are not among these numbers, so that the user notices them.
                     let more = report.findings.iter().filter(|finding| finding.error().is_none());
                     more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);

@@ -1,4 +1,4 @@
-//! Errors of a session. Either a procedure failed, or something that it needs.
+//! Errors of a session. Either a procedure failed, or a file, a bus or a value that the procedure needs is not usable.
 use can_link::{CanError, InvalidFrame, OpenError};
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 
@@ -28,7 +28,7 @@ pub enum SessionError {
     /// The open bus failed.
     #[error("{0}")]
     Bus(CanError),
-    /// This bus cannot carry the frame.
+    /// The bus cannot carry the frame.
     #[error("{0}")]
     Frame(InvalidFrame),
     /// No answer was received while the controller of this computer was bus-off, so the request may never have been sent.
@@ -50,7 +50,7 @@ pub enum SessionError {
     /// No board answers.
     #[error("no board answers")]
     NoBoards,
-    /// Boards are present, but none of them has a number.
+    /// Boards exist on the bus, but none of them has a number.
     #[error("{}", if *boards == 1 { "1 board reports, but it has no number".to_owned() } else { format!("{boards} boards report, but none has a number") })]
     NoNumbers {
         /// Number of boards.
@@ -73,10 +73,10 @@ pub enum SessionError {
     /// The names of boards' inputs, outputs and parameters are not known.
     #[error("{}", unnamed(failed))]
     NoNames {
-        /// These boards, each with its error.
+        /// Boards without known names, each with its error.
         failed: Vec<(u8, SessionError)>,
     },
-    /// The outcome is not of the kind that the request has. This is an error in this library.
+    /// The type of the outcome does not match the request. This is an error in this library.
     #[error("unexpected outcome {0:?}")]
     Unexpected(Box<Outcome>),
 }
@@ -119,7 +119,7 @@ pub enum ValuesError {
         /// Name.
         name: String,
     },
-    /// A value is for a board that is not selected.
+    /// A value is assigned to a board that is not selected.
     #[error("{board}.{name}: board {board} is not one of the boards to {to}")]
     NotMeant {
         /// The board.
@@ -166,7 +166,7 @@ impl SessionError {
         matches!(self, Self::Procedure(Error::Exchange(_) | Error::Identity(_) | Error::Signal(_)))
     }
 
-    /// Returns `true` if the board could answer once its application is started.
+    /// Returns `true` if the board could answer after a start of its application.
     fn is_not_started(&self) -> bool {
         matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }
@@ -291,7 +291,7 @@ impl Diagnose for ValuesError {
     }
 }
 
-/// Returns the cause for each board. If there are several boards, adds the next command for each.
+/// Returns the cause for each board. For several boards, adds the next command for each board.
 fn unnamed(failed: &[(u8, SessionError)]) -> String {
     let asked = "the names of inputs, outputs and parameters are not known";
     match failed {

@@ -1,4 +1,4 @@
-//! Diagnosis of a bus: listens, sends questions if they cannot do harm, and reports findings.
+//! Diagnosis of a bus: listens, sends queries if they cannot do harm, and reports findings.
 
 use std::time::{Duration, Instant};
 
@@ -31,8 +31,8 @@ impl Examination {
 }
 
 impl Driver {
-    /// Listens to the bus for a while, then scans it. If a competing master is on the bus, no question is sent, because even questions
-    /// could interfere with the questions of that master (D-08).
+    /// Listens to the bus for a while, then scans it. If a competing master is on the bus, no query is sent, because a query could
+    /// interfere with the queries of that master (D-08).
     ///
     /// # Errors
     /// The bus failed, or the operator requested an end.

@@ -9,8 +9,8 @@ use crate::files::{FlashRecord, Inventory, InventoryError};
 use crate::master::update::{UpdateOptions, UpdateReport};
 use crate::master::{Event, Outcome, Request};
 
-/// Flash records of this tool (D-62). Records of boards in the inventory are stored in the inventory file, others in memory until the
-/// session ends.
+/// Flash records of this tool (D-62). Records of boards in the inventory are stored in the inventory file; other records are stored in
+/// memory until the session ends.
 #[derive(Debug, Default)]
 pub struct FlashRecords {
     inventory: Option<PathBuf>,
@@ -19,7 +19,7 @@ pub struct FlashRecords {
 }
 
 impl FlashRecords {
-    /// Creates the records of an inventory file, which need not exist. `None`: records are kept only during the session.
+    /// Creates the records of an inventory file, which need not exist. With `None`, records are kept only during the session.
     pub fn new(inventory: Option<PathBuf>) -> Self {
         Self { inventory, ..Self::default() }
     }
@@ -54,7 +54,7 @@ impl FlashRecords {
 
 impl Driver {
     /// Updates boards. The record of a board is removed before the board is reset for programming, and stored again after the board has
-    /// been read back. If the record cannot be removed, the update is cancelled before more is erased.
+    /// been read back. If the record cannot be removed, the update is cancelled before more memory is erased.
     ///
     /// # Errors
     /// The errors of [`Driver::run`], or the inventory cannot be read.

@@ -1,8 +1,8 @@
 //! Supervision of the boards of a run: which boards have left their control loops, and how old their values are.
 //!
 //! A board leaves its control loop by itself if the PC's heartbeats are missing, if another PC stops it, or if its application ends the
-//! loop. The board reports this in a single MCA_ADMIN_DATA frame. If that frame is lost, the outputs stop all the same, and the master
-//! reads the board's status.
+//! loop. The board reports this in a single MCA_ADMIN_DATA frame. If that frame is lost, the sensor outputs of the board stop in any case,
+//! and the master then reads the board's status.
 
 use std::collections::BTreeMap;
 
@@ -15,9 +15,9 @@ use crate::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, S
 
 /// Age in µs above which the last outputs are considered old. Outputs normally arrive every few milliseconds.
 const OLD_US: u64 = 500_000;
-/// Minimum time in µs between questions to a board that sends heartbeats but no outputs.
+/// Minimum time in µs between queries to a board that sends heartbeats but no outputs.
 const ASK_US: u64 = 1_000_000;
-/// A run has ended when no board has been in its loop for this time, µs.
+/// Time in µs after which a run has ended if no board has been in its control loop.
 const OVER_US: u64 = 3_000_000;
 
 /// Change of a board.
@@ -54,7 +54,7 @@ impl Change {
     }
 }
 
-/// A change of a board that is shown to the user at once.
+/// Change of a board that is shown to the user at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Notice {
     /// The board.
@@ -91,12 +91,12 @@ impl Notice {
     }
 }
 
-/// The boards of a run and their state.
+/// Boards of a run and their state.
 #[derive(Default)]
 pub struct Followed {
     boards: BTreeMap<u8, One>,
     asking: Option<ProcedureId>,
-    /// Time since when no board has been in its loop.
+    /// Time at which the last board left its loop.
     nobody_since: Option<u64>,
 }
 
@@ -104,11 +104,12 @@ pub struct Followed {
 struct One {
     last: Option<Snapshot>,
     out: bool,
-    /// `true` if any board was lost or has rebooted since this board started to run. With `on_lost` this may be the reason for its stop.
+    /// `true` if any board was lost or has rebooted since this board started to run. With `on_lost`, this loss or reboot may be the reason
+    /// for the stop of this board.
     lost: bool,
-    /// `true` if the board has ever left its loop before any board was lost or had rebooted.
+    /// `true` if the board left its loop at any time before a board was lost or had rebooted.
     left: bool,
-    /// `true` if the status byte shows that the board has left its loop. The board's own report was then lost.
+    /// `true` if the status byte shows that the board has left its loop. In this case, the board's own report was lost.
     status_out: bool,
     asked_us: u64,
 }
@@ -202,7 +203,7 @@ impl Followed {
     }
 
     /// Returns `true` if the run has ended: every board has left its loop, has rebooted, or was lost and stopped by `on_lost`. Only a new
-    /// run starts the loop of a board again. With `on_lost = report` the run waits for a lost board, which may still be in its loop.
+    /// run can start the loop of a board again. With `on_lost = report` the run waits for a lost board, which may still be in its loop.
     pub fn is_over(&mut self, master: &Master, now_us: u64) -> bool {
         let boards = master.boards();
         let waits_for_lost = master.profile().on_lost == OnLost::Report;
@@ -217,7 +218,7 @@ impl Followed {
         now_us.saturating_sub(*self.nobody_since.get_or_insert(now_us)) >= OVER_US
     }
 
-    /// Cancels the question in progress, so that the next request does not find the board busy.
+    /// Cancels the query in progress, so that the next request does not find the board busy.
     pub fn ask_no_more(&mut self, master: &mut Master) {
         if let Some(id) = self.asking.take() {
             master.cancel(id);
@@ -243,7 +244,7 @@ impl Followed {
     }
 }
 
-/// Returns `true` if missing heartbeats make the board's values doubtful.
+/// Returns `true` if the board's values are doubtful because heartbeats are missing.
 fn in_doubt(board: &Board) -> bool {
     board.rebooted || matches!(board.life, Life::Late | Life::Lost)
 }
@@ -263,7 +264,7 @@ mod tests {
 
     use super::*;
 
-    /// Delivers frames of board 1 at a time, and returns the notices.
+    /// Delivers frames of board 1 at the given times, and returns the notices.
     fn receive(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
         frames.iter().for_each(|text| master.handle(at_us, Ok(text.parse().unwrap())));
         let mut sent = Vec::new();
@@ -337,7 +338,7 @@ mod tests {
         assert!(followed.nobody_left().is_ok(), "the loss is what failed");
     }
 
-    /// Starting or stopping a board does not change the state of the others.
+    /// Starting or stopping a board does not change the state of the other boards.
     #[test]
     fn d37_boards_that_come_and_go_leave_the_others_as_they_were() {
         let (mut master, mut followed) = running();
@@ -351,7 +352,7 @@ mod tests {
             assert_eq!(stale(&master, &followed, 30_000), [true]);
             assert!(followed.nobody_left().is_err());
         }
-        // The board is restarted. Earlier losses no longer matter: when it leaves its loop, it does so by itself.
+        // The board is restarted. Earlier losses are not considered any more: when the board leaves its loop, it does so by itself.
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
         followed.add(&[1], 3_200_000);
@@ -374,7 +375,7 @@ mod tests {
         assert!(followed.is_over(&master, 5_100_000));
     }
 
-    /// A lost board has been stopped by the policy, so the run ends. With `report` the run waits for the board.
+    /// The policy has stopped a lost board, so the run ends. With `report` the run waits for the board.
     #[test]
     fn d51_a_lost_board_is_waited_for_only_where_nobody_stops_it() {
         for on_lost in [OnLost::StopAll, OnLost::StopBoard, OnLost::Report] {

@@ -1,8 +1,8 @@
-//! The boards that a session has started, and the data about them. All programs that own a bus for others use this module. A board whose
-//! state is in doubt is listed as started, because an additional stop does no harm.
+//! Boards that a session has started, and the data about them. All programs that own a bus for others use this module. A board whose state
+//! is in doubt is listed as started, because an additional stop does no harm.
 //!
 //! - [`Held`]: the state, which the session's [`Operator`](super::Operator) updates even during procedures.
-//! - [`Session`]: a driver with that state. All starts and stops of boards go through it.
+//! - [`Session`]: a driver with that state. Every start and stop of a board uses [`Session`].
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +24,7 @@ use crate::master::io::Snapshot;
 use crate::master::update::{UpdateOutcome, UpdateReport};
 use crate::master::{Event, InitReport};
 
-/// The boards that a session has started, and the data about them.
+/// Boards that a session has started, and the data about them.
 #[derive(Default)]
 pub struct Held {
     started: BTreeSet<u8>,
@@ -33,13 +33,13 @@ pub struct Held {
     pub followed: Followed,
     /// Last outputs of boards.
     pub snapshots: BTreeMap<u8, Snapshot>,
-    /// The names of boards.
+    /// Names of the boards' signals.
     pub known: BTreeMap<u8, Arc<Known>>,
     has_started: Arc<AtomicBool>,
 }
 
 impl Held {
-    /// Creates a state without started boards. `has_started` tells other threads whether there are started boards.
+    /// Creates a state without started boards. `has_started` shows other threads if there are started boards.
     pub fn new(has_started: Arc<AtomicBool>) -> Self {
         Self { has_started, ..Self::default() }
     }
@@ -95,7 +95,7 @@ impl Held {
 
 /// Session on a bus, with its state.
 pub struct Session {
-    /// The driver: procedures and boards.
+    /// Driver: procedures and boards.
     pub driver: Driver,
     /// Cache of names.
     pub cache: Cache,
@@ -106,7 +106,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Runs the bus for a moment. Waits at most `patience`.
+    /// Handles the frames of the bus for a short time. Waits at most `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         self.driver.turn(patience)?;
         while let Some(event) = self.driver.master.take_event() {
@@ -122,20 +122,20 @@ impl Session {
         self.held.borrow_mut().followed.look(&mut self.driver.master, now_us)
     }
 
-    /// Cancels background questions, so that the next request does not find the board busy.
+    /// Cancels background queries, so that the next request does not find the board busy.
     pub fn quiet(&mut self) {
         self.held.borrow_mut().followed.ask_no_more(&mut self.driver.master);
     }
 
-    /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands` is `false`). Otherwise the
-    /// boards of another PC would not become safe if that PC is lost (D-50).
+    /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands` is `false`). If the heartbeats
+    /// continued, the boards of another PC would not become safe after the loss of that PC (D-50).
     pub fn rest(&mut self, commands: bool) {
         if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
             self.driver.master.end_session();
         }
     }
 
-    /// Returns the names and meanings of a board's values. Asks the board if they are not known.
+    /// Returns the names and meanings of a board's values. Requests the names from the board if they are not known.
     pub fn known(&mut self, board: u8) -> Result<Arc<Known>, SessionError> {
         let kept = self.held.borrow().known.get(&board).cloned();
         let info = self.driver.master.boards().get(board).and_then(|board| board.info);
@@ -166,8 +166,8 @@ impl Session {
         known
     }
 
-    /// Runs an action that uses names. If a board no longer has the cached names, reads the names from the board and runs the action once
-    /// more.
+    /// Runs an action that uses names. If the cached names are not the names of the board, reads the names from the board and runs the
+    /// action once more.
     pub fn by_names<T>(
         &mut self,
         mut act: impl FnMut(&mut Self, &Cache) -> Result<T, SessionError>,
@@ -193,7 +193,7 @@ impl Session {
         let done = act(self);
         if done.is_err() {
             for board in boards.iter().filter(|board| !counted.contains(board)) {
-                // If this session is not master, it has sent only questions.
+                // If this session is not the master, it has sent only queries.
                 if !self.driver.master.is_master() || self.is_stopped(*board) {
                     self.runs_no_more(Some(*board));
                 }
@@ -202,7 +202,7 @@ impl Session {
         done
     }
 
-    /// Returns `true` if the board answers that its application does not run. Asks even if the request was cancelled.
+    /// Returns `true` if the board answers that its application does not run. Sends the query even if the request was cancelled.
     fn is_stopped(&mut self, board: u8) -> bool {
         self.driver.seen_for_certain(board).is_ok_and(|seen| !seen.info.status.has(Status::MSTART))
     }
@@ -229,7 +229,7 @@ impl Session {
         }
     }
 
-    /// Removes all data about a board whose number or application has changed or no longer exists.
+    /// Removes all data about a board whose number or application has changed, or which no longer exists.
     pub fn forget(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         held.runs_no_more(Some(board));
@@ -277,9 +277,9 @@ impl Session {
         }
     }
 
-    /// Handles new numbers of boards. All stored names are dropped. After a complete init no board is listed as started. After an
-    /// incomplete init, boards that are not in the report stay listed, because they may run under their old numbers. Boards whose status
-    /// shows a started application are listed, because they may not have received the reset.
+    /// Handles new numbers of boards. Removes all stored names. After a complete init no board is listed as started. After an incomplete
+    /// init, boards that are not in the report stay listed, because they may run under their old numbers. Boards whose status shows a
+    /// started application are listed, because they may not have received the reset.
     pub fn renumbered(&mut self, report: Option<&InitReport>) {
         let mut held = self.held.borrow_mut();
         match report {

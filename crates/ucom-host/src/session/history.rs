@@ -1,5 +1,5 @@
-//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now: the protocol has no
-//! read-back, and a restart of the application, which may go unnoticed, resets the parameters (D-35).
+//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now. The protocol does not allow
+//! them to be read back, and a restart of the application, which this tool may not notice, resets the parameters (D-35).
 
 use std::collections::BTreeMap;
 
@@ -17,14 +17,14 @@ pub struct Written {
     pub at: u64,
 }
 
-/// The values last written to the parameters of one board, by index in the buffer.
+/// Values last written to the parameters of one board, by index in the buffer.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(default)]
 pub struct History {
     program_id: u16,
     date: u16,
     par: BTreeMap<u16, Written>,
-    /// The cache, and the name of the file in it.
+    /// Cache, and the name of the file in the cache.
     #[serde(skip)]
     kept: (Cache, String),
 }

@@ -10,7 +10,7 @@ use crate::files::{BoardSignals, SignalTable};
 use crate::master::io::{DescriptionKey, IoDescription, Kind};
 use crate::master::{Outcome, Request, Setting};
 
-/// A board with its names and the meaning of its words.
+/// Board with its names and the meaning of its words.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// Board number.
@@ -19,15 +19,15 @@ pub struct Known {
     pub info: BoardInfo,
     /// Names.
     pub names: IoDescription,
-    /// Types, scales and units.
+    /// Signal types, scales and units.
     pub signals: BoardSignals,
     /// Names in the signal table that the program does not have.
     strays: Vec<String>,
 }
 
 impl Cache {
-    /// Returns a board with its names from the cache. If the cache does not have them, the running application is asked. If the cache
-    /// cannot be written, the failure is ignored, and the names are read again next time.
+    /// Returns a board with its names from the cache. If the cache does not have the names, requests them from the running application. If
+    /// the cache cannot be written, this is ignored, and the names are read again next time.
     pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, SessionError> {
         let info = driver.seen(board)?.info;
         if let Some(names) = self.kept(driver, &info) {
@@ -36,7 +36,8 @@ impl Cache {
         self.described(driver, table, board)
     }
 
-    /// Like `known`, for a board whose application must run. The board is asked, because cached names may belong to another application.
+    /// Like `known`, for a board whose application must run. The names are read from the board, because cached names may belong to another
+    /// application.
     pub fn described(
         &self,
         driver: &mut Driver,
@@ -57,7 +58,7 @@ impl Cache {
     /// Returns boards with their names. Boards in `must_run` are read as in [`Self::described`], others as in [`Self::known`].
     ///
     /// # Errors
-    /// [`SessionError::NoNames`] lists every board that failed, after all boards were asked. Other errors are returned at once.
+    /// [`SessionError::NoNames`] lists every board that failed, after all boards were asked. Errors of any other type are returned at once.
     pub fn all(
         &self,
         driver: &mut Driver,
@@ -80,7 +81,7 @@ impl Cache {
         if failed.is_empty() { Ok(all) } else { Err(SessionError::NoNames { failed }) }
     }
 
-    /// Returns the cached names of a program, without asking the board.
+    /// Returns the cached names of a program, without a query to the board.
     fn kept(&self, driver: &mut Driver, info: &BoardInfo) -> Option<IoDescription> {
         let key = DescriptionKey::of(info);
         if self.fresh || !info.has_application() {
@@ -111,7 +112,7 @@ impl Known {
         Setting { name, value: word.word }
     }
 
-    /// Returns this board with the names that it has sent since.
+    /// Returns this board with the names that it has sent in the meantime.
     pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
         if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }
@@ -137,7 +138,7 @@ fn with_signals(
     let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
     let mut strays: Vec<String> = strays.iter().map(|stray| format!("{who} has no {stray}")).collect();
     let mut signals = BoardSignals::new(&names, program, &profile);
-    // The user has a table and therefore expects units. Without an entry for this program, values would be sent unscaled.
+    // The user has a table and therefore expects units. Without an entry for this program, values would be sent without a scale.
     if table.is_given() && program.is_none() && info.has_application() {
         strays.push(format!("the table does not contain {who}"));
         signals = signals.raw_only();

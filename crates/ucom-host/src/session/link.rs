@@ -1,4 +1,4 @@
-//! An open bus, and the conversion between its frames and the frames of the protocol.
+//! Open bus, and the conversion between its frames and the frames of the protocol.
 
 use std::time::{Duration, Instant};
 
@@ -12,12 +12,12 @@ use crate::files::recording::{FrameKind, RecordedFrame};
 
 /// Longest wait that is timed precisely.
 const COARSE: Duration = Duration::from_millis(12);
-/// Interval at which the bus is polled during such a wait.
+/// Interval at which the bus is polled during a wait that is timed precisely.
 const LOOK: Duration = Duration::from_micros(100);
-/// Largest overrun of a sleep. The last part of a wait, of this length, is not slept.
+/// Largest time by which a sleep may end late. The thread does not sleep during this last part of a wait.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
-/// An open bus with its clock.
+/// Open bus with its clock.
 pub struct Link {
     bus: Box<dyn CanBus + Send>,
     url: String,
@@ -72,7 +72,7 @@ impl Link {
             }
             match left.checked_sub(OVERSLEPT) {
                 Some(left) => std::thread::sleep(left.min(LOOK)),
-                // The thread does not yield here, because on a busy machine it would lose some milliseconds.
+                // The thread does not yield at this point, because on a busy machine a yield would cost some milliseconds.
                 None => std::hint::spin_loop(),
             }
         }

@@ -7,19 +7,19 @@ use crate::files::Signal;
 use crate::master::io::{Kind, short};
 
 impl Known {
-    /// Returns the words of a buffer as a JSON object with signal names as keys. Values are in units if a signal table has the signal
-    /// (D-11).
+    /// Returns the words of a buffer as a JSON object with signal names as keys. A value is in its unit if a signal table contains the
+    /// signal (D-11).
     pub fn values(&self, kind: Kind, words: &[u16]) -> Value {
         named(self.names.names(kind), self.signals.all(kind), words)
     }
 
-    /// Returns the keys of this object, in the order of the buffer.
+    /// Returns the keys of the JSON object, in the order of the buffer.
     pub fn keys(&self, kind: Kind) -> Vec<String> {
         let names = self.names.names(kind);
         keys(names, names.len())
     }
 
-    /// Returns the units of the values under the same keys, for signals whose unit is in a signal table.
+    /// Returns the units of the signals whose unit is in a signal table, with the keys of the JSON object.
     pub fn units(&self, kind: Kind) -> Value {
         let (names, signals) = (self.names.names(kind), self.signals.all(kind));
         let pairs = keys(names, names.len()).into_iter().zip(signals);
@@ -28,8 +28,8 @@ impl Known {
     }
 }
 
-/// Returns `count` keys. A key is the short name of its signal if that is unique, otherwise the complete name. If the complete name is not
-/// unique either, the index is added.
+/// Returns `count` keys. A key is the short name of its signal if that name is unique; otherwise the key is the complete name. If the
+/// complete name is not unique either, the key also contains the index.
 fn keys(names: &[String], count: usize) -> Vec<String> {
     let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
     let key = |i: usize| match names.get(i) {

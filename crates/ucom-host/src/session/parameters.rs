@@ -1,4 +1,4 @@
-//! Parameters of boards: reads them from parameter files, and writes them with a check that they arrived.
+//! Parameters of boards. They are read from parameter files and written with a check that the boards received them.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::files::params::{
 use crate::master::io::Kind;
 use crate::master::{AdminChange, Error, Outcome, Request};
 
-/// A board, the words to write to it, and the words written before.
+/// Board, the words to write to it, and the words that were written before.
 #[derive(Debug)]
 pub struct Parameters {
     /// Board with its names.
@@ -28,7 +28,7 @@ pub struct Parameters {
     pub history: History,
 }
 
-/// Writes all words of all boards. Nothing is written until every board is ready.
+/// Writes all words of all boards. No word is written until every board is ready.
 pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(), SessionError> {
     for board in all.iter().filter(|p| !p.words.is_empty()) {
         become_master(driver, board.known.board, force)?;
@@ -54,7 +54,7 @@ pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result
     Ok(())
 }
 
-/// Listens for another PC before anything is sent (D-08). Returns `true` if the control loop runs.
+/// Listens for another PC before any frame is sent (D-08). Returns `true` if the control loop runs.
 pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, SessionError> {
     let change = AdminChange::default();
     match driver.run(Request::Admin { board, change, force })? {
@@ -63,8 +63,8 @@ pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool
     }
 }
 
-/// Sends the queued frames, then checks that the application still runs and has therefore received them. The board does not confirm inputs
-/// and parameters themselves (D-35). Frames are sent in order, so the answer to a question shows that all frames before it were sent.
+/// Sends the queued frames, then checks that the application still runs and has therefore received them. The board does not confirm the
+/// inputs and parameters (D-35). Frames are sent in order, so the answer to a query shows that all frames before the query were sent.
 pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
     let unknown = |why: String| Err(ValuesError::Unknown { board, why, written: None });
     match driver.seen(board) {
@@ -88,7 +88,7 @@ pub fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str>
     Some(board.name.as_str()).filter(|name| !name.is_empty())
 }
 
-/// A parameter file that is checked against the boards on the bus.
+/// Parameter file that is checked against the boards on the bus.
 #[derive(Debug)]
 pub struct ParameterFile {
     file: String,
@@ -96,7 +96,7 @@ pub struct ParameterFile {
     inventory: Option<Inventory>,
 }
 
-/// The words for one board in a parameter file: initial inputs, then parameters.
+/// Words for one board in a parameter file: initial inputs, then parameters.
 pub type FileWords = (Vec<Word>, Vec<Word>);
 
 impl ParameterFile {
@@ -117,7 +117,7 @@ impl ParameterFile {
         Ok(Self { file: path.display().to_string(), boards, inventory })
     }
 
-    /// Keeps only the selected boards. For a file that was read before the boards were known.
+    /// Keeps only the selected boards. Used for a file that was read before the boards were known.
     #[must_use]
     pub fn of_boards(mut self, meant: impl Fn(u8) -> bool) -> Self {
         self.boards.retain(|board| meant(board.number));

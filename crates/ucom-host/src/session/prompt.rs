@@ -1,4 +1,4 @@
-//! A bus with a short receive timeout. Its owner can check for requests often, so that a stop need not wait for a frame.
+//! Bus with a short receive timeout. The owner of the bus can check for requests often, so that a stop does not need to wait for a frame.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
 //! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered before a timeout can
-//! end. Neither direction can block the other.
+//! end. Sending and receiving cannot block each other.
 
 use std::time::Duration;
 
@@ -8,24 +8,23 @@ use ucom::{Foreign, Frame};
 use super::error::SessionError;
 use crate::master::Master;
 
-/// Longest wait. Ctrl-C is checked at this interval.
+/// Longest wait. Interval at which Ctrl-C is checked.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Limits before the due frames are sent: number of delivered frames, and time. With these limits a flooded bus does not stop the
-/// heartbeats.
+/// Limits before the due frames are sent: number of delivered frames, and time. With these limits, heartbeats continue on a flooded bus.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
 /// Limit of frames that are sent before received frames are handled.
 const MOST_SENT: usize = 64;
-/// On a bus that is flooded without end, frames older than this are assumed to be delivered, µs.
+/// Age in µs above which frames are assumed to be delivered, on a bus that is flooded permanently.
 const BEHIND_US: u64 = 1_000_000;
 
-/// A bus with a clock.
+/// Bus with a clock.
 pub trait Line {
-    /// Returns the time in µs since any start.
+    /// Returns the time in µs since an arbitrary start.
     fn now_us(&self) -> u64;
     /// Sends a frame.
     fn send(&mut self, frame: &Frame) -> Result<(), SessionError>;
-    /// Returns the next frame. Waits at most `timeout`; does not wait if it is zero.
+    /// Returns the next frame. Waits at most `timeout`; does not wait if `timeout` is zero.
     fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError>;
 }
 
@@ -73,7 +72,7 @@ impl Pump {
                         break;
                     }
                 }
-                // At that time no further frame had arrived.
+                // No further frame had arrived at that time.
                 None if wait.is_zero() => {
                     self.received_us = asked;
                     return Ok(());
@@ -86,7 +85,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Sends due frames. Returns `true` if there may be more of them.
+    /// Sends due frames. Returns `true` if more frames may be waiting.
     fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, SessionError> {
         for _ in 0..MOST_SENT {
             let Some(frame) = master.poll_behind(line.now_us(), self.received_us) else { return Ok(false) };
@@ -105,14 +104,14 @@ mod tests {
 
     use super::*;
 
-    /// A simulated bus with board 1, which answers PC_INFO within a millisecond. The process on it loses the CPU now and then.
+    /// Simulated bus with board 1, which answers PC_INFO within a millisecond. The process of the PC side sometimes loses the CPU.
     struct Bench {
         now: u64,
-        /// Frames on their way to the PC, by time.
+        /// Frames that travel to the PC, by time.
         coming: VecDeque<(u64, Frame)>,
         /// CPU losses before and after each access to the bus, µs. Each entry is used once.
         lost: VecDeque<u64>,
-        /// Period of frames from another member, µs.
+        /// Period of frames from another member of the bus, µs.
         flood_us: Option<u64>,
         flooded_up_to: u64,
         sent: Vec<(u64, Frame)>,
@@ -141,7 +140,7 @@ mod tests {
             self.sent.iter().filter(|(_, f)| *f == frame(text)).map(|(at, _)| *at).collect()
         }
 
-        /// Runs a request to its end.
+        /// Runs a request until it ends.
         fn run(&mut self, master: &mut Master, request: Request) -> Result<Outcome, crate::master::Error> {
             let mut pump = Pump::default();
             let id = master.start(self.now, request).unwrap();
@@ -200,8 +199,8 @@ mod tests {
         z ^ (z >> 27)
     }
 
-    /// The process may lose the CPU at any place, for longer than an answer takes. A frame that arrived during that time is not mistaken
-    /// for silence.
+    /// The process may lose the CPU at any point, for longer than an answer takes. A frame that arrived during that time must prevent a
+    /// timeout.
     #[test]
     fn a_lost_cpu_is_no_silence() {
         let ask = |lost: Vec<u64>| {

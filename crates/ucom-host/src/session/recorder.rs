@@ -17,7 +17,7 @@ enum Sink {
     Stream(CandumpWriter<Box<dyn Write>>),
 }
 
-/// A recording in progress. The recording has a master that only listens, to learn the numbers of the boards.
+/// Recording in progress. The recording contains a master that only listens, to learn the numbers of the boards.
 pub struct Recorder {
     sink: Sink,
     /// `true` if the format cannot represent frames of other protocols.
@@ -55,7 +55,7 @@ impl Recorder {
         Self { sink, only_protocol: false, channel: channel.into(), decoder, master, frames: 0, left_out: 0 }
     }
 
-    /// Writes a frame. The frame was received at `now_us` of the session and at `time_ns` since 1970.
+    /// Writes a frame. The frame was received at the session time `now_us`, and at `time_ns` since 1970.
     ///
     /// # Errors
     /// The frame cannot be written.

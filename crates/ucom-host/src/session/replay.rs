@@ -30,7 +30,7 @@ pub fn replay(
             if rest.is_zero() {
                 break;
             }
-            // Discards received frames so that they do not pile up.
+            // Discards received frames so that they do not fill the memory.
             bus.receive(rest.min(Duration::from_millis(100)))?;
             bus.news().into_iter().for_each(|news| operator.note(news));
         }
@@ -52,7 +52,7 @@ pub fn is_intrusive(frame: &RecordedFrame) -> bool {
     function.is_some_and(intrusive_function)
 }
 
-/// Returns `true` for functions that change boards or keep them running; `false` for questions and frames of boards.
+/// Returns `true` for functions that change boards or keep them running; returns `false` for queries and frames of boards.
 fn intrusive_function(function: ucom::Function) -> bool {
     use ucom::Function;
     let asks = matches!(function, Function::Info | Function::AskReport | Function::DumpIo | Function::DumpCi);

@@ -5,14 +5,14 @@ use std::str::FromStr;
 use super::error::ValuesError;
 use crate::files::SignalValue;
 
-/// Selected boards: numbers, a list, ranges, or all.
+/// Selection of boards: numbers, a list, ranges, or all boards.
 #[derive(Clone, Debug, Eq, PartialEq)]
 pub enum Boards {
     /// Every board that answers.
     All,
     /// No board.
     None,
-    /// These boards, in ascending order and without duplicates.
+    /// Listed boards, in ascending order and without duplicates.
     Some(Vec<u8>),
 }
 
@@ -57,11 +57,11 @@ impl FromStr for Boards {
 /// `NAME=VALUE` or `BOARD.NAME=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assignment {
-    /// The board; `None`: every selected board.
+    /// Board for the value; `None` for every selected board.
     pub board: Option<u8>,
     /// Name or index.
     pub name: String,
-    /// Value. Its word depends on the signal.
+    /// Value. The word for the value depends on the signal.
     pub value: SignalValue,
 }
 

@@ -15,7 +15,7 @@ use crate::files::params::ParamsWord;
 use crate::master::io::Kind;
 use crate::master::{Error, Outcome, Request, SignalError, StopLevel};
 
-/// A word for a signal.
+/// Word for a signal.
 pub type Word = ParamsWord;
 
 /// Converts the assignments for a board to words.
@@ -64,7 +64,7 @@ pub fn with_names<T>(
     }
 }
 
-/// Boards with their names. Applications were started only on boards that could not send their names otherwise.
+/// Boards with their names. The procedure started the applications only of boards that could not send their names otherwise.
 #[derive(Default)]
 pub struct Prepared {
     /// Boards by number.
@@ -87,7 +87,7 @@ impl Prepared {
                 // The board is recorded before the command is sent, because a cancelled start may still have reached it.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
-                    // If the request was refused, nothing was sent. A stop would be a command on the bus of another PC.
+                    // If the request was refused, no frame was sent. A stop would then be a command on the bus of another PC.
                     if e.kind() == ErrorKind::Refused {
                         self.started.borrow_mut().pop();
                     }
@@ -104,7 +104,7 @@ impl Prepared {
     }
 
     /// Stops the applications that were started only to read names, so that the boards are left as before if the action is refused. A
-    /// second call does nothing. Failures are shown to the operator.
+    /// second call has no effect. Failures are shown to the operator.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

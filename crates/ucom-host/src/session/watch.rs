@@ -10,7 +10,7 @@ use super::error::SessionError;
 use crate::master::doctor::{Controller, Observation, Severity, findings};
 use crate::master::{Boards, Event, Request, Statistics};
 
-/// Function and addressee of another PC's frame.
+/// Function of another PC's frame, and the number that the frame was sent to.
 pub type CompetingMaster = (Function, u8);
 
 /// Length of the bus load curve in seconds.
@@ -18,7 +18,7 @@ pub const HISTORY: usize = 120;
 /// Largest number of lines in the log.
 pub const LOG: usize = 200;
 
-/// Content of the view except the boards.
+/// Content of the view without the boards.
 pub struct Watch {
     /// The bus.
     pub url: String,
@@ -26,11 +26,11 @@ pub struct Watch {
     pub load: VecDeque<f64>,
     /// Events as time in s and text, oldest first.
     pub log: VecDeque<(f64, String)>,
-    /// Last frame of another PC that is master. If it is set, no question is sent.
+    /// Last frame of another PC that is a master. If this field is set, no query is sent.
     pub competing_master: Option<CompetingMaster>,
-    /// `true` if nothing may be sent.
+    /// `true` if no frame may be sent.
     pub listen_only: bool,
-    /// `true` to ask the boards for their identity.
+    /// `true` to request the identity of the boards.
     pub ask: bool,
     /// Profile of the boards.
     pub profile: Profile,
@@ -43,7 +43,7 @@ pub struct Watch {
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {
-    /// Creates the view of a bus. With `listen_only` nothing is ever sent.
+    /// Creates the view of a bus. With `listen_only`, the view never sends a frame.
     pub fn new(url: String, listen_only: bool, profile: Profile) -> Self {
         Self {
             url,
@@ -63,7 +63,7 @@ impl Watch {
         now_us >= QUIET_US
     }
 
-    /// Runs the bus for a moment.
+    /// Handles the frames of the bus for a short time.
     pub fn turn(&mut self, driver: &mut Driver) -> Result<(), SessionError> {
         driver.turn(Duration::from_millis(25))?;
         let time_s = driver.now_us() as f64 * 1e-6;
@@ -108,7 +108,7 @@ impl Watch {
         self.message = "Stop sent to all boards; `ucom stop all` also ends their applications".into();
     }
 
-    /// Asks the boards for their identity again, if questions are allowed.
+    /// Sends queries for the identity of the boards again, if queries are allowed.
     pub fn ask_again(&mut self) {
         self.ask = !self.listen_only;
         self.message = if self.listen_only {
@@ -126,8 +126,8 @@ impl Watch {
         }
     }
 
-    /// Asks the boards once, and again if the user requests it. Constant questions would look like a second master to other PCs (D-08), and
-    /// changes are received without questions.
+    /// Sends queries to the boards once, and again if the user requests it. Permanent queries would look like a second master to other PCs
+    /// (D-08), and changes are received without queries.
     fn question(&mut self, driver: &mut Driver) {
         if self.ask && !driver.master.is_busy() {
             self.ask = false;
@@ -141,15 +141,15 @@ impl Watch {
 pub struct Picture<'a> {
     /// Boards as last seen.
     pub boards: &'a Boards,
-    /// Traffic on the bus.
+    /// Data traffic on the bus.
     pub statistics: &'a Statistics,
     /// Numbers that two boards share, as text.
     pub shared: &'a [String],
-    /// CAN adapter, if it reports its state.
+    /// State of the CAN adapter, if the adapter reports it.
     pub controller: Option<Controller>,
     /// Time, µs.
     pub now: u64,
-    /// Content of the view except the boards.
+    /// Content of the view without the boards.
     pub watch: &'a Watch,
 }
 
@@ -160,7 +160,7 @@ pub struct Problems {
     pub causes: Vec<String>,
     /// Problems that do not keep boards from working.
     pub warnings: Vec<String>,
-    /// Next command for the most serious problem; empty if there is nothing to do.
+    /// Next command for the most serious problem; empty if no command is needed.
     pub next: String,
 }
 
@@ -184,7 +184,7 @@ impl Picture<'_> {
             next.push("ucom doctor".into());
         }
         let all = findings(&seen).into_iter();
-        // Silence is reported below, because its text depends on whether the boards were asked.
+        // Silence of boards is reported below, because the text depends on whether queries were sent to the boards.
         for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
             let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
             let text = format!("{}{why}", finding.what);
@@ -194,7 +194,7 @@ impl Picture<'_> {
                 &mut problems.warnings
             };
             list.push(text);
-            // A hint that refers to this view itself is replaced.
+            // If a hint refers to this view itself, the hint is replaced.
             let helps = finding.next.to_string();
             let own = helps.is_empty() || helps.contains("ucom monitor");
             next.push(if own { "ucom doctor".into() } else { helps });

@@ -1,4 +1,4 @@
-//! Runs the bodies of the fuzz targets on the stored inputs, on some handmade inputs, and on random ones.
+//! Runs the code of the fuzz targets with stored inputs, some manual inputs, and random inputs.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};

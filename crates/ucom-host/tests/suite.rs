@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of it.
+//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of this program.
 mod codes_page;
 mod fuzz_regressions;
 mod master;

@@ -1,5 +1,5 @@
-//! A bus in memory and in virtual time. The master is on one side, boards or a script on the other, and faults can be
-//! set for the frames between them.
+//! A bus in memory and in virtual time. The master is on one side, and boards or a script are on the other side. Faults can be set for the
+//! frames between the two sides.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Frame, Profile};
@@ -77,16 +77,16 @@ pub(super) struct Bench {
     pub events: Vec<(u64, Event)>,
     /// Number of a frame, and its fault.
     pub fault: Option<(usize, Fault)>,
-    /// Beginnings of frames that are lost, and how many of each are lost. `<` marks a frame of the master, `>` a
+    /// Beginnings of frames that are lost, and the number of frames to lose for each beginning. `<` marks a frame of the master, `>` a
     /// frame of a board.
     pub lose: Vec<(&'static str, u32)>,
-    /// Members that are disconnected: no frame reaches them, and none of their frames arrives.
+    /// Members that are disconnected. No frame reaches them, and none of their frames arrives.
     pub cut: Vec<usize>,
     pending_master: Option<Frame>,
     pending: Vec<Option<Frame>>,
     held: Option<(From, Frame)>,
     delayed: Vec<(u64, From, Frame)>,
-    /// The driver does nothing, as if the tool had been killed.
+    /// The driver does nothing, as after a kill of the tool.
     pub dead: bool,
 }
 
@@ -230,14 +230,14 @@ impl Bench {
         while self.now < until && self.step(until) {}
     }
 
-    /// Lets time pass until `done` returns `true`.
+    /// Advances the time until `done` returns `true`.
     pub(super) fn until(&mut self, done: impl Fn(&Self) -> bool) {
         while !done(self) {
             self.run(1);
         }
     }
 
-    /// Starts a procedure and waits for its end. Panics if it takes more than `limit_s` of virtual time.
+    /// Starts a procedure and waits for its end. Panics if the procedure takes more than `limit_s` of virtual time.
     pub(super) fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
         let id = self.master.start(self.now, request).expect("nothing else is under way");
         self.wait(id, limit_s)

@@ -37,9 +37,9 @@ fn d08_whose_heartbeat_is_it() {
     }
 }
 
-/// D-08, D-51: this PC is master, and another PC sends heartbeats for a board that is not started. The master reports
-/// these heartbeats and does not expect further ones. It does not attribute heartbeats of a board that this PC has
-/// started to another PC.
+/// D-08, D-51: this PC is master, and another PC sends heartbeats for a board that is not started. The master reports these heartbeats and
+/// does not expect further heartbeats. If this PC has started a board, the master does not attribute the heartbeats of that board to
+/// another PC.
 #[test]
 fn d08_d51_heartbeats_of_another_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -56,8 +56,8 @@ fn d08_d51_heartbeats_of_another_pc() {
     assert!(!bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { .. })), "{:?}", bench.events);
 }
 
-/// D-25: a board that starts its application by itself is not reported as a competing master. A board that is stopped
-/// and started again is not reported either.
+/// D-25: a board that starts its application by itself is not reported as a competing master. A board that is stopped and started again is
+/// also not reported as a competing master.
 #[test]
 fn d08_d25_no_board_is_mistaken_for_a_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -93,8 +93,7 @@ fn a_single_reset_is_checked() {
     assert_eq!((error.exit(), bench.count("004#")), (3, 0));
     assert!(error.hint().contains("ucom scan"), "{}", error.hint());
 
-    // If any single frame is lost, either the reset is done, or the board still has its number and the error reports
-    // that.
+    // If any single frame is lost, either the reset is done, or the board still has its number and the error reports this number.
     let mut whole = initialised(&[0x21, 0x42, 0x63]);
     let from = whole.log.len();
     whole.go(reset(2), 10).unwrap();
@@ -124,8 +123,7 @@ fn a_single_reset_is_checked() {
     );
 }
 
-/// The driver delivers frames late. The master does not mistake frames that are still in the driver for silence, and
-/// still sends heartbeats.
+/// The driver delivers frames late. A frame that is still in the driver does not count as silence, and the master still sends heartbeats.
 #[test]
 fn d50_a_driver_that_is_behind() {
     let mut master = ucom_host::master::Master::new(Profile::default());
@@ -141,7 +139,7 @@ fn d50_a_driver_that_is_behind() {
     assert_eq!((alive, asked), (6, 1), "the question is not repeated");
     master.handle(3_000 * MS, Ok(frame("141#2100011B34126E38")));
     master.handle(3_000 * MS, Ok(frame("141#0000")));
-    // The question is not repeated before its timeout.
+    // The query is not repeated before its timeout.
     for ms in 3_000..3_200 {
         while let Some(sent) = master.poll(ms * MS) {
             assert_ne!(sent, frame("201#"), "the question is not repeated");

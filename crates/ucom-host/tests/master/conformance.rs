@@ -1,4 +1,4 @@
-//! The conformance tests. Boards of this crate pass all of them, and each faulty board fails the test for its fault.
+//! The conformance tests. Boards of this crate pass all conformance tests, and each faulty board fails the test for its fault.
 
 use super::bench::Exit;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -42,7 +42,7 @@ fn failed(report: &ConformanceReport) -> Vec<String> {
     failed.map(|t| format!("{} {:?} {:?}", t.id, t.board, t.verdict)).collect()
 }
 
-/// Runs every test in both byte orders. Only tests that need a special bus are left out.
+/// Runs every test in both byte orders. The run omits only tests that need a special bus.
 #[test]
 fn boards_of_this_crate_pass_every_test() {
     for endian in [Endian::Little, Endian::Big] {
@@ -52,7 +52,7 @@ fn boards_of_this_crate_pass_every_test() {
         assert!(failed(&report).is_empty(), "{endian}: {:?}", failed(&report));
         let skipped: Vec<&str> =
             report.tests.iter().filter(|t| matches!(t.verdict, Verdict::Skipped(_))).map(|t| t.id).collect();
-        // At this point of the run no application runs, so these tests of questions are skipped.
+        // No application runs at this point, so these tests of queries are skipped.
         assert_eq!(
             skipped,
             ["D-T10", "D-T11", "D-T10", "D-T11", "D-T10", "D-T11", "D-T19", "D-T20", "D-T21"]
@@ -68,7 +68,7 @@ fn boards_of_this_crate_pass_every_test() {
     }
 }
 
-/// Without options, no actions that need permission are done. The frames of such a run are checked.
+/// Without options, the run performs no action that needs permission. The frames of such a run are checked.
 #[test]
 fn without_options_only_harmless_frames_leave() {
     let mut bench = numbered(Bench::chain(&[0x21, 0x42]));
@@ -79,8 +79,8 @@ fn without_options_only_harmless_frames_leave() {
     let mut last = 0;
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
-        // PC_INFO, PC_REPORT, a number that the board already has, and dumps. Heartbeats are sent as well, because
-        // `start` has begun them.
+        // Allowed are PC_INFO, PC_REPORT, a number that the board already has, and dumps. Heartbeats are sent as well, because `start` has
+        // begun them.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
             // PC_INIT is sent only to a board that has just reported this number.
@@ -109,7 +109,7 @@ fn running_boards_are_left_alone() {
     assert_eq!(refused.exit(), 4, "{refused}");
 }
 
-/// A board with a fault, which changes the frames that it receives and sends.
+/// Board with a fault, which changes the frames that the board receives and sends.
 struct Flawed {
     inner: TestNode,
     mistake: Mistake,
@@ -187,7 +187,7 @@ fn with(mistake: Mistake) -> Bench {
     Bench::new(profile, vec![Box::new(first), Box::new(second)])
 }
 
-/// Each fault is found by its test.
+/// Each fault is detected by the test for it.
 #[test]
 fn each_mistake_is_found_by_its_test() {
     let mistakes: [(&str, Mistake); 17] = [
@@ -201,7 +201,7 @@ fn each_mistake_is_found_by_its_test() {
                 if b.number().is_none() && f.id() == 0x2C1 { vec![*f, frame("240#")] } else { vec![*f] }
             }),
         ),
-        // The pin does not follow PC_SETSTATUS.
+        // The pin does not follow the value in PC_SETSTATUS.
         (
             "D-T4",
             receives(|_, f| {
@@ -212,7 +212,7 @@ fn each_mistake_is_found_by_its_test() {
             }),
         ),
         ("D-T5", receives(|b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] })),
-        // The value is masked.
+        // The board masks the value.
         ("D-T6", receives(|_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] })),
         // MSTART follows EXLRUN.
         (
@@ -228,7 +228,7 @@ fn each_mistake_is_found_by_its_test() {
             sends(|_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] }),
         ),
         ("D-T12", sends(|_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] })),
-        // A heartbeat is enough to start it again.
+        // A heartbeat is enough to start the loop again.
         (
             "D-T13",
             receives(|b, f| {

@@ -1,5 +1,5 @@
-//! The conformance tests leave boards as they found them: at their end, after a cancel, and when a board disconnects.
-//! The requests that they refuse are tested as well.
+//! The conformance tests restore the state of the boards at their end, after a cancel, and when a board disconnects. This file also tests
+//! the requests that the conformance tests refuse.
 
 use super::bench::Exit;
 use ucom::{Function, Status};
@@ -22,7 +22,7 @@ fn info(bench: &mut Bench, board: u8) -> BoardSeen {
     }
 }
 
-/// Three boards with numbers. The second is started; the third starts by itself but its application is not up yet.
+/// Three boards with numbers. The second board is started. The third board starts by itself, but its application does not run yet.
 fn chain() -> Bench {
     let mut bench = Bench::chain(&FLASH);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
@@ -65,8 +65,8 @@ fn report(bench: &mut Bench, id: ProcedureId) -> ConformanceReport {
     }
 }
 
-/// Cancels at moments throughout the tests. ASTART, MSTART, MCARUN, PROG and the numbers must be as before. The
-/// report is complete and lists a board that was erased.
+/// Cancels the tests at many different moments. ASTART, MSTART, MCARUN, PROG and the numbers must be as before. The report is complete and
+/// lists a board that was erased.
 #[test]
 fn cancelled_tests_leave_the_boards_as_they_were() {
     let mut bench = chain();
@@ -104,7 +104,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let named = report.left.iter().any(|l| l.starts_with("board 1 has no program now"));
         assert_eq!(named, programless, "moment {moment}: {:?}", report.left);
         assert_eq!(report.left.len(), usize::from(named), "moment {moment}: {:?}", report.left);
-        // After this time the board that starts by itself is up.
+        // After this time, the application of the board that starts by itself runs.
         bench.run(4_000);
         assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment} {:?}", report.tests.last());
     }

@@ -8,7 +8,7 @@ use super::chain::initialised;
 
 const IDS: [u16; 3] = [0x21, 0x42, 0x63];
 
-/// Every kind of fault for frame `at`; the frame's number determines the damaged bit.
+/// Every kind of fault for frame `at`. The number of the frame determines the damaged bit.
 pub(super) fn kinds(at: usize) -> [Fault; 6] {
     let bit = (at * 7 + 3) as u8;
     [
@@ -51,8 +51,8 @@ fn every_frame_of_an_init_disturbed() {
                 complete += 1;
             } else {
                 named += 1;
-                // If a single frame is only lost, doubled or late, the chain is always complete. Only a corrupted
-                // frame can leave it incomplete.
+                // If a single frame is only lost, doubled or late, the chain is always complete. Only a corrupted frame can result in an
+                // incomplete chain.
                 assert!(matches!(fault, Fault::Corrupted(_)), "{what}: {:?}", report.findings);
             }
         }

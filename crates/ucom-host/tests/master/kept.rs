@@ -8,7 +8,7 @@ fn kept(target: &str, body: fn(&[u8])) {
         for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let bytes = std::fs::read(file.path()).unwrap();
             body(&bytes);
-            // Texts are short: try each prefix, and each text without one of its bytes.
+            // The texts are short, so the test tries each prefix, and each text without one of its bytes.
             for at in 0..bytes.len().min(600) {
                 body(&bytes[..at]);
                 body(&[&bytes[..at], &bytes[at + 1..]].concat());

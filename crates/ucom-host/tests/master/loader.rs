@@ -1,15 +1,15 @@
-//! A board, as a table of frames, that accepts program data.
+//! Simulated board that accepts program data, as a table of frames.
 
 use ucom::Frame;
 
 use super::bench::{Bench, MS, Member};
 
-/// A board as a table. The board accepts every block; the last rule defines the end of the update.
+/// Board that is a table of frames. The board accepts every block; the last rule defines the end of the update.
 pub(super) struct Loader {
     /// Program ID and date in `DSP_INFO` before and after the update.
     pub info: [&'static str; 2],
-    /// Flash number that the board sends. It depends on the number of resets so far, and on whether the transfer was
-    /// cancelled since.
+    /// Flash number that the board sends. The arguments are the number of resets so far, and `true` if the transfer was cancelled after the
+    /// last reset.
     pub flash: fn(usize, bool) -> &'static str,
     /// Status of the board after all blocks.
     pub done_status: u8,
@@ -22,7 +22,7 @@ pub(super) struct Loader {
     pub delay: fn(usize) -> u64,
     /// Answer to a block instead of READY; an empty text means no answer.
     pub special: fn(usize, usize) -> Option<&'static str>,
-    /// Number of frames after which the board sends an error at once and accepts no more.
+    /// Number of frames after which the board sends an error at once and accepts no further frames.
     pub refuses_at: Option<usize>,
     pub out: Vec<(u64, Frame)>,
     pub waiting: bool,

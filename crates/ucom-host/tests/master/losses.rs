@@ -1,4 +1,4 @@
-//! Losses of several chosen frames together. Tests with a single fault do not cover these.
+//! Losses of several chosen frames together. Tests with a single fault do not cover these losses.
 
 use ucom::Profile;
 use ucom::node::Phase;
@@ -29,7 +29,7 @@ fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     assert_eq!(numbers, [Some(1), Some(2), Some(3)], "{result:?}");
 }
 
-/// D-46, U-4: PC_XRESET is never answered. If it is lost, the application still runs, and the master sends it again.
+/// D-46, U-4: PC_XRESET is never answered. If the command is lost, the application still runs, and the master sends the command again.
 #[test]
 fn d46_a_lost_xreset_is_repeated() {
     let mut bench = initialised(&[0x21]);

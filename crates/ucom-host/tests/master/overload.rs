@@ -10,7 +10,7 @@ use super::bench::{Bench, CI, MS, frame};
 
 const BOARDS: u8 = 8;
 
-/// Eight running boards whose inputs alone need 108 % of the bus.
+/// Eight running boards whose inputs alone would need 108 % of the bus time.
 fn overloaded() -> Bench {
     let profile = Profile { ci_period: 1, so_period: 1000, ..Profile::default() };
     let ids: Vec<u16> = (1..=BOARDS.into()).collect();
@@ -22,8 +22,8 @@ fn overloaded() -> Bench {
     bench
 }
 
-/// D-34, D-50: while a board's inputs wait, they are not queued again. So a change reaches its board soon, even after
-/// a long overload, and heartbeats are sent in time.
+/// D-34, D-50: while a board's inputs wait, they are not queued again. Therefore a change reaches its board soon, even after a long
+/// overload, and heartbeats are sent in time.
 #[test]
 fn d34_d50_inputs_that_wait_are_never_stale() {
     let mut bench = overloaded();
@@ -47,8 +47,8 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
     }
 }
 
-/// D-50: below the master there are more queues, for example that of a socket. The master puts no more inputs into
-/// them than the bus can carry. Otherwise heartbeats would wait behind inputs in those queues.
+/// D-50: between the master and the bus there are more queues, for example the queue of a socket. The master puts only as many inputs into
+/// these queues as the bus can carry. With more inputs, heartbeats would wait in these queues after the inputs.
 #[test]
 fn d50_no_more_inputs_than_the_bus_carries() {
     let mut bench = overloaded();
@@ -64,7 +64,7 @@ fn d50_no_more_inputs_than_the_bus_carries() {
         while let Some(frame) = master.poll(now) {
             queue.push_back((now, frame));
         }
-        // 1 Mbit/s; time of an idle bus is not carried over.
+        // At 1 Mbit/s. The time in which the bus is idle is not carried over.
         spare += MS;
         while let Some((since, next)) = queue.front()
             && spare >= frame_bits(next.dlc())
@@ -85,8 +85,8 @@ fn d50_no_more_inputs_than_the_bus_carries() {
     assert!(longest <= 200 * MS, "a heartbeat waited {longest} µs");
 }
 
-/// D-34: the driver sends only one frame every 20 ms. Then at most one package of each board's inputs waits, and it
-/// has the latest values.
+/// D-34: the driver sends only one frame every 20 ms. Then at most one package of each board's inputs waits, and this package has the
+/// latest values.
 #[test]
 fn d34_a_slow_driver_has_a_short_queue() {
     let mut bench = overloaded();

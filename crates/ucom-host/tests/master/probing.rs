@@ -14,7 +14,7 @@ use super::bench::{Bench, image};
 use super::chain::initialised;
 use super::update::options;
 
-/// P-20: the answers of boards with other profiles show these profiles, and the probe finds the right one.
+/// P-20: the answers of boards with other profiles show these profiles, and the probe derives the correct profile.
 #[test]
 fn p20_probe_finds_the_profile() {
     let others = [
@@ -48,8 +48,8 @@ fn p20_probe_finds_the_profile() {
     }
 }
 
-/// D-10: if the byte order is wrong, the error mentions the byte order and `probe`, and not the wire, the load or the
-/// flash numbers.
+/// D-10: if the byte order is wrong, the error mentions the byte order and `probe`. It does not mention the wire, the load or the flash
+/// numbers.
 #[test]
 fn d10_a_wrong_byte_order_is_named() {
     for (boards, here) in [(Endian::Big, Endian::Little), (Endian::Little, Endian::Big)] {
@@ -74,7 +74,7 @@ fn d10_a_wrong_byte_order_is_named() {
             problems[0].what.contains("byte order") && problems[0].next.to_string().contains("ucom probe"),
             "{problems:?}"
         );
-        // `update` is refused while the board has its old program. `info` shows the numbers and reports that they are wrong.
+        // `update` is refused while the board has its old program. `info` shows the numbers and reports that these numbers are wrong.
         let before = bench.log.len();
         let Ok(Outcome::Update(report)) = bench.go(Request::Update(options(&[1], 128)), 60) else { panic!() };
         let Some(UpdateFailure::Refused(error)) = &report.boards[0].failure else { panic!("{report:?}") };
@@ -87,12 +87,12 @@ fn d10_a_wrong_byte_order_is_named() {
         bench.go(Request::Info { board: 1 }, 60).unwrap();
         let noted = |(_, event): &(_, Event)| matches!(event, Event::Note { text, .. } if text.contains("wrong byte order"));
         assert!(bench.events[received..].iter().any(noted));
-        // `io`: a running application is needed for the description.
+        // `io`: the board sends its description only if an application runs.
         bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
         let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
         assert!(error.to_string().contains("byte order") && error.hint().contains("ucom probe"), "{error:?}");
     }
-    // If a flash number equals its swapped form by chance, the byte order is not reported as wrong.
+    // If a flash number happens to equal its swapped form, the byte order is not reported as wrong.
     let mut bench = Bench::chain(&[0x2121, 0x42]);
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 60), Ok(Outcome::Init(r)) if r.is_ok()));
 }
@@ -129,7 +129,7 @@ fn probe_of_checksum_and_heartbeats() {
     assert!(!bench.board(0).application.running);
 }
 
-/// After any end of a probe the session uses the same profile as before, and no board runs that did not run before.
+/// After any end of a probe, the session uses the same profile as before. Boards that did not run before do not run.
 #[test]
 fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
@@ -146,11 +146,11 @@ fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     assert_eq!(report.profile.prog_checksum, Checksum::Sum16, "{}", report.table());
     assert_eq!(bench.master.profile(), Profile::default());
     assert!(!bench.board(0).application.running && !bench.board(0).status().has(Status::MSTART));
-    // A board that was started stays started.
+    // A board whose application was started stays started.
     bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
     bench.go(Request::Probe(alive.clone()), 120).unwrap();
     assert!(!bench.board(0).application.running && bench.board(0).status().has(Status::MSTART));
-    // The probe is cancelled while it reads everything raw, and while a control loop runs with other heartbeats.
+    // The probe is cancelled while it reads all frames in raw form, and while a control loop runs with other heartbeats.
     for until in ["<201#", "<541#"] {
         let mut bench = numbered();
         let id = bench.master.start(bench.now, Request::Probe(alive.clone())).unwrap();
@@ -167,7 +167,7 @@ fn sent(from: super::bench::From, frame: &ucom::Frame) -> String {
     format!("{}{frame}", if from == super::bench::From::Master { '<' } else { '>' })
 }
 
-/// A probe that would end a running control loop is refused, unless forced.
+/// A probe that would end a running control loop is refused unless `force` is set.
 #[test]
 fn a_probe_that_would_end_control_loops_is_refused() {
     for asked in [

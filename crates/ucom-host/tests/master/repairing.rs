@@ -10,7 +10,7 @@ use super::update::{options, recorded, update};
 
 const FLASH: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
 
-/// A chain of four boards, of which these have rebooted; the pins of the other boards are still on.
+/// A chain of four boards. The given boards have rebooted; the pins of the other boards are still on.
 fn rebooted(boards: &[u8]) -> Bench {
     let mut bench = initialised(&FLASH);
     for board in boards {
@@ -28,8 +28,7 @@ fn numbers(bench: &mut Bench) -> Vec<u8> {
     (0..FLASH.len()).map(|i| bench.board(i).number().map_or(0, |n| n.number())).collect()
 }
 
-/// Checks that the result of the repair of board 2 is correct: after a success this board has the number and no other
-/// board has it.
+/// Checks that the result of the repair of board 2 is correct: after a success, only this board has the number.
 fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
     let numbers = numbers(bench);
     match result {
@@ -40,8 +39,8 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // The board did not receive the number, or the pin of its neighbour is still on. Such an error makes no
-        // statement about the numbers.
+        // The board did not receive the number, or the pin of its neighbour is still on. Such an error does not say which boards have
+        // numbers.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
@@ -54,7 +53,7 @@ fn d21_a_number_goes_to_one_board_only() {
     let result = repair(&mut bench, 2);
     assert!(matches!(&result, Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42), "{result:?}");
     is_sound(&mut bench, &result, "nothing lost");
-    // The pins are on again, so the other board gets its number. A board that has its number gets only questions.
+    // The pins are on again, so the other board gets its number. A board that has its number gets only queries.
     assert!(repair(&mut bench, 4).is_ok());
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
     let before = (bench.count("281#"), bench.count("1C1#0200"));
@@ -62,8 +61,7 @@ fn d21_a_number_goes_to_one_board_only() {
     assert_eq!((bench.count("281#"), bench.count("1C1#0200")), before);
 }
 
-/// The first board's incoming pin is always active. As long as it has no number, it would take any other number that
-/// is given.
+/// The first board's incoming pin is always active. As long as this board has no number, it would take any other number that is assigned.
 #[test]
 fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);
@@ -95,8 +93,8 @@ fn d21_no_single_fault_gives_a_number_twice() {
     }
 }
 
-/// Many frames are lost together: those that switch off the pin before the other board, the answers of that board,
-/// and the answers of the selected board.
+/// Several frames are lost together: frames that switch off the pin before the other board, the answers of that board, and the answers of
+/// the selected board.
 #[test]
 fn d21_no_losses_give_a_number_twice() {
     let mut shared = 0;

@@ -10,14 +10,14 @@ use super::bench::{Bench, CI, PAR, SO};
 use super::update::{check_program, options, update};
 
 proptest! {
-    /// Random frames at any time during any procedure. The master never panics or waits without end, and each
-    /// procedure ends exactly once.
+    /// Random frames at any time during any procedure. The master never panics and never waits endlessly, and each procedure ends exactly
+    /// once.
     #[test]
     fn any_frames_into_any_procedure(data in prop::collection::vec(any::<u8>(), 0..400)) {
         ucom_host::master::fuzzing::frames(&data);
     }
 
-    /// The same with identifiers of boards 1 to 3 and valid lengths, so that the master accepts more of the frames.
+    /// Like the previous test, but with identifiers of boards 1 to 3 and valid lengths, so that the master accepts more of the frames.
     #[test]
     fn likely_frames_into_any_procedure(
         choice: u8,
@@ -33,7 +33,7 @@ proptest! {
     }
 }
 
-/// Init, update and run with boards that have other profiles. Only the master's profile must be changed.
+/// Init, update and run with boards that have other profiles. The tests change only the master's profile.
 #[test]
 fn other_profiles() {
     let profiles = [

@@ -57,7 +57,7 @@ fn start_order() {
     assert_eq!((board.application.latched_ci.as_slice(), board.application.par[0]), (&[1500, 9][..], 120));
 }
 
-/// D-34: a change is sent at once. D-35: the shadow contains assumed values, and is unknown after a restart.
+/// D-34: a change is sent at once. D-35: the shadow contains assumed values. After a restart, the values are unknown.
 #[test]
 fn d34_d35_inputs_and_parameters() {
     let mut bench = running(&[0x21], &[1]);
@@ -76,7 +76,7 @@ fn d34_d35_inputs_and_parameters() {
     assert_eq!(bench.master.parameters(1), [ParValue::Unknown; 3]);
 }
 
-/// D-36: the description of each board is read once after its application has started. P-14: heartbeats continue meanwhile.
+/// D-36: the description of each board is read once after its application has started. P-14: heartbeats continue during this time.
 #[test]
 fn d36_p14_descriptions_are_cached() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -99,7 +99,7 @@ fn d36_p14_descriptions_are_cached() {
     assert_eq!(bench.count("582#"), 2);
     let alive = bench.times_of("680#");
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))));
-    // A board without a running application: the request is refused, and the error suggests the command that helps.
+    // If a board has no running application, the request is refused, and the error suggests the command that helps.
     let mut bench = initialised(&[0x21]);
     let error = bench.go(Request::Describe { board: 1, fresh: false }, 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::NoApplication { board: 1, valid: true }));
@@ -158,7 +158,7 @@ fn d14_dump_is_accepted_only_if_the_totals_fit() {
     assert!(matches!(read(&[]), (Err(Error::Exchange(ExchangeError::NoAnswer { tries: 3, .. })), 3)));
 }
 
-/// P-6: board 2 sends a dump. Meanwhile ten other boards send SO at full rate, and board 3 sends DSP_INFO.
+/// P-6: board 2 sends a dump. At the same time, ten other boards send SO at full rate, and board 3 sends DSP_INFO.
 #[test]
 fn p6_nothing_is_mixed_up() {
     let dump = [
@@ -216,7 +216,8 @@ fn d37_flags() {
     assert!(!bench.board(0).application.running);
 }
 
-/// A stop does the steps in reverse order: outputs, loop, application. The status changes from AB to 8B to 1B.
+/// A stop performs its steps in the order outputs, loop, application, which is the reverse of a start. The status changes from AB to 8B to
+/// 1B.
 #[test]
 fn stop_in_reverse() {
     let mut bench = running(&[0x21], &[1]);
@@ -261,7 +262,7 @@ fn p15_d51_lost_boards() {
         assert!((3_000 * MS..=3_100 * MS).contains(&(lost - last)), "{}", lost - last);
         for text in ["600#00000000", "602#00000000"] {
             let times = bench.times_of(text);
-            // The frame is sent three times, because one can be lost.
+            // The frame is sent three times, because a single frame can be lost.
             assert_eq!(times.len(), 3 * usize::from(frame == Some(text)), "{on_lost:?} {text}");
             assert!(times.iter().all(|at| at - lost <= 100 * MS));
         }
@@ -276,7 +277,7 @@ fn p15_d51_lost_boards() {
     }
 }
 
-/// A monitor without the role of master sends nothing when a board is lost.
+/// A monitor that is not the master sends nothing when a board is lost.
 #[test]
 fn only_a_master_stops_boards() {
     let script = (0..5).fold(Script::default(), |s, i| s.at(i * 1000, "681#"));
@@ -299,7 +300,7 @@ fn d26_reboot_of_a_running_board() {
     assert!(bench.events.iter().any(|(_, e)| *e == Event::Supervision { board: 2, change }));
     assert!(!bench.board(0).application.running);
     assert_eq!(bench.count("600#00000000"), 3);
-    // A repair gives the board its number again.
+    // A repair assigns the number to the board again.
     let repair = Request::Repair { board: 2, flash_number: 0x42, force: false };
     assert!(matches!(bench.go(repair, 10), Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42));
     let repair = Request::Repair { board: 2, flash_number: 0x63, force: false };
@@ -313,7 +314,7 @@ fn d26_reboot_of_a_running_board() {
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
-    // Starts at a heartbeat.
+    // The session starts at a heartbeat.
     let alive = bench.count("680#");
     bench.until(|b| b.count("680#") != alive);
     bench.master.end_session();
@@ -325,7 +326,7 @@ fn d50_end_of_session() {
     assert_eq!(bench.sent().len(), sent);
 }
 
-/// P-19: if the predicted load is above the limit, the start is refused before any loop runs.
+/// P-19: if the predicted load is above the limit, the start is refused before any control loop starts.
 #[test]
 fn p19_load_forecast() {
     let profile = Profile { so_period: 1, load_limit: 70, ..Profile::default() };
@@ -358,7 +359,7 @@ fn d33_snapshots() {
     assert!((9..=11).contains(&(snapshots.count() + 1)));
 }
 
-/// Only one procedure at a time may work with a board. Meanwhile a procedure for another board may run.
+/// Only one procedure at a time may work with a board. At the same time, a procedure for another board may run.
 #[test]
 fn one_procedure_a_board() {
     let mut bench = initialised(&[0x21, 0x42]);

@@ -1,4 +1,4 @@
-//! Rows of the acceptance table in which the boards are only a table of frames.
+//! Tests for rows of the acceptance table in which the boards are only a table of frames.
 
 use super::bench::Exit;
 use ucom_host::master::{
@@ -13,7 +13,7 @@ fn golden(boards: usize) -> Script {
     let mut script = Script::default().on("000#", reports).on("240#", reports);
     for (i, flash) in [0x21, 0x42, 0x63].into_iter().enumerate().take(boards) {
         let n = i + 1;
-        // The status is 19 first, and 1B after OPINIT has been set.
+        // The status is 0x19 first, and 0x1B after OPINIT has been set.
         let answer = |status: &str| {
             let numbers = format!("14{n}#{flash:02X}000{n}{status}34126E38");
             [numbers, format!("14{n}#0200"), format!("14{n}#55436F4D32206865"), format!("14{n}#61642070616E")]
@@ -53,7 +53,7 @@ fn p1_scan_is_harmless() {
     }
 }
 
-/// P-2, vector 13.1: the golden chain frame by frame; the end of the chain takes at most a second.
+/// P-2, vector 13.1: the golden chain frame by frame. The master detects the end of the chain within one second.
 #[test]
 fn p2_init_of_the_golden_chain() {
     let mut bench = Bench::script(golden(3));
@@ -91,13 +91,12 @@ fn p3_lost_ack_asks_info_first() {
     let report = init(&mut bench);
     assert!(report.is_ok(), "{:?}", report.findings);
     assert_eq!(bench.count("281#"), 1, "{:?}", bench.sent());
-    // No board answers at all. Between two PC_INIT there is always a PC_INFO.
+    // No board answers at all. The master always sends a PC_INFO between two PC_INIT.
     let sent: Vec<String> = bench.sent().into_iter().filter(|t| t == "282#" || t == "202#").collect();
     assert_eq!(sent, ["282#", "202#", "282#", "202#", "282#", "202#"]);
 }
 
-/// P-4, D-24: identifier and data of INITACK differ. The number is refused; the master does not choose one of the
-/// two.
+/// P-4, D-24: identifier and data of INITACK differ. The number is refused: the master does not choose between the two values.
 #[test]
 fn p4_d24_ack_mismatch_is_refused() {
     for ack in ["0C1#02", "0C2#01"] {
@@ -137,8 +136,8 @@ fn p16_spontaneous_report() {
     assert_eq!(*event, expected);
 }
 
-/// P-17, D-08: another master sends frames: the command is refused, unless forced. Heartbeats of a running board are
-/// not taken for frames of another master.
+/// P-17, D-08: if another master sends frames, the command is refused unless `force` is set. Heartbeats of a running board are not
+/// interpreted as frames of another master.
 #[test]
 fn p17_d08_second_master() {
     for foreign in ["680#", "341#0000000000000000", "240#", "581#"] {
@@ -161,7 +160,7 @@ fn p17_d08_second_master() {
     assert!(bench.log.iter().find(|(_, f, _)| *f == super::bench::From::Master).unwrap().0 >= 600_000);
 }
 
-/// P-18: an unknown error code is shown as its number.
+/// P-18: an unknown error code is reported as its number.
 #[test]
 fn p18_unknown_error_code() {
     let mut bench = Bench::script(Script::default().at(10, "081#2A"));
@@ -172,7 +171,7 @@ fn p18_unknown_error_code() {
     assert_eq!(code.number(), 0x2A);
 }
 
-/// D-T21: the reports of two boards are equal. The scan finds more boards than reports.
+/// D-T21: the reports of two boards are equal. The scan counts more boards than reports.
 #[test]
 fn dt21_two_boards_with_one_flash_id() {
     let info = |n: u8, status: &str| vec![format!("14{n}#21000{n}{status}34126E38"), format!("14{n}#0000")];
@@ -191,7 +190,7 @@ fn dt21_two_boards_with_one_flash_id() {
     assert!(report.findings.contains(&same), "{:?}", report.findings);
 }
 
-/// A board has sent a report but answers to no number: the init wire after the last board is broken.
+/// A board has sent a report but does not answer to any number, because the init wire after the last board is broken.
 #[test]
 fn init_names_a_broken_wire() {
     let script = Script::default()
@@ -218,7 +217,8 @@ fn d07_reports_by_data_byte() {
     assert!(report.findings.contains(&ScanFinding::Disagrees { ucom_id: 0x21 }));
 }
 
-/// D-14: before the master repeats a request, it waits until the truncated answer has ended. Otherwise old and new packages would mix.
+/// D-14: before the master repeats a request, it waits until the truncated answer has ended. Without this wait, old and new packages would
+/// mix.
 #[test]
 fn d14_a_truncated_answer_runs_dry() {
     let info = "141#2100011B34126E38";

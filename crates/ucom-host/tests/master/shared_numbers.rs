@@ -1,5 +1,4 @@
-//! Two boards with the same number (D-24): every request to this number fails with a specific error before anything
-//! is changed.
+//! Two boards with the same number (D-24). Every request to this number fails with a specific error before any board is changed.
 
 use super::bench::Exit;
 use ucom::{Profile, Status};
@@ -21,8 +20,8 @@ fn strapped(flash: [u16; 2]) -> Bench {
     Bench::new(Profile::default(), flash.map(board).into_iter().collect())
 }
 
-/// Two boards with number 1, which another PC gave them before it disconnected. `more` contains further frames of
-/// that PC by time in milliseconds.
+/// Two boards with number 1, which another PC assigned before it disconnected. `more` contains further frames of that PC by time in
+/// milliseconds.
 fn sharing(flash: [u16; 2], more: &[(u64, &str)]) -> Bench {
     let mut bench = strapped(flash);
     let script =
@@ -41,7 +40,7 @@ fn is_shared(error: &Error, flash: [u16; 2]) -> bool {
     *error == shared && error.exit() == 4 && error.code() == "number-shared"
 }
 
-/// Requests for this board, or requests that change all boards.
+/// Requests for board 1, or requests that change all boards.
 fn requests() -> Vec<Request> {
     let (board, force) = (1, false);
     let target = UpdateTarget { board, flash_number: Some(0x21) };
@@ -71,7 +70,7 @@ fn requests() -> Vec<Request> {
     ]
 }
 
-/// Returns `true` for questions and heartbeats.
+/// Returns `true` for queries and heartbeats.
 fn changes_nothing(frame: &str) -> bool {
     let id = u16::from_str_radix(&frame[..3], 16).unwrap();
     matches!(id >> 6, 8 | 9 | 22 | 23) || frame == "680#"
@@ -114,7 +113,7 @@ fn d24_nothing_is_done_to_two_boards_that_cannot_be_told_apart() {
     refuses([0x21, 0x21]);
 }
 
-/// The second board's answer comes late, after the answer of the first has ended.
+/// The answer of the second board comes late, after the answer of the first board has ended.
 #[test]
 fn d24_the_second_answer_may_come_late() {
     let answers = |ms: u64| {
@@ -158,9 +157,9 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
     assert_eq!((bench.count("541#"), bench.count("1C1#8000") > 0), (0, true), "{:?}", bench.sent());
 }
 
-/// A second board takes the number at any step while the first is programmed. The second board either sends an error
-/// about program data, or is flashed together with the first. In both cases the report gives the reason, no board
-/// stays in programming mode, and no success is reported.
+/// A second board takes the number at any step while the first board is programmed. The second board either sends an error about program
+/// data, or is flashed together with the first board. In both cases the report gives the reason, no board stays in programming mode, and no
+/// success is reported.
 #[test]
 fn d24_it_is_named_when_it_shows_in_an_update() {
     let strap = |flash| node(flash, WirePins::chain(1).remove(0), Profile::default());
@@ -222,7 +221,7 @@ fn d24_a_stop_stops_both() {
     assert!(bench.events.iter().any(reported));
 }
 
-/// A request that turns outputs off is handled like a stop.
+/// A request that switches outputs off is handled like a stop.
 #[test]
 fn d24_outputs_are_turned_off_on_both() {
     let mut bench =
@@ -232,7 +231,7 @@ fn d24_outputs_are_turned_off_on_both() {
     assert!((0..2).all(|i| !bench.board(i).application.running));
 }
 
-/// An init that gives one number to two boards takes the number back from both and reports it.
+/// An init that assigns one number to two boards removes the number from both boards and reports this.
 #[test]
 fn d24_an_init_leaves_no_number_to_two_boards() {
     let mut bench = strapped([0x21, 0x42]);
@@ -250,7 +249,7 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
     assert!(bench.go(Request::Info { board: 1 }, 10).is_err_and(|e| is_shared(&e, [0x21, 0x42])));
 }
 
-/// A scan lists the other findings. For the shared number it lists both boards instead of a board without a number.
+/// A scan lists the other findings. For the shared number, the scan lists both boards instead of a board without a number.
 #[test]
 fn d24_a_scan_names_both() {
     let mut bench = sharing([0x21, 0x42], &[]);
@@ -261,7 +260,7 @@ fn d24_a_scan_names_both() {
     assert!(shared.to_string().contains("flash numbers 0x0021 and 0x0042"), "{shared}");
 }
 
-/// If a gateway doubles a frame, or corrupts one frame, no second board is reported.
+/// A frame that a gateway doubles, or one frame that it corrupts, does not count as a second board.
 #[test]
 fn d24_a_doubled_frame_is_no_board() {
     let whole = {

@@ -1,4 +1,4 @@
-//! If a run fails to start, it leaves every board as it found it.
+//! If a run fails to start, it returns every board to its previous state.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -37,8 +37,8 @@ fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
     [0, 1, 2, 3].map(|i| (bench.board(i).phase(), bench.board(i).application.active))
 }
 
-/// P-19: a start with too much load is refused. Boards that were idle before are idle afterwards. If the master knows
-/// the descriptions, it does not even start a board.
+/// P-19: a start that would cause too much bus load is refused. Boards that were idle before are idle afterwards. If the master knows the
+/// descriptions, it does not even start a board.
 #[test]
 fn p19_a_refusal_leaves_every_board_as_it_was() {
     let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
@@ -63,8 +63,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
     }
 }
 
-/// For every board and step: the board does not answer to this step. Afterwards the other boards are as they were
-/// found.
+/// For every board and step, the board does not answer to this step. Afterwards the other boards are in their previous state.
 #[test]
 fn a_run_that_fails_is_undone() {
     let steps = [("> 14", "PC_INFO"), ("> 60", "flags"), ("> 6C", "initial inputs")];
@@ -79,14 +78,13 @@ fn a_run_that_fails_is_undone() {
             for board in (0..4).filter(|board| *board != silent) {
                 assert_eq!(after[board], FOUND[board], "board {} {what} of {} lost", board + 1, silent + 1);
             }
-            // The state of the silent board could not be read. Its outputs are never left active if they were safe
-            // before.
+            // The state of the silent board could not be read. The outputs of this board are never left active if they were safe before.
             assert!(!after[silent].1 || FOUND[silent].1, "{what}: {after:?}");
         }
     }
 }
 
-/// Ctrl-C at any moment of a start.
+/// The user presses Ctrl-C at any moment of a start.
 #[test]
 fn a_run_that_is_cancelled_is_undone() {
     let mut bench = found(Profile::default());
@@ -112,7 +110,7 @@ fn a_run_that_is_cancelled_is_undone() {
 }
 
 /// D-51: a board is lost while others are still being started. With `StopAll`, no further loop is started; with
-/// `Report`, the start continues. In both cases the boards that were idle before are idle again.
+/// `Report`, the start continues. In both cases, boards that were idle before are idle again.
 #[test]
 fn d51_a_board_lost_while_others_start() {
     for on_lost in [OnLost::StopAll, OnLost::Report] {
@@ -150,7 +148,7 @@ fn d51_a_board_lost_while_others_start() {
     }
 }
 
-/// After a failed run none of its procedures is still running, so the boards accept new requests.
+/// After a failed run, none of its procedures is still active, so the boards accept new requests.
 #[test]
 fn after_a_failed_run_boards_are_free() {
     let mut bench = initialised(&IDS);

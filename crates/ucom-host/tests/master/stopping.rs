@@ -1,5 +1,5 @@
-//! A stop works on a bus that loses frames and reports errors, and for a board that has received a start command but
-//! is not up yet.
+//! A stop works on a bus that loses frames and reports errors. It also works for a board that has received a start command but does not run
+//! yet.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -17,7 +17,7 @@ fn run(boards: &[u8]) -> Request {
     Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active: true, force: false })
 }
 
-/// From now on board 1 sends error 7 (CAN_RECEIVE) again and again, as on a bad bus.
+/// From now on, board 1 sends error 7 (CAN_RECEIVE) repeatedly, as on a bad bus.
 fn bad_bus(bench: &mut Bench) {
     let from = bench.now / MS;
     bench.join(Box::new((0..20_000).step_by(10).fold(Script::default(), |s, ms| s.at(from + ms, "081#07"))));
@@ -83,17 +83,17 @@ fn a_silent_board_gets_the_stop_more_than_once() {
     }
 }
 
-/// Ctrl-C while a board starts and its status does not show it yet. The board must not be reported as stopped.
+/// The user presses Ctrl-C while a board starts and its status does not show the start yet. The board must not be reported as stopped.
 #[test]
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
     for request in [run(&[1]), Request::Start { board: 1, force: true }] {
-        // The board shows the start one second after the command, and stops when it receives a stop after that.
+        // The status of the board shows the start one second after the command. The board stops if it receives a stop after that time.
         let (idle, started) = (info("1B"), info("8B"));
         let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
         let started: Vec<&str> = started.iter().map(String::as_str).collect();
         let was_run = matches!(request, Request::Run(_));
-        // Three questions come before the status changes: before the start, at the stop, and when the stop is read back.
+        // Three queries come before the status changes: before the start, at the stop, and when the stop is read back.
         let script = Script::default().rule("201#", 0, 3, &idle).on("201#", &started);
         let mut bench = Bench::script(script.on("601#00000000", &["601#00000000"]));
         bench.run(2_000);
@@ -134,8 +134,7 @@ fn slow_boards_are_idle_after_a_cancelled_run() {
     }
 }
 
-/// A stop of all boards begins with a broadcast, which is sent three times. A stop of some boards is sent only to
-/// these.
+/// A stop of all boards begins with a broadcast, which is sent three times. A stop of some boards is sent only to these boards.
 #[test]
 fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -156,11 +155,11 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     bench.run(100);
     assert_eq!([0, 1, 2].map(|i| bench.board(i).application.running), [false, true, false]);
     assert_eq!(["601#00000000", "603#00000000", "600#00000000"].map(|f| bench.count(f)), [3, 3, 0]);
-    // A stop has the reverse order of the start.
+    // A stop performs the steps of the start in reverse order.
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 
-/// U-2: the master asks a board twice whether it runs, because one answer can be lost. Its outputs can be lost as
+/// U-2: the master sends two queries to determine if a board runs, because one answer can be lost. The outputs of the board can be lost as
 /// well.
 #[test]
 fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
@@ -172,7 +171,7 @@ fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     assert_eq!(bench.count("041#"), 0);
 }
 
-/// A running board keeps the inputs that another PC set, unless the user gives new ones.
+/// A running board keeps the inputs that another PC set, unless the user sets new inputs.
 #[test]
 fn a_board_that_runs_is_not_given_initial_inputs() {
     for given in [false, true] {
@@ -182,7 +181,7 @@ fn a_board_that_runs_is_not_given_initial_inputs() {
         bench.master.set_input(now, 1, CI[0], 1234).unwrap();
         bench.run(100);
         assert_eq!(bench.board(0).application.ci, [1234, 9]);
-        // Another PC takes over.
+        // Another PC becomes the master.
         bench.master = Master::new(Profile::default());
         let ci = given.then(|| Setting { name: CI[1].into(), value: 5 });
         let board = RunBoard { board: 1, ci: ci.into_iter().collect(), par: Vec::new() };

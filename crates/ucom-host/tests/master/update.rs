@@ -29,7 +29,7 @@ pub(super) fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport 
     }
 }
 
-/// Returns these options with the flash records of an update with the same image.
+/// Returns the options with the flash records of an update with the same image.
 pub(super) fn recorded(options: UpdateOptions, report: &UpdateReport) -> UpdateOptions {
     let image = &options.image;
     let record = |info: &BoardInfo| FlashRecord::new(&image.bytes, image.address_words, info);
@@ -42,7 +42,7 @@ pub(super) fn outcomes(report: &UpdateReport) -> Vec<&str> {
     report.boards.iter().map(|b| b.outcome.name()).collect()
 }
 
-/// Checks that a board has the old program, the new one, or none, and never a part of one.
+/// Checks that a board has the complete old program, the complete new program, or no program.
 pub(super) fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) {
     let record = bench.board(board).record();
     let bytes = bench.board(board).flash.bytes(Memory::Program).to_vec();
@@ -59,8 +59,8 @@ pub(super) fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16
     }
 }
 
-/// Returns `true` if the board reports the program, either because this update wrote it, or because the board had it
-/// before and no flash record proves the image.
+/// Returns `true` if the board reports the program: either this update wrote the program, or the board had it before and no flash record
+/// proves the image.
 fn shows_it(result: &UpdateResult) -> bool {
     matches!(result.outcome, UpdateOutcome::Verified | UpdateOutcome::ProgramUpToDate)
 }
@@ -80,11 +80,11 @@ fn golden_update() {
         ["2C1#4355010001000000", "2C1#00000000F4010000", "2C1#3F4BC13AFFFFFFFF", "2C1#FFFFFFFFFFFFFFFF"];
     assert_eq!(prog[..4], first);
     assert_eq!((prog[7].as_str(), prog[8].as_str()), ("2C1#FFFFFFFFFFFFDC22", "2C1#0B30557A9FC4E90E"));
-    // OPINIT does not change: the status is 1B before and after.
+    // OPINIT does not change: the status is 0x1B before and after.
     assert_eq!(sent.iter().rfind(|t| t.starts_with("141#2100")).unwrap(), "141#2100011B3F4BC13A");
     assert_eq!(sent.iter().filter(|t| *t == "041#").count(), 1);
     assert_eq!(check_program(&mut bench, 0, 1000), (0x4B3F, DATE));
-    // A second update finds the board up to date and sends only questions.
+    // A second update detects that the board is up to date, and sends only queries.
     let before = bench.log.len();
     let report = update(&mut bench, recorded(options(&[1], 1000), &report));
     assert_eq!((report.boards[0].outcome, report.boards[0].verified), (UpdateOutcome::UpToDate, true));
@@ -93,8 +93,8 @@ fn golden_update() {
     assert!(master.map(|(.., f)| f.to_string()).all(|t| silent.contains(&t.as_str())));
 }
 
-/// P-7: the first frame of a block is sent only after READY of the previous block. P-14: heartbeats are sent every
-/// 500 ±50 ms meanwhile.
+/// P-7: the first frame of a block is sent only after READY of the previous block. P-14: heartbeats are sent every 500 ±50 ms during this
+/// time.
 #[test]
 fn p7_p14_flow_control_and_heartbeats() {
     let mut bench = initialised(&[0x21]);
@@ -187,8 +187,7 @@ fn p11_attempts_by_error() {
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 2));
 }
 
-/// An error in the middle of a block is an answer to this block: the master does not wait for READY, and makes no
-/// further attempt.
+/// An error in the middle of a block is an answer to this block: the master does not wait for READY and does not make another attempt.
 #[test]
 fn errors_in_the_middle_of_a_block_count() {
     let mut bench = loader(Loader { refuses_at: Some(3), ..Loader::new(34) });
@@ -198,7 +197,7 @@ fn errors_in_the_middle_of_a_block_count() {
     assert!(report.boards[0].failure.as_ref().is_some_and(code));
 }
 
-/// After an overrun the next attempt leaves more time between frames.
+/// After an overrun, the pause between frames is longer in the next attempt.
 #[test]
 fn overrun_widens_the_gap() {
     let special = |reset, block| (reset == 1 && block == 2).then_some("081#04");
@@ -231,7 +230,7 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
     assert_eq!((report.exit(), bench.count("041#")), (4, 0));
 }
 
-/// No board answers. The exit code is 3, and nothing intrusive was sent.
+/// No board answers. The exit code is 3, and no frame that changes a board was sent.
 #[test]
 fn update_of_nobody() {
     let mut bench = Bench::script(Script::default());
@@ -290,7 +289,7 @@ fn p13_killed_tool() {
     }
 }
 
-/// U-2: an update is refused while a board runs, unless forced.
+/// U-2: an update is refused while a board runs, unless `force` is set.
 #[test]
 fn u2_running_boards() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -329,7 +328,7 @@ fn group_update() {
     assert_eq!(prog.count(), 48);
 }
 
-/// A dry run reads the boards and changes nothing.
+/// A dry run reads the boards and does not change them.
 #[test]
 fn dry_run() {
     let mut bench = Bench::chain(&[0x21]);

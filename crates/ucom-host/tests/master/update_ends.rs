@@ -1,5 +1,4 @@
-//! Updates that are not completed: the bus fails, the user cancels, or another board answers instead of the selected
-//! one.
+//! Updates that are not completed, because the bus fails, the user cancels, or another board answers instead of the selected board.
 
 use super::bench::Exit;
 use ucom::{Frame, Status};
@@ -16,7 +15,7 @@ use super::update::{check_program, options, outcomes, recorded, update};
 
 const DATE: u16 = 0x3AC1;
 
-/// Starts an update and lets it run until `stop` returns `true`. Then `end` ends it, and the report comes at once.
+/// Starts an update and lets it run until `stop` returns `true`. Then `end` ends the update, and the report comes at once.
 fn ended(
     bench: &mut Bench,
     options: UpdateOptions,
@@ -40,8 +39,8 @@ fn unplugged(bench: &mut Bench, id: ucom_host::master::ProcedureId) {
     bench.master.abandon(id, "the adapter is gone");
 }
 
-/// D-46: the bus fails at any frame of an update of two boards. The report comes at once and gives the true state of
-/// each board. The exit code is 5 after anything was erased.
+/// D-46: the bus fails at any frame of an update of two boards. The report comes at once and shows the true state of each board. The exit
+/// code is 5 if memory was erased.
 #[test]
 fn d46_a_bus_that_fails_leaves_a_report() {
     let (from, to) = {
@@ -91,7 +90,7 @@ fn d46_a_bus_that_fails_leaves_a_report() {
     assert_eq!(seen.into_iter().collect::<Vec<_>>(), all);
 }
 
-/// A procedure whose bus has disconnected sends nothing more, even if it was just being cancelled.
+/// A procedure whose bus has disconnected sends no further frame, even if it was being cancelled at that moment.
 #[test]
 fn an_abandoned_update_sends_nothing() {
     for cancel_first in [false, true] {
@@ -118,8 +117,8 @@ fn an_abandoned_update_sends_nothing() {
     assert!(error.to_string().contains("the adapter is gone"));
 }
 
-/// P-12: an update session that is cancelled before the erase ends with exit code 4. Boards that are done keep the
-/// new program, and the others the old one.
+/// P-12: an update session that is cancelled before the erase ends with exit code 4. Boards that are done keep the new program; the other
+/// boards keep the old program.
 #[test]
 fn p12_a_cancelled_update_session() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -130,7 +129,7 @@ fn p12_a_cancelled_update_session() {
     assert_eq!((check_program(&mut bench, 1, 128), check_program(&mut bench, 2, 128)), (OLD, OLD));
 }
 
-/// The user cancels while the new application is being started. The board is verified, and the report shows that.
+/// The user cancels while the new application starts. The board is verified, and the report shows this.
 #[test]
 fn p12_cancelled_while_it_starts() {
     let mut bench = initialised(&[0x21]);
@@ -140,7 +139,7 @@ fn p12_cancelled_while_it_starts() {
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
     assert_eq!((report.boards[0].outcome, report.exit()), (left, 5));
     assert_eq!(check_program(&mut bench, 0, 128).1, DATE);
-    // The application was stopped again. If the board's answers are lost, its state is unknown, and the report says so.
+    // The application has been stopped again. If the board's answers are lost, its state is unknown, and the report states this.
     assert!(!bench.board(0).status().has(ucom::Status::MSTART));
     let mut bench = initialised(&[0x21]);
     let start = UpdateOptions { start: true, ..options(&[1], 128) };
@@ -174,7 +173,7 @@ fn a_board_that_is_up_to_date_is_started() {
     let report = update(&mut bench, start.clone());
     assert_eq!((outcomes(&report), report.exit()), (vec!["running", "running"], 0), "{report:?}");
     assert_eq!(bench.beginning("2C1#"), blocks);
-    // All boards are up to date and run, so the update has nothing to do.
+    // All boards are up to date and run, so the update does not need to send program data.
     let sent = bench.beginning("301#");
     let mut all = recorded(start.clone(), &report);
     all.records.extend(start.records);
@@ -192,8 +191,7 @@ fn a_board_that_does_not_enable_programming_answers() {
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::NotStarted, 1));
 }
 
-/// U-1 is checked before every attempt: a board that was replaced since the last attempt gets no XRESET and no
-/// program data.
+/// U-1 is checked before every attempt: a board that was replaced since the last attempt does not get XRESET or program data.
 #[test]
 fn u1_a_board_that_is_swapped_between_attempts() {
     let swapped = |resets, cancelled| if resets == 1 && cancelled { "4200" } else { "2100" };
@@ -203,8 +201,7 @@ fn u1_a_board_that_is_swapped_between_attempts() {
     let wrong = Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x21, found: 0x42 });
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::After(Box::new(wrong.clone()))));
     assert_eq!((bench.count("041#"), report.exit()), (1, 5), "{report:?}");
-    // The board is replaced at the moment of XRESET. The update is refused, the board leaves programming mode, and
-    // nothing is written.
+    // The board is replaced at the moment of XRESET. The update is refused, the board leaves programming mode, and no memory is written.
     let mut bench = loader(Loader { flash: |n, _| if n == 0 { "2100" } else { "4200" }, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
@@ -230,8 +227,7 @@ fn one_damaged_answer_is_no_swapped_board() {
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 0), "{report:?}");
 }
 
-/// A board that becomes silent at XRESET. Another board takes its number when the master gives the number again
-/// (5.4).
+/// A board that becomes silent at XRESET. Another board takes the number when the master assigns the number again (5.4).
 fn impostor() -> impl Member {
     let (mut silent, mut other) = (false, false);
     Answering::new(move |frame| match frame {
@@ -253,8 +249,7 @@ fn impostor() -> impl Member {
     })
 }
 
-/// 5.4: another board took the number. The update is refused with exit code 4, nothing is written, and the number is
-/// taken back from that board.
+/// 5.4: another board took the number. The update is refused with exit code 4, no memory is written, and that board loses the number again.
 #[test]
 fn u4_repair_that_finds_another_board_is_refused() {
     let mut bench = Bench::new(Default::default(), vec![Box::new(impostor())]);
@@ -264,14 +259,13 @@ fn u4_repair_that_finds_another_board_is_refused() {
     assert_eq!((report.exit(), bench.beginning("2C1#")), (4, 0));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
     assert_eq!(bench.count("1C1#0800"), 3);
-    // The pin is switched off before the number is given again (5.4).
+    // The pin is switched off before the number is assigned again (5.4).
     let sent = bench.sent();
     let place = |text: &str| sent.iter().position(|t| t == text).unwrap();
     assert!(place("1C1#0200") < place("281#"));
 }
 
-/// D-08: a dry run also checks for another PC, because it shows what an update would do. It still sends only
-/// questions.
+/// D-08: a dry run also checks for another PC, because it shows what an update would do. The dry run still sends only queries.
 #[test]
 fn d08_a_dry_run_looks_for_another_pc() {
     let info = ["141#2100011B34126E38", "141#0000"];
@@ -285,14 +279,14 @@ fn d08_a_dry_run_looks_for_another_pc() {
     assert_eq!(report.exit(), 4);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
     assert!(!bench.master.is_master());
-    // Without another PC the dry run succeeds, and it still sends no heartbeats.
+    // Without another PC the dry run succeeds and does not send heartbeats.
     let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
     assert_eq!(update(&mut bench, dry).exit(), 0);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
 }
 
-/// A board already has the image, but was left in programming mode, for example by a killed tool. An update takes it
-/// out of this mode. A dry run changes nothing.
+/// A board already has the image, but was left in programming mode, for example by a killed tool. An update ends this mode. A dry run
+/// changes nothing.
 #[test]
 fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let left = || {
@@ -315,7 +309,7 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let report = update(&mut bench, UpdateOptions { dry_run: true, ..again });
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::UpToDate, 0));
     assert!(bench.board(0).status().has(Status::PROG));
-    // The mode cannot be ended; the failure is reported.
+    // The board does not leave this mode, and the report contains the failure.
     let (mut bench, again) = left();
     bench.lose = vec![("< 1C1#", u32::MAX)];
     let report = update(&mut bench, again);
@@ -324,8 +318,8 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     assert_ne!(report.exit(), 0);
 }
 
-/// P-12: the update is cancelled, or the bus fails, at any time while such boards are read and taken out of
-/// programming mode. The report lists each board that stays in this mode although it is up to date.
+/// P-12: the update is cancelled, or the bus fails, at any time while such boards are read and their programming mode is ended. The report
+/// lists each board that stays in this mode although it is up to date.
 #[test]
 fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
     let left = || {
@@ -357,7 +351,7 @@ fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
                     assert_eq!(code, Some("still-programming"), "after {after} µs: {result:?}");
                     named += 1;
                 } else {
-                    // This board had not been read yet.
+                    // The master had not read this board yet.
                     assert!(matches!(code, Some("cancelled" | "bus")), "after {after} µs: {result:?}");
                 }
             }

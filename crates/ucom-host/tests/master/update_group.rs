@@ -1,5 +1,5 @@
-//! Updates of several boards at once: boards that take part, boards that must not take part, and the report of boards
-//! that missed a block.
+//! Updates of several boards at once. The tests cover boards that take part, boards that must not take part, and the report of boards that
+//! missed a block.
 
 use super::bench::Exit;
 use ucom::{Frame, Profile};
@@ -22,9 +22,8 @@ fn broadcasts(bench: &Bench) -> usize {
     bench.beginning("2C0#")
 }
 
-/// D-46: the master commands every board that is not selected to leave programming mode, and then asks each board for
-/// its state. Answers to a broadcast PC_INFO may be lost, and a board that still has PROG = 1 would be erased with
-/// the group.
+/// D-46: the master commands every board that is not selected to leave programming mode, and then requests the state of each board. Answers
+/// to a broadcast PC_INFO may be lost, and a board that still has PROG = 1 would be erased with the group.
 #[test]
 fn d46_a_group_leaves_other_boards_alone() {
     for lose in [vec![], vec![("> 142#", 2)], vec![("> 142#", 2), ("< 1C2#0400", 2)]] {
@@ -47,13 +46,12 @@ fn d46_a_group_leaves_other_boards_alone() {
     }
 }
 
-/// A board that always keeps PROG = 1 and does not answer broadcast questions.
+/// A board that always keeps PROG = 1 and does not answer broadcast queries.
 fn stubborn() -> impl Member {
     Answering::new(|frame| if frame == "209#" { &["149#7700091F34126E38", "149#0000"] } else { &[] })
 }
 
-/// D-46: a board outside the group stays in programming mode. The update is refused before anything is sent to the
-/// group.
+/// D-46: a board outside the group stays in programming mode. The update is refused before any frame is sent to the group.
 #[test]
 fn d46_a_group_is_refused_while_another_board_listens() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -94,8 +92,8 @@ fn d42_a_group_waits_for_every_board() {
     }
 }
 
-/// A selected board takes XRESET and then sends nothing more. Frames to the group could erase it without notice. So
-/// the master sends none, and updates the other boards one by one.
+/// A selected board executes XRESET and then sends no further frame. Frames to the group could erase this board without any report.
+/// Therefore the master sends no such frames, and updates the other boards one by one.
 #[test]
 fn a_silent_board_that_may_listen_ends_the_broadcast() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -108,11 +106,10 @@ fn a_silent_board_that_may_listen_ends_the_broadcast() {
     assert_eq!(check_program(&mut bench, 2, 128), OLD);
 }
 
-/// A board whose READY is lost is removed from the group. The master then reads it to find out whether it accepted
-/// the later blocks.
+/// A board whose READY is lost is removed from the group. The master then reads the board to determine if it accepted the later blocks.
 #[test]
 fn a_board_that_fell_behind_is_asked() {
-    // In cycles 1 and 2: the board accepted the blocks like the others and is done, and nothing is sent again.
+    // In cycles 1 and 2, the board accepted the blocks like the other boards and is done, so no block is sent again.
     for block in [0, 2, 3, 5] {
         let mut bench = initialised(&[0x21, 0x42]);
         let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
@@ -124,8 +121,8 @@ fn a_board_that_fell_behind_is_asked() {
     }
 }
 
-/// A board was removed from the group before the erase, and has been silent since. It may be erased: outcome
-/// `unknown`, exit code 5.
+/// A board was removed from the group before the erase, and has been silent since then. The board may be erased, so its outcome is
+/// `unknown` and the exit code is 5.
 #[test]
 fn a_board_that_was_lost_in_a_group_may_be_erased() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -139,8 +136,8 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     assert!(matches!(failure, UpdateFailure::MayBeErased(_)), "{failure}");
     assert!(failure.to_string().contains("may be erased"));
     assert_ne!(check_program(&mut bench, 1, 128), OLD, "it was");
-    // The board was removed from the group before the erase and received nothing more. It reports its old program, so
-    // nothing was erased.
+    // The board was removed from the group before the erase and received no further block. The board reports its old program, so its memory
+    // was not erased.
     let mut bench = initialised(&[0x21, 0x42]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
     bench.until(|b| broadcasts(b) >= 4);
@@ -154,8 +151,8 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
 }
 
 /// D-43: after an error code of its CAN controller or of its start, or after an unknown code, a board still accepts
-/// blocks. It is erased with the others. If its answers are lost, the report says so; otherwise the master reads the
-/// board and finds the program.
+/// blocks. The board is erased together with the other boards. If the answers of the board are lost, the report states this. Otherwise the
+/// master reads the board, which shows the program.
 #[test]
 fn d43_not_every_error_ends_a_transfer() {
     for code in ["06", "08", "09", "0B", "2A"] {
@@ -176,8 +173,8 @@ fn d43_not_every_error_ends_a_transfer() {
     }
 }
 
-/// U-3 with `force`: a board that was removed from the group had the same program before. So its answer does not
-/// prove that the program was written.
+/// U-3 with `force`: a board that was removed from the group had the same program before. Therefore the answer of the board does not prove
+/// that the program was written.
 #[test]
 fn u3_what_was_there_before_proves_nothing() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -199,15 +196,14 @@ fn u3_what_was_there_before_proves_nothing() {
     assert_eq!(own, 48, "it was programmed by itself");
 }
 
-/// One board of the group gets its own attempt. A cancel during this attempt takes all boards of the group out of
-/// programming mode.
+/// One board of the group gets an attempt on its own. A cancel during this attempt ends the programming mode of all boards of the group.
 #[test]
 fn p12_a_cancel_reaches_every_board_of_the_group() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
     bench.until(|b| b.count("043#") > 0);
-    // Board 3 accepts blocks and sends nothing. So the master sends no broadcast and updates the boards one by one.
-    // Board 2 waits with PROG = 1.
+    // Board 3 accepts blocks but does not send frames. Therefore the master sends no broadcast and updates the boards one by one. Board 2
+    // waits with PROG = 1.
     bench.lose = vec![("> 143#", u32::MAX)];
     bench.until(|b| b.beginning("2C1#") >= 4);
     assert!(bench.board(1).status().has(ucom::Status::PROG));

@@ -1,5 +1,5 @@
-//! Conditions under which a board is up to date (D-62, U-3): its answer and the flash record together, and cases that
-//! neither of them covers.
+//! Conditions under which a board is up to date (D-62, U-3): the board's answer together with the flash record, and cases that neither of
+//! the two covers.
 
 use super::bench::{Bench, Exit};
 use super::chain::initialised;
@@ -9,7 +9,7 @@ use ucom::{Memory, Profile, Status};
 use ucom_host::master::update::{UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
 use ucom_host::master::{Event, InitOptions, Request};
 
-/// Returns the number of frames of program data, to one board or to all.
+/// Returns the number of frames of program data, to one board or to all boards.
 fn data_frames(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| matches!(f.to_string().get(..3), Some("2C0" | "2C1" | "2C2"))).count()
 }
@@ -35,8 +35,8 @@ fn both(outcome: &'static str, verified: bool) -> Vec<(&'static str, bool)> {
     vec![(outcome, verified); 2]
 }
 
-/// D-62: the board's answer alone does not decide; the flash record is needed as well. Tests ten differences between
-/// record and image, one by one and as a group.
+/// D-62: the board's answer alone is not enough; the flash record is needed as well. Tests ten differences between record and image, one by
+/// one and as a group.
 #[test]
 fn d62_the_flash_record_decides() {
     type Change = fn(&mut UpdateOptions);
@@ -90,7 +90,7 @@ fn d62_an_accepted_program_is_not_verified() {
     assert!(!bench.board(0).status().has(Status::MSTART));
     let start = UpdateOptions { start: true, ..accepted };
     assert_eq!(again(&mut bench, start.clone()), (both("running", false), 0, false));
-    // If the start fails, the program is not verified either.
+    // If the start fails, the program is also not verified.
     bench
         .go(Request::Stop { board: 1, level: ucom_host::master::StopLevel::Application, force: true }, 20)
         .unwrap();
@@ -100,7 +100,7 @@ fn d62_an_accepted_program_is_not_verified() {
     assert_eq!((boards, code), (vec![("program-up-to-date", false)], 5));
 }
 
-/// D-62: the Program ID covers program memory only. Another image for data memory is written each time, even if records exist.
+/// D-62: the Program ID covers program memory only. Another image for data memory is written in each update, even if records exist.
 #[test]
 fn d62_data_memory_is_written_each_time() {
     let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };

@@ -1,5 +1,5 @@
-//! Updates with unusual plans and headers: which memories each cycle may erase, which updates can be verified, and
-//! what the report says if an update cannot be verified.
+//! Updates with unusual plans and headers. The tests cover the memories that each cycle may erase, the updates that can be verified, and
+//! the report of other updates.
 
 use super::bench::Exit;
 use ucom::profile::{HeaderForm, Plan};
@@ -24,8 +24,8 @@ fn two(plan: Plan) -> UpdateOptions {
     UpdateOptions { second, ..options(&[1], 1000) }
 }
 
-/// The exit codes of each plan: 1 or 3 before an erase, 5 after it. Only `verify-write` and `exloader-app` do not
-/// change flash in their first cycle.
+/// Exit codes of each plan: 1 or 3 before an erase, 5 after an erase. Only `verify-write` and `exloader-app` do not change flash in their
+/// first cycle.
 #[test]
 fn d40_what_the_first_cycle_may_have_erased() {
     let cases = [
@@ -49,8 +49,8 @@ fn d40_what_the_first_cycle_may_have_erased() {
             assert_eq!(report.exit(), if erased { 5 } else { before }, "{plan}: {report:?}");
             assert_eq!(report.boards[0].outcome, left, "{plan}: {report:?}");
         }
-        // Error 3 comes after block 16 of the attempt, counted from 0: under `verify-write` the last block of cycle 1, under
-        // the other plans after an erase.
+        // Error 3 comes after block 16 of the attempt, counted from 0. With `verify-write` this is the last block of cycle 1; with the
+        // other plans it is after an erase.
         let board = Loader { special: |_, block| (block == 16).then_some("081#03"), ..Loader::new(blocks) };
         let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
         let expected = if plan == Plan::VerifyWrite { 1 } else { 5 };
@@ -58,7 +58,7 @@ fn d40_what_the_first_cycle_may_have_erased() {
     }
 }
 
-/// Both images are written to their memories, and the report has address, length and Program ID of each.
+/// Both images are written to their memories. The report contains address, length and Program ID of each image.
 #[test]
 fn d40_two_images_reach_two_memories() {
     for (plan, memory) in [(Plan::ExloaderApp, Memory::Ram), (Plan::PmemXmem, Memory::Data)] {
@@ -94,7 +94,7 @@ fn u10_what_cannot_be_verified_says_so() {
     let report = raw("3F4BC13A", 0x1B, None);
     let board = &report.boards[0];
     assert_eq!((board.outcome, &board.failure, report.exit()), (UpdateOutcome::Written, &None, 5));
-    // For a user who accepts unverified programs the exit code is 0.
+    // For a user who accepts unverified programs, the exit code is 0.
     assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit(), 0);
     assert_eq!((report.unverifiable, report.program_id), (Some(Unverifiable::RawPlan), None));
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
@@ -109,8 +109,7 @@ fn u10_what_cannot_be_verified_says_so() {
     }
 }
 
-/// U-10: the user gives a Program ID. The board is verified against it, and an image with another Program ID is
-/// refused.
+/// U-10: the user gives a Program ID. The board is verified with this Program ID, and an image with another Program ID is refused.
 #[test]
 fn u10_a_named_program_id_is_verified() {
     let report = raw("3F4BC13A", 0x1B, Some(0x4B3F));
@@ -122,10 +121,10 @@ fn u10_a_named_program_id_is_verified() {
         Some(UpdateFailure::NotVerified { program_id: 0x4B3F, wanted_id: 0x4B40, wanted_date: None, .. })
     ));
     assert_eq!(report.exit(), 5);
-    // The board already has the program (U-3), judged by its answer alone (D-62).
+    // The board already has the program (U-3). Only its answer shows this (D-62).
     let report = raw("3F4BC13A", 0x1B, Some(OLD.0));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::ProgramUpToDate, 0));
-    // If the Program ID of an image is known, it must equal the given one.
+    // If the Program ID of an image is known, it must equal the Program ID that the user gives.
     let mut bench = Bench::new(Profile::default(), vec![Box::new(Loader::new(34))]);
     let other = UpdateOptions { expect_program_id: Some(0x4B40), ..options(&[1], 1000) };
     let error = bench.go(Request::Update(other), 60).unwrap_err();
@@ -135,8 +134,7 @@ fn u10_a_named_program_id_is_verified() {
     assert_eq!(update(&mut bench, same).boards[0].outcome, UpdateOutcome::Verified);
 }
 
-/// U-9 needs an expected Program ID. Without one, an update with a lost DSP_PROGFINISHED is not reported as a
-/// success.
+/// U-9 needs an expected Program ID. Without this ID, an update with a lost DSP_PROGFINISHED is not reported as a success.
 #[test]
 fn u9_not_where_nothing_is_expected() {
     let board = Loader { special: |_, block| (block == 31).then_some(""), ..Loader::new(32) };

@@ -20,7 +20,7 @@ pub(super) struct SimApplication {
     par: Vec<u16>,
     so: Vec<u16>,
     up_at: u64,
-    /// Time up to which the model has moved, µs.
+    /// Time up to which the model has been simulated, µs.
     moved_us: u64,
     running: bool,
     active: bool,
@@ -46,9 +46,9 @@ impl SimApplication {
         }
     }
 
-    /// Moves the axes up to `now_us`, even if no program runs.
+    /// Simulates the axes up to `now_us`, even if no program runs.
     pub(crate) fn pass(&mut self, now_us: u64) {
-        // After that time an axis without drive is at rest.
+        // An axis without drive is at rest after that time.
         let seconds = (now_us.saturating_sub(self.moved_us) as f64 * 1e-6).min(MOST_S);
         self.moved_us = self.moved_us.max(now_us);
         let driven = self.running && self.active;
@@ -57,7 +57,7 @@ impl SimApplication {
         }
     }
 
-    /// Handles a power loss: the axes have no drive, and the program loses its state.
+    /// Handles a power loss. The axes are not driven any more, and the program loses its state.
     pub(crate) fn power_lost(&mut self, now_us: u64) {
         self.pass(now_us);
         self.stop();

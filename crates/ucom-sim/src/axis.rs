@@ -1,7 +1,8 @@
 //! Motor axis that a board's application moves in a simulated chain.
 use serde::Deserialize;
 
-/// Step of the integration, s. The step is small compared with the fastest gains that the words of the protocol can hold.
+/// Step of the integration, s. The step is small compared with the time constants of the largest gains that the words of the protocol can
+/// represent.
 const STEP_S: f64 = 0.000_5;
 /// Speed below which friction stops the axis, °/s.
 const STANDS_DEG_S: f64 = 0.5;
@@ -14,7 +15,7 @@ const HOT_C: f64 = 80.0;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxisConfig {
-    /// Prefix of the names of its inputs and outputs; empty on a board with one axis.
+    /// Prefix of the names of the inputs and outputs of the axis; empty on a board with one axis.
     pub name: String,
     /// Lower stop, degrees.
     pub min_deg: f64,
@@ -129,12 +130,12 @@ impl Axis {
             self.position = self.position.clamp(c.min_deg, c.max_deg);
             self.velocity = 0.0;
         }
-        // 2 A lead to about 60 K above ambient temperature, with a time constant of 40 s.
+        // With 2 A, the temperature rises to about 60 K above ambient, with a time constant of 40 s.
         let heat = 15.0 * (self.current / 1000.0).powi(2);
         self.temperature += dt * (heat - (self.temperature - AMBIENT_C)) / 40.0;
     }
 
-    /// Returns the current of a position controller whose set point moves no faster than allowed.
+    /// Returns the current of a position controller. The set point of the controller moves at most at the speed limit.
     fn control(&mut self, dt: f64, c: &Command) -> f64 {
         let goal = c.set_position.max(c.limits.0).min(c.limits.1);
         let way = (goal - self.reference).clamp(-c.speed_limit * dt, c.speed_limit * dt);
@@ -183,7 +184,7 @@ mod tests {
         assert_eq!((axis.velocity, axis.reference), (0.0, axis.position));
     }
 
-    /// Extreme gains within the words of the protocol never lead to values that are not finite.
+    /// Extreme gains within the words of the protocol never cause values that are not finite.
     #[test]
     fn wild_gains_stay_finite_and_within_the_stops() {
         let mut axis = Axis::new(&AxisConfig { gravity_deg_s2: 5000.0, ..Default::default() });

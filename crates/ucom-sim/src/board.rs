@@ -1,4 +1,4 @@
-//! A board of the simulated chain: the node that real boards run, with simulated parts and faults around it.
+//! Board of the simulated chain: the node that real boards run, with simulated parts and faults around the node.
 
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
@@ -21,7 +21,7 @@ pub(super) struct Board {
     node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
     /// `true` for the first board of the chain, whose incoming pin is strapped active.
     strapped: bool,
-    /// This field and the next three are `true` while their fault is active.
+    /// `true` while the fault of this name is active; the next three fields have the same meaning for their faults.
     pub unpowered: bool,
     pub silent: bool,
     pub deaf: bool,
@@ -32,7 +32,7 @@ pub(super) struct Board {
     coming: VecDeque<(u64, u32, Format, Payload)>,
     /// Frame that waits for the bus.
     waiting: Option<Frame>,
-    /// INITACK that a fault keeps inside the board.
+    /// INITACK that the board does not send because of a fault.
     held: Option<Frame>,
     next_us: u64,
     /// Status that no board can have, if it occurred.
@@ -75,12 +75,12 @@ impl Board {
         }
     }
 
-    /// Returns the time of the board's next action, µs.
+    /// Returns the time of the next action of the board, µs.
     pub(crate) fn next_us(&self) -> u64 {
         if self.unpowered { u64::MAX } else { self.next_us }
     }
 
-    /// Advances the time to `now_us`; returns the frame that the board puts into its controller.
+    /// Advances the time to `now_us`. Returns the frame that the board puts into its controller.
     pub(crate) fn poll(&mut self, now_us: u64) -> Option<Frame> {
         if self.unpowered {
             return None;
@@ -101,10 +101,10 @@ impl Board {
         out
     }
 
-    /// Applies the faults to a frame that the board sends.
+    /// Applies the active faults to a frame that the board sends.
     fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
         if self.silent {
-            // For the board's controller, another member has acknowledged the frame.
+            // The board's controller assumes that another member has acknowledged the frame.
             self.node.sent(now_us, &frame);
             return None;
         }
@@ -120,7 +120,7 @@ impl Board {
     fn schedule(&mut self, now_us: u64) {
         self.violation = self.violation.or(self.node.status().contradiction());
         self.next_us = match (&self.held, &self.waiting) {
-            // The fault may end at any time.
+            // The fault may end at any time, so the held frame is checked every `WAIT_US`.
             (Some(_), _) => now_us + WAIT_US,
             (None, Some(_)) => self.node.next_deadline().max(now_us + WAIT_US),
             (None, None) => self.node.next_deadline().max(now_us + 1),
@@ -196,7 +196,7 @@ impl Board {
         }
     }
 
-    /// Lets the application crash. The watchdog then reboots the board (D-26).
+    /// Simulates a crash of the application. The watchdog then reboots the board (D-26).
     pub(crate) fn crash(&mut self, now_us: u64) {
         if !self.unpowered {
             self.waiting = None;
@@ -206,7 +206,7 @@ impl Board {
         }
     }
 
-    /// Gives the board a number that another board has already taken, as if both had received the same PC_INIT.
+    /// Assigns a number that another board has already taken to the board, as if both boards had received the same PC_INIT.
     pub(crate) fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;
@@ -240,7 +240,7 @@ impl Board {
     }
 }
 
-/// State of a board of the chain, for tests and displays. The bus does not carry this state.
+/// State of a board of the chain, for tests and displays. This state is not visible on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardState {
     /// `true` if the board has power.
@@ -257,8 +257,8 @@ pub struct BoardState {
     pub driven: bool,
 }
 
-/// Returns an application as the factory programs it. The image is derived from the description, so that boards have different
-/// applications.
+/// Returns the application that the factory programs into a board. The image is derived from the description, so that boards have
+/// different applications.
 fn image(config: &BoardConfig) -> Vec<u8> {
     let seed = config.description.bytes().fold(7_u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into()));
     let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();

@@ -1,4 +1,4 @@
-//! Faults of a simulated chain: kind, trigger, duration.
+//! Faults of a simulated chain, with kind, trigger and duration.
 use serde::Deserialize;
 
 /// Text of `ucom help faults`.
@@ -17,9 +17,9 @@ pub enum FaultKind {
     Crash,
     /// The init wire after a board is broken.
     WireBroken,
-    /// A board takes the number of the previous board, as after a blind repetition of PC_INIT (D-24).
+    /// A board takes the number of the previous board, as after PC_INIT was repeated without a query (D-24).
     SameNumber,
-    /// The acknowledgement of a board's number does not leave the board (D-24).
+    /// The board does not send the acknowledgement of its number (D-24).
     AckHeld,
     /// A board's flash memory cannot be written.
     FlashBroken,
@@ -33,7 +33,7 @@ pub enum FaultKind {
     Corrupted(f64),
     /// A share of the frames is doubled.
     Doubled(f64),
-    /// A share of the frames is destroyed on the wire; error counters rise, up to bus-off.
+    /// A share of the frames is destroyed on the wire. Error counters increase, up to bus-off.
     Disturbed(f64),
 }
 
@@ -60,48 +60,48 @@ pub struct Fault {
     pub board: usize,
     /// Trigger.
     pub trigger: Trigger,
-    /// Duration, µs. `None`: the fault does not end.
+    /// Duration in µs; `None` if the fault does not end.
     pub duration_us: Option<u64>,
 }
 
 /// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    /// The text is not TOML of this form; the message shows the place and the reason.
+    /// The text is not TOML in the form of a fault file; the message shows the place and the reason.
     #[error("{0}")]
     Form(String),
-    /// The kind does not exist.
+    /// The kind of fault does not exist.
     #[error("fault {fault}: unknown kind `{kind}`, expected one of {}", kinds().join(", "))]
     Kind {
-        /// Number in the file, from 1.
+        /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Kind in the file.
+        /// Kind of the fault in the file.
         kind: String,
     },
-    /// A key that this kind needs is missing.
+    /// A key that this kind of fault needs is missing.
     #[error("fault {fault}: {kind} needs {key}")]
     Missing {
-        /// Number in the file, from 1.
+        /// Number of the fault in the file, from 1.
         fault: usize,
         /// The kind.
         kind: String,
         /// The key.
         key: &'static str,
     },
-    /// A key that has no meaning for this kind.
+    /// A key has no meaning for this kind of fault.
     #[error("fault {fault}: {key} has no effect for {kind}; remove the key")]
     Superfluous {
-        /// Number in the file, from 1.
+        /// Number of the fault in the file, from 1.
         fault: usize,
         /// The kind.
         kind: String,
         /// The key.
         key: &'static str,
     },
-    /// A value that is out of range.
+    /// A value is out of range.
     #[error("fault {fault}: {key} must be {range}")]
     Range {
-        /// Number in the file, from 1.
+        /// Number of the fault in the file, from 1.
         fault: usize,
         /// The key.
         key: &'static str,
@@ -126,7 +126,7 @@ const OF_A_BOARD: [(&str, FaultKind); 8] = [
 const OF_THE_BUS: [(&str, FaultKind); 2] =
     [("foreign-master", FaultKind::CompetingMaster), ("foreign-frames", FaultKind::ForeignFrames)];
 
-/// Function that creates a kind from its share, 0 to 1.
+/// Function that creates a kind of fault from its share, 0 to 1.
 type OfAShare = fn(f64) -> FaultKind;
 
 /// Kinds that concern a share of the frames.

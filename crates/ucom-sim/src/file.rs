@@ -1,4 +1,4 @@
-//! Chain files: the boards of a simulated chain, in the order of the wire.
+//! Chain files, which define the boards of a simulated chain in the order of the wire.
 
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use super::axis::AxisConfig;
 use ucom::profile::{Profile, ProfileError};
 
-/// The built-in chain: a humanoid head of ten boards.
+/// Built-in chain: a humanoid head of ten boards.
 pub const HEAD: &str = include_str!("head.toml");
 /// Text of `ucom help sim` before the built-in chain.
 const FORM: &str = include_str!("file.txt");
 /// Largest number of boards: a bus has numbers for 31 boards.
 const MOST_BOARDS: usize = 31;
-/// Largest number of axes of a board. A DSP of that time could not serve more words.
+/// Largest number of axes of a board. A DSP of the original boards could not process more words.
 const MOST_AXES: usize = 8;
 
 /// Board of a chain.
@@ -20,9 +20,9 @@ const MOST_AXES: usize = 8;
 pub struct BoardConfig {
     /// Flash number of the board; DSP_REPORT carries its low byte.
     pub flash_id: u16,
-    /// The description in DSP_INFO.
+    /// Description in DSP_INFO.
     pub description: String,
-    /// Program ID of its application; `None`: it is computed from the image, which is derived from the description.
+    /// Program ID of the board's application. If `None`, it is computed from the image, which is derived from the description.
     pub program_id: Option<u16>,
     /// Flash date as a number.
     pub date: u16,
@@ -30,13 +30,13 @@ pub struct BoardConfig {
     pub application: bool,
     /// `true` if autostart is enabled.
     pub autostart: bool,
-    /// Axes that its application moves.
+    /// Axes that the board's application moves.
     pub axes: Vec<AxisConfig>,
     /// Profile of the board.
     pub profile: Profile,
 }
 
-/// The boards of a chain.
+/// Boards of a chain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChainConfig {
     /// Boards in the order of the wire.
@@ -54,7 +54,7 @@ pub enum ChainFileError {
         /// Error of the system.
         source: std::io::Error,
     },
-    /// The text is not TOML of this form; the message shows the place and the reason.
+    /// The text is not TOML in the form of a chain file; the message shows the place and the reason.
     #[error("{0}")]
     Form(String),
     /// The chain has more boards than a bus has numbers.
@@ -63,10 +63,10 @@ pub enum ChainFileError {
         /// Number of boards.
         count: usize,
     },
-    /// A board has no axis, or more axes than it has words for.
+    /// A board has no axis, or more axes than its words allow.
     #[error("board {board}: {count} axes are out of range, expected 1 to {MOST_AXES}")]
     Axes {
-        /// Position in the file, from 1.
+        /// Position of the board in the file, from 1.
         board: usize,
         /// Number of axes.
         count: usize,
@@ -74,19 +74,19 @@ pub enum ChainFileError {
     /// The values of an axis cannot be simulated.
     #[error("board {board}: axis {axis}: {what}")]
     Axis {
-        /// Position in the file, from 1.
+        /// Position of the board in the file, from 1.
         board: usize,
         /// Position among the board's axes, from 1.
         axis: usize,
         /// Reason.
         what: &'static str,
     },
-    /// A description that the protocol cannot carry.
+    /// The protocol cannot carry a description.
     #[error(
         "board {board}: the description has {count} characters, expected at most 512 characters of Latin-1"
     )]
     Description {
-        /// Position in the file, from 1.
+        /// Position of the board in the file, from 1.
         board: usize,
         /// Characters.
         count: usize,
@@ -94,7 +94,7 @@ pub enum ChainFileError {
     /// A key of the board's profile is not valid.
     #[error("board {board}: profile: {key}: {source}")]
     Profile {
-        /// Position in the file, from 1.
+        /// Position of the board in the file, from 1.
         board: usize,
         /// The key.
         key: String,
@@ -174,13 +174,13 @@ impl ChainConfig {
         })
     }
 
-    /// Returns the built-in head.
+    /// Returns the built-in head with ten boards.
     pub fn head(profile: &Profile) -> Self {
-        // The file is part of the program, and a test reads it, so this cannot fail.
+        // The file is part of the program, and a test reads it, so reading cannot fail.
         Self::from_toml(HEAD, profile).unwrap_or_default()
     }
 
-    /// Returns the chain with `count` boards. Surplus boards at the end are removed; additional boards have one axis each.
+    /// Returns the chain with `count` boards. Boards above this number are removed from the end; additional boards have one axis each.
     #[must_use]
     pub fn with_boards(mut self, count: usize, profile: &Profile) -> Self {
         self.boards.truncate(count);

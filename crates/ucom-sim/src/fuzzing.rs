@@ -1,11 +1,11 @@
-//! Bodies of the fuzz targets.
+//! Code of the fuzz targets.
 
 use ucom::node::{Application, Flash, Node, NodeConfig, Phase, Pins, Store};
 use ucom::{Frame, FromBoard, Profile};
 
-/// Runs a board through a sequence of steps. The first byte of a step defines the time that passes, whether the board is polled in that
-/// time, and the length of a frame. Two bytes of identifier and up to eight bytes of data follow. The status of the board must never
-/// contradict itself, and the board must send only allowed frames.
+/// Runs a board through a sequence of steps. The first byte of a step defines the time that passes, the length of a frame, and if the board
+/// is polled in that time. Two bytes of identifier and up to eight bytes of data follow. The status of the board must never be
+/// contradictory, and the board must send only allowed frames.
 pub fn node(data: &[u8]) {
     use crate::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
@@ -26,7 +26,7 @@ pub fn node(data: &[u8]) {
             0 => pass(&mut board, &mut now, until),
             _ => now = until,
         }
-        // Only numbers 0 and 1 remain, so that many frames are addressed to the board.
+        // The mask keeps only numbers 0 and 1, so that many frames are addressed to the board.
         let id = u16::from_be_bytes([high, low]) & 0x7E1;
         let Some(frame) = Frame::new(id, payload) else { continue };
         board.receive(now, &frame);
@@ -36,7 +36,7 @@ pub fn node(data: &[u8]) {
     }
 }
 
-/// Advances the time: polls the board at its deadlines, and puts its frames on the bus.
+/// Advances the time. Polls the board at its deadlines, and puts its frames on the bus.
 fn pass<F: Flash, P: Pins, S: Store, A: Application>(
     board: &mut Node<F, P, S, A>,
     now: &mut u64,

@@ -1,4 +1,4 @@
-//! A board in memory, for tests, examples and simulations: flash with times and faults, a pin on a wire, a store, and an application that
+//! Board in memory, for tests, examples and simulations: flash with times and faults, a pin on a wire, a store, and an application that
 //! records its calls.
 
 use std::sync::Arc;
@@ -11,8 +11,8 @@ use crate::texts::Texts;
 
 /// Flash, data flash and exloader RAM in memory.
 ///
-/// Writing can only clear bits, as in a real flash. `fail_after` makes operations fail. `cut_after` cuts the power during one operation:
-/// half of that operation is done, and no other operation succeeds until [`MemoryFlash::power_up`].
+/// Writing can only clear bits, as in a real flash. `fail_after` makes operations fail. `cut_after` cuts the power during one operation.
+/// Half of that operation is performed, and all other operations fail until [`MemoryFlash::power_up`].
 #[derive(Clone, Debug)]
 pub struct MemoryFlash {
     /// Application area of the program flash.
@@ -25,13 +25,13 @@ pub struct MemoryFlash {
     pub erase_us: u64,
     /// Duration of a write of one block, µs.
     pub write_us: u64,
-    /// First operation, counted from 0, that fails. All later operations also fail.
+    /// First operation that fails, counted from 0. All later operations also fail.
     pub fail_after: Option<u64>,
-    /// The operation, counted from 0, during which the power is lost.
+    /// Operation during which the power is lost, counted from 0.
     pub cut_after: Option<u64>,
-    /// A byte of the program flash that stays erased after every write. Only reading back detects it.
+    /// Byte of the program flash that stays erased after every write. Only a read-back detects this fault.
     pub stuck_byte: Option<usize>,
-    /// Operations started so far.
+    /// Number of operations started so far.
     pub operations: u64,
     cells: [Vec<u8>; 3],
     record: [u8; RECORD_LEN],
@@ -88,7 +88,7 @@ impl MemoryFlash {
         &self.cells[slot(memory)]
     }
 
-    /// Stores an application as if it had been programmed.
+    /// Stores an application in the flash without the programming protocol.
     pub fn install(&mut self, record: ucom::node::Record, image: &[u8]) {
         let start = 2 * record.address.saturating_sub(self.program.start) as usize;
         if let Some(place) = self.cells[0].get_mut(start..start + image.len()) {
@@ -97,7 +97,7 @@ impl MemoryFlash {
         }
     }
 
-    /// Starts an operation. Returns how much of it is done: 2 for all, 1 for half, 0 for nothing.
+    /// Starts an operation. Returns the extent to which the operation is performed: 2 for all, 1 for half, 0 for none.
     fn begin(&mut self, now_us: u64, duration: u64) -> Result<usize, FlashError> {
         if self.dark {
             return Err(FlashError);
@@ -192,7 +192,7 @@ impl Flash for MemoryFlash {
     }
 }
 
-/// An init pin on a wire: the outgoing pin of one board is the incoming pin of the next.
+/// Init pin on a wire. The outgoing pin of one board is the incoming pin of the next board.
 #[derive(Clone, Debug, Default)]
 pub struct WirePins {
     /// Wire from the previous board.
@@ -251,7 +251,7 @@ impl Store for MemoryStore {
 /// Application without a controlled process: buffers, texts, and a record of the calls.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryApplication {
-    /// Time from the start until the application is up, µs.
+    /// Time from the start until the application runs, µs.
     pub start_us: u64,
     /// Description, and the names of the inputs, outputs and parameters.
     pub texts: Texts,
@@ -273,9 +273,9 @@ pub struct MemoryApplication {
     pub running: bool,
     /// `true` if the outputs are enabled.
     pub active: bool,
-    /// Control cycles so far.
+    /// Number of control cycles so far.
     pub steps: u64,
-    /// Time at which the program was started; `None`: the program does not run.
+    /// Time at which the program was started; `None` if the program does not run.
     pub started_us: Option<u64>,
 }
 
@@ -341,7 +341,7 @@ impl Application for MemoryApplication {
         self.sampled_so.clone_from(&self.so);
     }
 
-    // The trait calls the snapshot `so`.
+    // The trait names the snapshot `so`.
     #[allow(clippy::misnamed_getters)]
     fn so(&self) -> &[u16] {
         &self.sampled_so

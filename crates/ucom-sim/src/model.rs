@@ -1,10 +1,10 @@
 //! Application of a simulated board: some axes, controlled by the words of CI, SO and PAR.
 use super::axis::{Axis, AxisConfig, Command};
 
-/// Words of an axis among the inputs: name, unit, initial value.
+/// Words of an axis among the inputs, with name, unit and initial value.
 const INPUTS: [(&str, &str, i16); 3] =
     [("set_position", "0.01 deg", 0), ("stiffness", "0.1 %", 1000), ("speed_limit", "0.1 deg/s", 900)];
-/// Words of an axis among the outputs: name, unit.
+/// Words of an axis among the outputs, with name and unit.
 const OUTPUTS: [(&str, &str); 5] = [
     ("position", "0.01 deg"),
     ("velocity", "0.1 deg/s"),
@@ -12,7 +12,8 @@ const OUTPUTS: [(&str, &str); 5] = [
     ("temperature", "0.1 C"),
     ("reference", "0.01 deg"),
 ];
-/// Words of an axis among the parameters: name, unit, default. For the position limits, the defaults are the stops of the axis.
+/// Words of an axis among the parameters, with name, unit and default. For the position limits, the defaults are the mechanical stops of
+/// the axis.
 const PARAMETERS: [(&str, &str, i16); 5] = [
     ("kp", "mA/deg", 120),
     ("kd", "0.1 mA s/deg", 80),
@@ -30,7 +31,7 @@ pub(super) struct Model {
     par_names: Vec<String>,
     initial_ci: Vec<u16>,
     initial_par: Vec<u16>,
-    /// `true` for each set point that is beyond its limits. Such a set point is reported once.
+    /// `true` for each set point that is beyond its limits. Each such set point is reported only once.
     limited: Vec<bool>,
 }
 
@@ -82,7 +83,7 @@ impl Model {
         &self.initial_par
     }
 
-    /// Advances by `seconds`; the outputs are enabled if `active`. Returns a text to report, if any.
+    /// Advances the simulation by `seconds`; the outputs are enabled if `active`. Returns a text to report, if any.
     pub(crate) fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
         let mut reported = None;
         for (i, axis) in self.axes.iter_mut().enumerate() {
@@ -114,7 +115,7 @@ impl Model {
     }
 }
 
-/// Returns a value as a 16-bit word in two's complement. A value out of range gives the nearest word.
+/// Returns a value as a 16-bit word in two's complement. A value out of range results in the nearest word.
 fn word(value: f64) -> u16 {
     value.round() as i16 as u16
 }

@@ -13,7 +13,7 @@ use crate::{ChainSim, Fault};
 
 /// Name of the bus.
 const CHANNEL: &str = "can0";
-/// If the computer was busy for longer than this, virtual time pauses. Otherwise the boards would lose their PC.
+/// If the computer was busy for longer than this, virtual time pauses. Without this pause, the boards would lose their PC.
 const CATCH_UP_US: u64 = 200_000;
 
 /// Server that connects clients of the socketcand protocol with the boards of the chain, over a simulated bus and in real time.
@@ -28,9 +28,9 @@ pub struct ChainServer<'a> {
     leaving: Vec<MemberId>,
     started: Instant,
     start_us: u64,
-    /// The last frame on the wire: the time when it ended in ns, the frame, and the frames that clients receive for it.
+    /// Last frame on the wire: the time at which it ended in ns, the frame, and the frames that clients receive for it.
     carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
-    /// Clients that were told about the bus-off of their controllers.
+    /// Clients that received a message about the bus-off of their controllers.
     off: BTreeSet<ClientId>,
     /// Time of the last report that a controller has left the bus, ns.
     off_reported_ns: Option<u64>,
@@ -38,8 +38,8 @@ pub struct ChainServer<'a> {
 }
 
 impl<'a> ChainServer<'a> {
-    /// Listens for clients at an address; port 0 takes a free port. The bus has `bitrate` bit/s and uses the seed `seed`. `note` takes
-    /// messages for the operator while the server runs.
+    /// Listens for clients at an address; with port 0, the system selects a free port. The bus has `bitrate` bit/s and uses the seed
+    /// `seed`. `note` receives messages for the operator while the server runs.
     ///
     /// # Errors
     /// The address cannot be used for listening.
@@ -80,7 +80,7 @@ impl<'a> ChainServer<'a> {
         self.bus.stats()
     }
 
-    /// Serves clients and boards. Waits for an event of a client at most until the next event of the chain or the bus, and at most
+    /// Serves clients and boards. Waits for an event of a client. Ends the wait at the next event of the chain or the bus, or after
     /// `patience`.
     pub fn turn(&mut self, patience: Duration) {
         let now_us = self.now_us();
@@ -96,7 +96,7 @@ impl<'a> ChainServer<'a> {
         let due_us = self.due_us().saturating_sub(self.now_us());
         let mut patience = Duration::from_micros(due_us).min(patience);
         while let Some(event) = self.gateway.next(patience) {
-            // A frame that arrives now is on the bus now, not at the time when the clock was last read.
+            // A frame that arrives now is put on the bus at the present time, not at the time when the clock was last read.
             let now_us = self.now_us();
             self.advance(now_us);
             self.received(event.client, event.event);
@@ -104,7 +104,7 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Returns the virtual time by the clock, µs.
+    /// Returns the virtual time, derived from the clock, µs.
     fn now_us(&mut self) -> u64 {
         let now = self.start_us + self.started.elapsed().as_micros() as u64;
         let reached = self.bus.now_ns() / 1000;
@@ -115,7 +115,7 @@ impl<'a> ChainServer<'a> {
         now
     }
 
-    /// Returns the time of the next event that no client causes, µs.
+    /// Returns the time of the next event that is not caused by a client, µs.
     fn due_us(&self) -> u64 {
         let bus = self.bus.next_ns().map_or(u64::MAX, |ns| ns.div_ceil(1000));
         bus.min(self.chain.next_due_us())
@@ -177,7 +177,7 @@ impl<'a> ChainServer<'a> {
                 }
                 // Frames of several members that are equal bit for bit are one frame on the wire (D-07).
                 if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
-                    // Frames of clients have already passed these faults.
+                    // These faults were already applied to frames of clients.
                     let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
                     self.carried = Some((event.at_ns, *frame, copies));
                 }
@@ -204,7 +204,8 @@ impl<'a> ChainServer<'a> {
         self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| *client)
     }
 
-    /// Handles a change of a controller's state. A client is told when its own controller leaves the bus and when it is back.
+    /// Handles a change of a controller's state. A client gets a message when its own controller leaves the bus and when its controller
+    /// returns.
     fn is_in_state(&mut self, member: MemberId, state: ErrorState, at_ns: u64) {
         let off = state == ErrorState::BusOff;
         if let Some(client) = self.client_of(member)
@@ -218,7 +219,7 @@ impl<'a> ChainServer<'a> {
     }
 
     /// Reports that a controller has left the bus. The controller recovers by itself. At most one report per second is made, because a bad
-    /// wire causes bus-off again and again.
+    /// wire causes bus-off repeatedly.
     fn report_off(&mut self, member: MemberId, at_ns: u64) {
         if self.off_reported_ns.is_some_and(|at| at_ns.saturating_sub(at) < 1_000_000_000) {
             return;
@@ -254,7 +255,7 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Injects the fault of a line such as `kill 3`. Reports the fault, or the error in the line, to the operator.
+    /// Injects the fault that a line such as `kill 3` describes. Reports the fault, or the error in the line, to the operator.
     pub fn fault(&mut self, line: &str) {
         if line.is_empty() {
             return;

@@ -1,4 +1,4 @@
-//! The simulation of the chain: boards, init wires and faults.
+//! Simulation of the chain: boards, init wires and faults.
 
 use super::board::{Board, BoardState};
 use super::fault::{Fault, FaultKind, Trigger};
@@ -12,11 +12,11 @@ const MASTER_US: u64 = 250_000;
 /// Period of frames of another protocol, µs.
 const FOREIGN_US: u64 = 40_000;
 
-/// Boards of a chain and the other senders on their bus. All of them are members of a bus that the caller runs.
+/// Boards of a chain and the other senders on their bus. All boards and senders are members of a bus that the caller simulates.
 ///
-/// Member 0 is the first board. The last member is not a board: it sends all frames that faults bring onto the bus. Call
+/// Member 0 is the first board. The last member is not a board: it sends all frames that faults add to the bus. Call
 /// [`advance`](Self::advance), then [`poll`](Self::poll) each member and put its frame on the bus. Report the result to the member with
-/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent), and pass the frame to the other members with [`receive`](Self::receive).
+/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent). Then pass the frame to the other members with [`receive`](Self::receive).
 pub struct ChainSim {
     boards: Vec<Board>,
     profile: Profile,
@@ -24,7 +24,7 @@ pub struct ChainSim {
     random: u64,
     /// Faults that have not begun.
     waiting: Vec<Fault>,
-    /// Active faults, and the times when they end.
+    /// Active faults, and the times at which they end.
     holding: Vec<(u64, Fault)>,
     /// Number of times that each identifier was on the bus, for faults that a frame triggers.
     seen: BTreeMap<u16, u64>,
@@ -50,7 +50,7 @@ impl ChainSim {
             boards,
             profile: *profile,
             now_us: 0,
-            // xorshift must not start at 0.
+            // The state of xorshift must not start at 0.
             random: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
             waiting: faults,
             holding: Vec::new(),
@@ -67,7 +67,7 @@ impl ChainSim {
         sim
     }
 
-    /// Returns the number of members: the boards and one more.
+    /// Returns the number of members, which is the number of boards plus one.
     pub fn members(&self) -> usize {
         self.boards.len() + 1
     }
@@ -94,7 +94,7 @@ impl ChainSim {
         boards.chain(begin).chain(end).chain(others).min().unwrap_or(u64::MAX)
     }
 
-    /// Advances the time, never backwards. Returns the members whose queues on the bus must be emptied.
+    /// Advances the time, but never backwards. Returns the members whose queues on the bus must be emptied.
     pub fn advance(&mut self, now_us: u64) -> Vec<usize> {
         self.now_us = self.now_us.max(now_us);
         self.faults();
@@ -102,7 +102,7 @@ impl ChainSim {
         std::mem::take(&mut self.void)
     }
 
-    /// Returns the next frame of a member, if it has one to send now.
+    /// Returns the next frame of a member, if the member has a frame to send now.
     pub fn poll(&mut self, member: usize) -> Option<Frame> {
         match self.boards.get_mut(member) {
             Some(board) if board.next_us() > self.now_us => None,
@@ -119,7 +119,7 @@ impl ChainSim {
         }
     }
 
-    /// Reports that a member's controller gave up a frame.
+    /// Reports that a member's controller discarded a frame.
     pub fn not_sent(&mut self, member: usize, frame: &Frame) {
         if let Some(board) = self.boards.get_mut(member) {
             board.not_sent(self.now_us, frame);
@@ -133,17 +133,18 @@ impl ChainSim {
         } else if let (Ok(id), true) = (u16::try_from(id), format == Format::BUS)
             && let Some(frame) = Frame::new(id, data)
         {
-            // The last member receives every frame except its own, each once. Therefore frames are counted here for triggers.
+            // The last member receives every frame of the other members exactly once. Therefore frames are counted here for the triggers of
+            // faults.
             self.count(&frame);
         }
     }
 
-    /// Returns `true` if a member takes part in the bus. A board without power does not even acknowledge frames.
+    /// Returns `true` if a member is active on the bus. A board without power does not even acknowledge frames.
     pub fn is_powered(&self, member: usize) -> bool {
         self.boards.get(member).is_none_or(|board| !board.unpowered)
     }
 
-    /// Begins a fault now or when it is due. A trigger time is measured from now.
+    /// Begins a fault now or when its trigger occurs. A trigger time is measured from the time of this call.
     pub fn inject(&mut self, mut fault: Fault) {
         match &mut fault.trigger {
             Trigger::At(at) => *at += self.now_us,
@@ -190,7 +191,7 @@ impl ChainSim {
         }
     }
 
-    /// Gives a board the number of the previous board, if the previous board has one.
+    /// Assigns the number of the previous board to a board, if the previous board has a number.
     fn share_number(&mut self, i: usize) {
         let number = self.boards.get(i.wrapping_sub(1)).and_then(|before| before.state().number);
         if let (Some(number), Some(board)) = (number.and_then(Sequence::new), self.boards.get_mut(i)) {
@@ -198,7 +199,7 @@ impl ChainSim {
         }
     }
 
-    /// Returns a random number from 0 to below 1.
+    /// Returns a random number that is at least 0 and below 1.
     fn chance(&mut self) -> f64 {
         // xorshift64, Marsaglia 2003.
         self.random ^= self.random << 13;
@@ -221,7 +222,7 @@ impl ChainSim {
         if self.foreign_at.is_some_and(|at| at <= self.now_us) {
             self.foreign_at = Some(self.now_us + FOREIGN_US);
             let beat = (self.now_us / FOREIGN_US) as u32;
-            // Alternates an identifier with bit 5 and one with function 31.
+            // Alternates between an identifier with bit 5 and an identifier with function 31.
             return Frame::new(if beat.is_multiple_of(2) { 0x3A5 } else { 0x7C3 }, &beat.to_le_bytes());
         }
         None

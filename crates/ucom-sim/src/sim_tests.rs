@@ -3,7 +3,7 @@ use super::*;
 use ucom::node::Phase;
 use ucom::{Format, Frame, Profile};
 
-/// A chain and the frames on its bus.
+/// Chain and the frames on its bus.
 struct Bench {
     sim: ChainSim,
     now_us: u64,
@@ -51,7 +51,7 @@ impl Bench {
         }
     }
 
-    /// Sends a frame of the PC. Returns the frames that boards send within a time.
+    /// Sends a frame of the PC. Returns the frames that boards send within the given time.
     fn ask(&mut self, text: &str, ms: u64) -> Vec<String> {
         let frame: Frame = text.parse().unwrap();
         self.sim.advance(self.now_us);
@@ -69,7 +69,7 @@ impl Bench {
     }
 }
 
-/// Equal seeds, and equal frames at equal times, give the same frames and faults on the bus.
+/// Equal seeds, and equal frames at equal times, result in the same frames and faults on the bus.
 #[test]
 fn the_same_seed_gives_the_same_frames() {
     let run = |seed| {
@@ -89,7 +89,7 @@ fn the_same_seed_gives_the_same_frames() {
     assert_ne!(first, run(2));
 }
 
-/// D-26: a board that crashes sends a report without a request and loses its number. The wire after it becomes inactive.
+/// D-26: a board that crashes sends a report without a request and loses its number. The wire after this board becomes inactive.
 #[test]
 fn d26_a_crash_is_one_report_and_a_lost_number() {
     let mut bench = Bench::new(3, "", 1);
@@ -110,7 +110,7 @@ fn d26_a_crash_is_one_report_and_a_lost_number() {
     );
 }
 
-/// After a power loss, a board is silent. When power returns, it is in its initial state and its flash is unchanged.
+/// After a power loss, a board is silent. When the power returns, the board is in its initial state and its flash is unchanged.
 #[test]
 fn power_loss_leaves_the_flash() {
     let mut bench = Bench::new(1, "[[fault]]\nkind = 'power-loss'\nboard = 1\nat_s = 0.4\nfor_s = 0.3", 1);

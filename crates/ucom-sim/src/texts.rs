@@ -1,11 +1,11 @@
-//! The texts of a program: its description and the names of its inputs, outputs and parameters, in Latin-1.
+//! Texts of a program: its description and the names of its inputs, outputs and parameters, in Latin-1.
 
 use ucom::node::Text;
 
-/// The texts of a program, in Latin-1.
+/// Texts of a program, in Latin-1.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Texts {
-    /// The description of the application.
+    /// Description of the application.
     pub application: Vec<u8>,
     /// Names of the inputs.
     pub ci: Vec<Vec<u8>>,
@@ -16,13 +16,13 @@ pub struct Texts {
 }
 
 impl Texts {
-    /// Creates texts from a description and names. Characters that Latin-1 does not have become `?`.
+    /// Creates texts from a description and names. Characters that Latin-1 does not contain are replaced by `?`.
     pub fn new<T: AsRef<str>>(application: &str, ci: &[T], so: &[T], par: &[T]) -> Self {
         let list = |names: &[T]| names.iter().map(|name| latin1(name.as_ref())).collect();
         Self { application: latin1(application), ci: list(ci), so: list(so), par: list(par) }
     }
 
-    /// Returns a text; empty if it does not exist.
+    /// Returns a text; returns an empty text if it does not exist.
     pub fn get(&self, text: Text) -> &[u8] {
         let (list, index) = match text {
             Text::Application => return &self.application,
@@ -34,7 +34,7 @@ impl Texts {
     }
 }
 
-/// Converts to Latin-1. Characters that Latin-1 does not have become `?`.
+/// Converts to Latin-1. Characters that Latin-1 does not contain are replaced by `?`.
 pub(super) fn latin1(text: &str) -> Vec<u8> {
     text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect()
 }

@@ -1,4 +1,4 @@
-//! Runs the bodies of the fuzz targets on the stored inputs, on some handmade inputs, and on random ones.
+//! Runs the code of the fuzz targets with stored inputs, some manual inputs, and random inputs.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};
@@ -11,8 +11,8 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// A history with a number, a start and a run, and a frame that is too short. All truncations of this history are run
-/// as well.
+/// A history that consists of a number, a start and a run, and of a frame that is too short. The test also runs all truncations of this
+/// history.
 #[test]
 fn a_history() {
     let mut history = Vec::new();

@@ -1,6 +1,6 @@
-//! Runs a board on an in-memory bus: reset, number, start, control loop, and the reaction when the PC falls silent.
+//! Runs a board on an in-memory bus: reset, number, start, control loop, and the reaction when the PC stops sending.
 //!
-//! `cargo run -p ucom --example one_board` prints the frames with their times; `<` is the PC, `>` the board.
+//! `cargo run -p ucom --example one_board` prints the frames with their times. `<` marks the PC, `>` marks the board.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Admin, Frame, Profile, Sequence, ToBoard};
@@ -10,7 +10,7 @@ fn main() {
     let profile = Profile::default();
     let number = Sequence::new(1).expect("1 is at most 31");
 
-    // A board is the state machine and four hardware parts; here these are kept in memory.
+    // A board consists of the state machine and four hardware parts. In this example, the hardware parts are simulated in memory.
     let mut flash = MemoryFlash::default();
     flash.install(Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 }, &[0; 8]);
     let pins = WirePins::chain(1).remove(0);
@@ -38,7 +38,7 @@ fn main() {
     println!("status: {}", board.status());
 }
 
-/// Lets time pass until `end`, from one action of the board to the next.
+/// Advances the time until `end`, from one action of the board to the next.
 fn pass(
     board: &mut Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>,
     mut now_us: u64,
@@ -50,7 +50,7 @@ fn pass(
             if frame.id() != 0x381 {
                 print('>', now_us, &frame);
             }
-            // About as long as the frame takes at 1 Mbit/s.
+            // Approximate duration of the frame at 1 Mbit/s.
             now_us += 55 + 10 * u64::from(frame.dlc());
             board.sent(now_us, &frame);
         } else {

@@ -1,4 +1,4 @@
-//! The four flags of MCA_ADMIN_DATA (D-37).
+//! Four flags of MCA_ADMIN_DATA (D-37).
 
 use core::fmt;
 
@@ -18,13 +18,13 @@ pub struct Admin {
 }
 
 impl Admin {
-    /// Returns the 4 bytes.
+    /// Returns the four bytes of the frame.
     pub const fn payload(self) -> Payload {
         let data = [self.run as u8, self.active as u8, self.debug as u8, self.global_debug as u8, 0, 0, 0, 0];
         Payload::of(data, 4)
     }
 
-    /// Reads the 4 bytes. Returns `None` if a byte is neither 0 nor 1. The receiver then ignores the frame.
+    /// Reads the four bytes of the frame. Returns `None` if a byte is neither 0 nor 1. The receiver ignores such a frame.
     pub const fn from_bytes(bytes: [u8; 4]) -> Option<Self> {
         if bytes[0] > 1 || bytes[1] > 1 || bytes[2] > 1 || bytes[3] > 1 {
             return None;
@@ -38,7 +38,7 @@ impl Admin {
     }
 }
 
-/// Prints the names of the flags that are set, such as `run active`; `-` if none is set.
+/// Prints the names of the flags that are set, such as `run active`; prints `-` if no flag is set.
 impl fmt::Display for Admin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let flags = [

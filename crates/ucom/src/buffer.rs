@@ -14,7 +14,7 @@ pub struct BufferPackage {
     pub words: [u16; 3],
 }
 
-/// A package that starts at or beyond the end of its buffer (DSP_ERROR 5).
+/// Package that starts at or beyond the end of its buffer (DSP_ERROR 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BeyondBuffer {
     /// First word of the package.
@@ -70,7 +70,7 @@ impl BufferPackage {
     }
 
     /// Copies the words into a buffer and returns how many were copied. Words at or beyond the buffer's end are ignored. A package that
-    /// starts there is refused.
+    /// starts at or beyond the end is refused.
     pub fn apply(&self, buffer: &mut [u16]) -> Result<usize, BeyondBuffer> {
         let dimension = buffer.len();
         let beyond = BeyondBuffer { offset: self.offset, dimension };
@@ -89,7 +89,7 @@ impl BufferPackage {
     }
 }
 
-/// The packages of a whole buffer, offsets 0, 3, 6 ….
+/// Packages of a whole buffer, with offsets 0, 3, 6 and so on.
 #[derive(Clone, Debug)]
 pub struct Packages<'a> {
     buffer: &'a [u16],
@@ -97,7 +97,7 @@ pub struct Packages<'a> {
 }
 
 impl<'a> Packages<'a> {
-    /// Creates the packages of a buffer. Words after the 65 536th have no offset and are left out.
+    /// Creates the packages of a buffer. Words after the 65 536th word have no offset and are omitted.
     pub const fn new(buffer: &'a [u16]) -> Self {
         Self { buffer, next: Some(0) }
     }
@@ -120,7 +120,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// C-5: dimensions 0 to 7 and the highest offsets.
+    /// C-5: tests dimensions 0 to 7 and the highest offsets.
     #[test]
     fn d15_c5_packages_of_a_buffer() {
         for dimension in [0u16, 1, 2, 3, 4, 6, 7, 65535] {
@@ -174,7 +174,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-15: a package is decoded as it was sent, and no word outside the buffer is ever changed.
+        /// D-15: a package is decoded as it was sent, and a word outside the buffer is never changed.
         #[test]
         fn d15_round_trip(offset: u16, count in 1..=3u8, mut words: [u16; 3], big: bool, size in 0..9usize) {
             words[usize::from(count)..].fill(0);

@@ -1,4 +1,4 @@
-//! Frames of a HAL's CAN driver: any type that implements the trait of `embedded-can`.
+//! Conversion of frames of a HAL's CAN driver, for any type that implements the trait of `embedded-can`.
 
 use embedded_can::{Id, StandardId};
 

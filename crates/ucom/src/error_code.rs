@@ -2,22 +2,22 @@
 
 use core::fmt;
 
-/// Declares the published codes. Each has a number, a name, and one sentence each for meaning and reaction.
+/// Declares the published codes. Each code has a number, a name, one sentence for its meaning and one sentence for the reaction.
 macro_rules! error_codes {
     ($($(#[$doc:meta])* $code:ident = $number:literal, $name:literal: $meaning:literal, $reaction:literal;)+) => {
         /// Code in DSP_ERROR.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ErrorCode {
             $($(#[$doc])* $code,)+
-            /// A code that is not in the published list. The code is shown as a number and never dropped.
+            /// Code that is not in the published list. The code is shown as a number and never dropped.
             Unknown(u8),
         }
 
         impl ErrorCode {
-            /// The codes of the published list.
+            /// Codes of the published list.
             pub const ALL: [Self; [$($number),+].len()] = [$(Self::$code),+];
 
-            /// Returns the code of a number.
+            /// Returns the error code with this number.
             pub const fn from_number(number: u8) -> Self {
                 match number {
                     $($number => Self::$code,)+
@@ -33,7 +33,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the published name.
+            /// Returns the published name of the code.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$code => $name,)+
@@ -41,7 +41,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the meaning as one sentence.
+            /// Returns the meaning of the code as one sentence.
             pub const fn meaning(self) -> &'static str {
                 match self {
                     $(Self::$code => $meaning,)+
@@ -67,7 +67,7 @@ error_codes! {
     Checksum = 1, "DSP_ERROR_CHECKSUM":
         "The checksum of the received or written image differs from the checksum in its header.",
         "Send the image again. Stop after three attempts.";
-    /// 2: memory area disabled or protected.
+    /// 2: the memory area is disabled or protected.
     MemProtected = 2, "DSP_ERROR_MEM_PROTECTED":
         "Programming is not enabled, the image lies outside the application area, or it is for another board.",
         "Check board and image. Sending the image again does not help.";
@@ -79,7 +79,7 @@ error_codes! {
     Overrun = 4, "DSP_ERROR_OVERRUN":
         "Program data arrived while the board was still busy with the previous block.",
         "Send the image again with a larger prog.frame_gap_us.";
-    /// 5: invalid data header, or an offset at or beyond the end of the buffer.
+    /// 5: the data header is invalid, or an offset is at or beyond the end of the buffer.
     Data = 5, "DSP_ERROR_DATA":
         "The header of the image is invalid, or controller inputs or parameters were sent beyond the last one.",
         "In an update, check the image header. Otherwise compare dimensions and endian of the profile.";
@@ -103,7 +103,7 @@ error_codes! {
     ExloadCycle = 10, "DSP_ERROR_EXLOAD_CYCLE":
         "The transfer paused too long, was out of order, or the second cycle differed from the first.",
         "Send the image again. Stop after three attempts.";
-    /// 11: no valid application to start.
+    /// 11: there is no valid application to start.
     AutostartForbidden = 11, "DSP_ERROR_AUTOSTART_FORBIDDEN":
         "There is no valid application to start.",
         "Program the board first: `ucom update`.";

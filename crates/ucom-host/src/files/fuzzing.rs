@@ -1,4 +1,4 @@
-//! Code of the fuzz targets. Each target gives arbitrary bytes to a file reader. A panic or a violated property is an error.
+//! Code of the fuzz targets. Each target passes arbitrary bytes to a file reader. A panic or a violated property is an error.
 
 use std::io::Cursor;
 use ucom::Profile;
@@ -70,7 +70,7 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Reads signal tables. For every signal, the displayed text of a word must be read as the same word, unless a limit forbids it.
+/// Reads signal tables. For every signal, the displayed text of a word must be read as this word again, unless a limit forbids it.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(table) = SignalTable::parse(text) else { return };
@@ -102,8 +102,8 @@ pub fn edges(data: &[u8]) {
     }
 }
 
-/// Reads parameter files and checks them against a board. The valid values are then written as a text, which must give the same words
-/// again.
+/// Reads parameter files and checks them against a board. The valid values are then written as a text. A reader must read this text as
+/// equal words.
 pub fn params(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(file) = ParamsFile::parse(text) else { return };

@@ -23,7 +23,7 @@ use segments::Segments;
 pub const MAX_BYTES: usize = 1 << 20;
 
 /// Number of consecutive records that cannot follow one another by coincidence. A single gap as long as the record before it may be
-/// intended. In a table of interrupt vectors such a gap may follow every entry, but these records are short.
+/// intended. In a table of interrupt vectors, a gap may follow every entry, but the records of such tables are short.
 const EVIDENCE: usize = 3;
 /// Minimum average length, in bytes, of the records that show the unit. Linkers write records of 16 bytes and more.
 const EVIDENCE_BYTES: usize = 12;

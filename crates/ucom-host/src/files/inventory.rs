@@ -36,7 +36,7 @@ pub struct InventoryBoard {
     /// Description reported by the board.
     #[serde(default)]
     pub description: String,
-    /// Name given by the user.
+    /// Name that the user has chosen.
     #[serde(default)]
     pub name: String,
     /// Record of the last update.
@@ -279,7 +279,7 @@ impl Inventory {
     /// Sets or removes the flash record of a board in an inventory file, and changes nothing else in it.
     ///
     /// # Errors
-    /// The file cannot be read or written. If the file does not list the board, nothing is stored, and no error is returned.
+    /// The file cannot be read or written. If the file does not list the board, the file stays unchanged, and no error is returned.
     pub fn set_record(
         path: &Path,
         flash_number: u16,

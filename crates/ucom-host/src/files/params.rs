@@ -29,11 +29,11 @@ pub struct ParamsFile {
 pub struct ParamsBoard {
     /// Position in the chain.
     pub number: u8,
-    /// Place in the file.
+    /// Position of the entry in the file.
     pub place: Place,
     /// Flash number that the board at this position must have.
     pub flash_number: Option<u16>,
-    /// Name in the inventory that the board at this position must have. Each board in the file has a flash number, a name, or both.
+    /// Name in the inventory that the board at this position must have. Each board in the file has a flash number or a name, or both.
     pub name: Option<String>,
     /// Program that the names apply to; `None` for `any` in the file.
     pub program_id: Option<u16>,
@@ -50,11 +50,11 @@ pub struct ParamsEntry {
     pub name: String,
     /// The value.
     pub given: SignalValue,
-    /// Place in the file.
+    /// Position of the value in the file.
     pub place: Place,
 }
 
-/// Place in a text, counted from 1.
+/// Position in a text, counted from 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     /// Line.

@@ -156,7 +156,7 @@ impl RecordingWriter {
         .map_err(|e| e.with_path(path))
     }
 
-    /// Adds a frame. For a frame of another protocol, FZI-CAN returns an error and writes nothing.
+    /// Adds a frame. For a frame of another protocol, FZI-CAN returns an error and does not write the frame.
     pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.write(record),
@@ -174,7 +174,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes the remaining data. Without this call an MCAP file has no index, and a text file may lack its last lines.
+    /// Writes the remaining data. If this function is not called, an MCAP file has no index, and a text file may lack its last lines.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => Ok(w.into_inner().flush()?),
@@ -184,7 +184,7 @@ impl RecordingWriter {
     }
 }
 
-/// Converts `sec.fraction` to nanoseconds. Digits after the ninth decimal are dropped.
+/// Converts `sec.fraction` to nanoseconds. Digits after the ninth decimal are discarded.
 fn seconds(text: &str) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());

@@ -8,7 +8,7 @@ use host_kit::write_atomically;
 /// Size limit of a file in bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 20;
 
-/// A text file that cannot be used at all.
+/// Text file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TextError {

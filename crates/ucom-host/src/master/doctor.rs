@@ -219,7 +219,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
         f.problem(shared.to_string(), why, next);
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
-        // The other values of these boards were read in the wrong byte order, so they give no findings.
+        // The other values of these boards were read in the wrong byte order, so no findings are derived from these values.
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }

@@ -156,7 +156,7 @@ impl Master {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns the numbers that two boards share. Each number is returned as the error of a procedure that ends because of it.
+    /// Returns the numbers that two boards share. Each number is returned as the error with which a procedure ends.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
@@ -216,8 +216,8 @@ impl Master {
         lock(&self.core).data.get(&board).is_some_and(|data| data.repeat.is_some())
     }
 
-    /// Returns the inputs of a board: the values that were set last, or the board's initial values. Returns `None` if neither is known
-    /// since the application started.
+    /// Returns the inputs of a board: the values that were set last, or the board's initial values. An input is `None` if neither value is
+    /// known since the application started.
     pub fn inputs(&self, board: u8) -> Vec<Option<u16>> {
         lock(&self.core).data.get(&board).map(ProcessData::inputs).unwrap_or_default()
     }

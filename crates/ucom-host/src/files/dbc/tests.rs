@@ -26,7 +26,7 @@ fn message(dbc: &Dbc, id: u16) -> &Message {
     dbc.messages.iter().find(|m| m.id == MessageId::Standard(id)).unwrap_or_else(|| panic!("no {id:03X}"))
 }
 
-/// Computes a signal's value bit by bit, from the rules of the DBC format alone.
+/// Computes a signal's value bit by bit, using only the rules of the DBC format.
 fn value(signal: &Signal, data: &[u8]) -> i64 {
     let bit = |n: u64| i64::from(data[n as usize / 8] >> (n % 8) & 1);
     let mut raw = 0_i64;
@@ -60,7 +60,7 @@ fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     message.signals.iter().filter(applies).map(|s| (s.name.clone(), value(s, &data))).collect()
 }
 
-/// P-21: process data have the names of the description, and the same values in both byte orders.
+/// P-21: process data have the names in the description. Their values are equal in both byte orders.
 #[test]
 fn p21_so_frames_decode_by_name() {
     let numbers = [100_i16, -20, 32767, -32768, 5];

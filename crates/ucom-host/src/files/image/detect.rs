@@ -88,7 +88,7 @@ fn extension(name: Option<&Path>) -> Option<String> {
     name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }
 
-/// Returns the place of the first line that is a complete or damaged record. The content may be a text in any encoding, with missing or
+/// Returns the line number, as text, of the first complete or damaged record. The content may be a text in any encoding, with missing or
 /// damaged characters. Returns `None` if the content is not a text, or has no such line.
 fn record_place(content: &[u8]) -> Option<String> {
     // Removes bytes that are not letters: zeros of two-byte encodings, padding, and end marks of old systems.

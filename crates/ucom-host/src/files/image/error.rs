@@ -46,7 +46,7 @@ pub enum ImageError {
         "{place}: a complete or damaged record of Intel HEX or S-record; these characters are not a program"
     )]
     WasRecords {
-        /// Place of the first record.
+        /// Position of the first record.
         place: String,
     },
     /// Raw bytes were requested, but the file is a text.
@@ -164,7 +164,7 @@ pub enum LineProblem {
     /// An address already has another value.
     #[error("byte address 0x{address:X} has two different values")]
     Overlap {
-        /// First such byte address.
+        /// First byte address whose value is different.
         address: u64,
     },
     /// The data would make the image larger than the limit.
@@ -232,8 +232,8 @@ impl ImageError {
         }
     }
 
-    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or are too high. Such addresses may have another
-    /// unit.
+    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or are too high. The record addresses may then have
+    /// another unit.
     pub fn is_of_addresses(&self) -> bool {
         use LineProblem::{HalfWord, Overlap, TooLarge};
         matches!(

@@ -125,7 +125,7 @@ pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> 
     Ok(digits.as_chunks::<2>().0.iter().map(|[high, low]| value(*high) << 4 | value(*low)).collect())
 }
 
-/// Returns the lines with their numbers from 1, without line ends and surrounding blanks. Empty lines are left out.
+/// Returns the lines with their numbers from 1, without line ends and surrounding blanks. Empty lines are omitted.
 pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
     let lines = content.split(|b| *b == b'\n').enumerate();
     lines.map(|(i, line)| (i + 1, line.trim_ascii())).filter(|(_, line)| !line.is_empty())

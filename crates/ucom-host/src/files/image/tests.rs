@@ -75,7 +75,8 @@ fn s_records_as_published_count_words_here() {
     );
 }
 
-/// Records that follow one another in only one unit show the unit of the addresses. One or two records are not enough.
+/// Records that follow one another in only one unit show the unit of the addresses. One or two records are not enough to determine the
+/// unit.
 #[test]
 fn the_unit_of_addresses_is_taken_from_the_records() {
     let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
@@ -94,7 +95,7 @@ fn the_unit_of_addresses_is_taken_from_the_records() {
     let in_bytes = read(&file(4, 16, 16)).unwrap();
     let note = ImageNote::AddressesCount(AddressUnit::Byte);
     assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
-    // Either the gap is intended or the unit differs. The reader does not guess.
+    // The gap may be intended, or the unit may differ. The reader does not guess.
     let other = |text: &str| match read(text) {
         Err(ImageError::OtherUnit { error, unit: AddressUnit::Byte }) => error.to_string(),
         other => panic!("{other:?}"),
@@ -154,7 +155,7 @@ fn raw_bytes_are_whole_words() {
     assert!(matches!(Image::parse(b":00000001FF\n", &forced), Err(ImageError::WasRecords { .. })));
 }
 
-/// A text with any name is never read as raw bytes. The error reports the place of the record.
+/// A text with any name is never read as raw bytes. The error contains the position of the record.
 #[test]
 fn a_text_is_no_image() {
     let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
@@ -200,7 +201,7 @@ fn a_text_is_no_image() {
     }
 }
 
-/// A count record ends a file of S-records if its number is correct and nothing follows it.
+/// A count record ends a file of S-records if its number is correct and it is the last record.
 #[test]
 fn a_count_record_ends_a_file() {
     let data: Vec<String> = (0..4).map(|i| s_line(1, 2, i * 8, &[i as u8 + 1; 16])).collect();

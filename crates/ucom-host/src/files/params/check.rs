@@ -1,4 +1,4 @@
-//! Checks a parameter file against the boards on the bus. Every error is reported with its place before anything is sent.
+//! Checks a parameter file against the boards on the bus. Every error is reported with its position before any frame is sent.
 
 use super::{ParamsBoard, ParamsEntry, Place};
 use crate::files::signals::{BoardSignals, ValueError};
@@ -34,7 +34,7 @@ pub struct ParamsWord {
 /// Error in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsProblem {
-    /// Place in the file.
+    /// Position of the error in the file.
     pub place: Place,
     /// Board number.
     pub board: u8,
@@ -83,7 +83,7 @@ pub enum ParamsProblemKind {
     WrongProgram {
         /// Program ID in the file.
         wanted: u16,
-        /// Program ID of the board; `None`: it has no application.
+        /// Program ID of the board; `None` if the board has no application.
         found: Option<u16>,
     },
     /// No signal has this name.

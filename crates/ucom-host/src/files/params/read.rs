@@ -122,7 +122,7 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
 
 /// Rewords a message of the YAML library for the author of the file.
 fn people(words: &str) -> String {
-    // The message itself contains another place, which is removed.
+    // The message itself contains another position, which is removed.
     let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');
     if let Some(rest) = words.strip_prefix("duplicate mapping key") {
         let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);

@@ -165,8 +165,8 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
 }
 
-/// D-11, D-35: if a saved file is read with another signal table, or without one, it gives the same word or is refused. The file never
-/// gives another word.
+/// D-11, D-35: if a saved file is read with another signal table, or without a table, each value results in the saved word or is refused.
+/// The file never results in another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };
@@ -221,7 +221,7 @@ fn names() -> impl Strategy<Value = Vec<String>> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// For any parameter names, a saved file gives the same words at the same positions.
+    /// For any parameter names, a saved file is read back as equal words at equal positions.
     #[test]
     fn a_saved_file_gives_the_same_words(par in names(), words in prop::collection::vec(any::<Option<u16>>(), 8), kind in 0..4_usize, text in any::<String>()) {
         let description = IoDescription { description: text.clone(), par, ..Default::default() };

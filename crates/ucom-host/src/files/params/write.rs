@@ -29,7 +29,7 @@ pub struct SavedBoard {
 pub struct SavedSignal {
     /// Meaning of the word.
     pub signal: Signal,
-    /// Requested word; `None`: the signal is written as a comment.
+    /// Requested word; `None` if the signal is written as a comment.
     pub word: Option<u16>,
     /// Remark after the entry. For a requested word, the remark is the time of writing.
     pub remark: String,
@@ -90,8 +90,8 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// Returns the text for a word. A file may be read again with another signal table, or without one. A number without a unit would then give
-/// another word. Therefore each number gets a unit, which a reader without the table refuses, or the raw word is written.
+/// Returns the text for a word. A file may be read again with another signal table, or without one. A number without a unit would then
+/// result in another word. Therefore each number gets a unit, which a reader without the table refuses, or the raw word is written.
 fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
     let text = match signal.kind {
@@ -120,7 +120,7 @@ fn comment(words: &str) -> String {
 /// Longest implicit key that YAML allows (1.2.2, section 7.4.2), in characters, including quotes and escapes.
 const KEY_MAX: usize = 1024;
 
-/// Returns the shortest unambiguous name of a signal. If a YAML key cannot hold the name, returns the signal's index.
+/// Returns the shortest unambiguous name of a signal. If a YAML key cannot contain the name, returns the signal's index.
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);

@@ -45,7 +45,7 @@ fn times_are_written_with_six_decimals() {
     assert_eq!(String::from_utf8(out.into_inner()).unwrap(), "(0000000007.123456) can0 680#\n");
 }
 
-/// D-02: foreign frames are read with their kind, and are written as the same text.
+/// D-02: foreign frames are read with their kind, and are written as the original text.
 #[test]
 fn d02_foreign_lines_are_recognised() {
     for frame in [
@@ -132,8 +132,7 @@ fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     bytes
 }
 
-/// If a writer is killed, its file can be cut off at any place. All complete records are read, no other record appears, and the damage is
-/// reported.
+/// If a writer is killed, its file may end at any byte. All complete records are read, no other record appears, and the damage is reported.
 #[test]
 fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     let record = |i: u64| {

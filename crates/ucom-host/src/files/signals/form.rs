@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use super::value::may_follow;
 use super::{Signal, SignalType};
 
-/// Largest scale and offset. The smallest scale is the inverse of this limit. These limits keep displayed values within the range of a
-/// number.
+/// Largest scale and offset. The smallest scale is the inverse of this limit. With these limits, every displayed value can be represented
+/// as a number.
 pub(super) const LARGEST: f64 = 1e9;
 
 #[derive(Deserialize)]
@@ -50,7 +50,7 @@ impl Default for FileSignal {
     }
 }
 
-/// Reads `0x1234` or `[0x1234, 0x4B3F]`. An untagged enum would lose the place of an error.
+/// Reads `0x1234` or `[0x1234, 0x4B3F]`. An untagged enum would lose the position of an error.
 fn one_or_many<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u16>, D::Error> {
     struct Ids;
     impl<'de> serde::de::Visitor<'de> for Ids {

@@ -30,7 +30,7 @@ pub struct Signal {
     pub scale: f64,
     /// Value of the word 0, in the signal's unit.
     pub offset: f64,
-    /// Unit such as `deg`; empty if the signal has none.
+    /// Unit such as `deg`; empty if the signal has no unit.
     pub unit: String,
     /// Smallest value that may be written, in the signal's unit.
     pub min: Option<f64>,
@@ -38,7 +38,7 @@ pub struct Signal {
     pub max: Option<f64>,
     /// `true` if a table has an entry for the signal; otherwise its word is raw.
     pub known: bool,
-    /// `true` if the signal table has no entry for the program. Then only raw words are accepted.
+    /// `true` if the signal table has no entry for the program. In this case, only raw words are accepted.
     pub raw_only: bool,
 }
 
@@ -70,7 +70,7 @@ impl Signal {
         self.kind == SignalType::Int16
     }
 
-    /// Returns the smallest and the largest number that the word can hold.
+    /// Returns the smallest and the largest number that the word can represent.
     fn words(&self) -> (i32, i32) {
         match self.kind {
             SignalType::Int16 => (-32768, 32767),
@@ -96,7 +96,7 @@ impl Signal {
 
     fn written(&self, value: f64) -> String {
         let text = format!("{value:.*}", self.digits());
-        // Rounding can give a negative zero, whose sign is removed.
+        // Rounding can result in a negative zero, whose sign is removed.
         let zero = text.starts_with('-') && text.chars().all(|c| "-0.".contains(c));
         if zero { text.trim_start_matches('-').into() } else { text }
     }
@@ -202,7 +202,7 @@ impl Signal {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
-                // Without this check, the meaning of a number without a unit would depend on the signal table in the directory.
+                // If this check were missing, the meaning of a number without a unit would depend on the signal table in the directory.
                 if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }

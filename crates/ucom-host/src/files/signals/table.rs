@@ -113,7 +113,7 @@ impl SignalTable {
         Self::parse(&text).map_err(|e| SignalTableError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// Returns `true` if a table was read. Otherwise the meaning of words is unknown.
+    /// Returns `true` if a table was read. If no table was read, the meaning of words is unknown.
     pub fn is_given(&self) -> bool {
         self.given
     }

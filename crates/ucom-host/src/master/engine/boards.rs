@@ -166,7 +166,7 @@ pub struct Boards {
 }
 
 impl Boards {
-    /// Returns the board with this number, if something is known about it.
+    /// Returns the board with this number, if the master has data about the board.
     pub fn get(&self, number: u8) -> Option<&Board> {
         self.boards.get(&number)
     }

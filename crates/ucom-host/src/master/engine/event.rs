@@ -105,12 +105,12 @@ pub enum Event {
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash numbers of these boards. The list has the same number twice if the boards cannot be distinguished.
+        /// Flash numbers of these boards. The list contains the number twice if the boards cannot be distinguished.
         found: Vec<u16>,
     },
-    /// Events were dropped because the caller did not take them.
+    /// Events were discarded because the caller did not fetch them.
     Overflow {
-        /// Number of dropped events.
+        /// Number of discarded events.
         dropped: u64,
     },
 }

@@ -1,21 +1,21 @@
 //! Detection of numbers that two boards share. The master checks every answer to PC_INFO, for all procedures.
 //!
-//! If two boards have the same number, both carry out every command to it: both are flashed, both move. A board cannot detect this, but the
-//! PC can, because two boards answer one PC_INFO. All answers are compared ([`Holders::received`]). Before a procedure changes something,
-//! it waits until no other board can answer (`one_board_each`).
+//! If two boards have the same number, both boards carry out every command to this number: both are flashed, and both move. A board cannot
+//! detect this, but the PC can, because two boards answer one PC_INFO. All answers are compared ([`Holders::received`]). Before a procedure
+//! changes a board, it waits until no other board can answer (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
 /// Number of consecutive PC_INFO requests that the same flash number must answer twice. A single double answer is not enough, because a
-/// gateway may double a frame now and then.
+/// gateway may sometimes double a frame.
 const TWICE: u32 = 3;
 /// Limit of flash numbers stored per number. Damaged answers may contain any flash number.
 const MOST: usize = 8;
 
-/// Returns the contents of a first frame of DSP_INFO; `None` for other frames. A package of the description has neither the board's number
-/// nor a possible status at these places.
+/// Returns the contents of a first frame of DSP_INFO; `None` for other frames. A package of the description does not contain the board's
+/// number or a possible status at these positions.
 pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
     let info = BoardInfo::parse(payload, profile.endian)?;
     let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);

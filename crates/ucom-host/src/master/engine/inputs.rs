@@ -11,7 +11,7 @@ const INPUTS_SHARE: u64 = 70;
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
-    /// Ends the repetition of a board's inputs and drops the queued inputs. If the board is still being started, its inputs are not
+    /// Ends the repetition of a board's inputs and discards the queued inputs. If the board is still being started, its inputs are not
     /// repeated yet, so they stay queued.
     pub(crate) fn stop_inputs(&mut self, board: u8) {
         if self.data.get_mut(&board).is_some_and(|data| data.repeat.take().is_some()) {
@@ -27,8 +27,8 @@ impl Core {
     /// Sends the controller inputs again every `ci.period`, so that the loss of a frame has no lasting effect (D-34). The board that has
     /// waited longest is first.
     ///
-    /// The repetitions leave a part of the bus time to other frames, even if boards were started with force. On the bus, answers and
-    /// heartbeats have a lower priority than inputs, and a socket accepts more frames than the bus can carry.
+    /// The repetitions use only a part of the bus time, even if boards were started with `force`. On the bus, answers and heartbeats have a
+    /// lower priority than inputs, and a socket accepts more frames than the bus can carry.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -61,7 +61,7 @@ impl Core {
     }
 
     /// Sends a changed input at once. If this PC repeats the inputs, it sends the complete package, which takes effect as a whole (D-34).
-    /// Otherwise it sends only the word (DLC 4, D-15), because it does not know the other words.
+    /// If this PC does not repeat the inputs, it sends only the word (DLC 4, D-15), because it does not know the other words.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
         let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
         if data.repeat.is_some() {

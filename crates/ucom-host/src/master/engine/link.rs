@@ -67,8 +67,8 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// Like [`Link::ask`], but keeps errors. `feed` is for program data, because a board may report an error in the middle of a block.
-    /// Returns the time at which the frame left the queue.
+    /// Like [`Link::ask`], but does not discard errors. `feed` is for program data, because a board may report an error in the middle of a
+    /// block. Returns the time at which the frame left the queue.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
@@ -141,7 +141,7 @@ impl Link {
         });
     }
 
-    /// Sleeps for `us` µs. Frames that are received meanwhile stay in the mailbox.
+    /// Sleeps for `us` µs. Frames that are received during the sleep stay in the mailbox.
     pub(crate) async fn sleep(&self, us: u64) {
         self.sleep_until(self.now() + us).await;
     }
@@ -175,7 +175,7 @@ impl Link {
 
     /// Runs `work`, and ends it early in three cases. [`MasterError::Cancelled`]: the caller cancels it. [`MasterError::Bus`]: the caller
     /// reports that the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared): two boards with the same number appear,
-    /// and the procedure does not tolerate this; reported only once. The queued frames of the procedure are then dropped.
+    /// and the procedure does not tolerate this; reported only once. The queued frames of the procedure are then discarded.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -206,7 +206,7 @@ impl Link {
         .await
     }
 
-    /// Sets if the procedure tolerates two boards with the same number from now on, or ends.
+    /// Sets if two boards with the same number are tolerated by the procedure or end it.
     pub(crate) fn bear_shared_numbers(&self, bears: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {

@@ -13,7 +13,7 @@ use crate::master::reports::ProcedureId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use ucom::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, Status, ToBoard};
 
-/// Limit of events that the user has not taken yet.
+/// Limit of events that the user has not fetched yet.
 const MAX_EVENTS: usize = 4096;
 
 struct Outgoing {
@@ -125,7 +125,7 @@ impl Core {
     }
 
     pub(crate) fn event(&mut self, event: Event) {
-        // The end of a procedure must be reported, even if other events are dropped.
+        // The end of a procedure must be reported, even if other events are discarded.
         if self.events.len() >= MAX_EVENTS && !matches!(event, Event::Done { .. }) {
             self.dropped += 1;
         } else {
@@ -141,7 +141,7 @@ impl Core {
         event
     }
 
-    /// Queues a frame ahead of all others. Used for heartbeats and stops.
+    /// Queues a frame before all other frames. Used for heartbeats and stops.
     pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
@@ -326,7 +326,7 @@ impl Core {
             self.may_start(to);
         }
         if function == Function::AskReport {
-            // The reports that follow are answers to the other PC. These reports do not mean that a board has rebooted.
+            // The reports that follow are answers to the other PC. The reports do not mean that a board has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
         // An event is reported only after a pause of at least 1 s.

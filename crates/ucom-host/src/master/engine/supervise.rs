@@ -17,7 +17,7 @@ impl Core {
         }
     }
 
-    /// Performs the tasks that are due at `now`, whether or not a procedure is running.
+    /// Performs the tasks that are due at `now`, with or without a running procedure.
     pub(crate) fn duties(&mut self) {
         let now = self.now;
         if let Session::Master { next_alive } = self.session
@@ -191,7 +191,7 @@ impl Core {
         }
     }
 
-    /// Handles a frame of a board without a number. Such a board can only report errors (D-06).
+    /// Handles a frame of a board without a number. A board without a number can only report errors (D-06).
     fn unnumbered_message(&mut self, from: u8, message: FromBoard) {
         if let FromBoard::Error(code) = message {
             let during = self.mailboxes.keys().next().copied();

@@ -27,8 +27,8 @@ impl Kind {
     }
 }
 
-/// Key of a description. The key contains Program ID and flash date (D-36), and also the board, because boards with the same image can have
-/// different applications.
+/// Key of a description. The key contains Program ID and flash date (D-36). It also contains the board, because boards with equal images
+/// can have different applications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DescriptionKey {
     /// Flash number of the board.
@@ -75,8 +75,8 @@ impl IoDescription {
         }
     }
 
-    /// Returns the index of a signal. The signal is found by its text, with or without the unit in brackets at its end, or by its index
-    /// (`#3` or `3`). The letter case is ignored if only one signal matches then.
+    /// Returns the index of a signal. The signal is selected by its text, with or without the unit in brackets, or by its index (`#3` or
+    /// `3`). The letter case is ignored if only one signal matches then.
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {

@@ -12,7 +12,7 @@ pub struct Snapshot {
     pub incomplete_before: u64,
 }
 
-/// Reassembles snapshots, from offset 0 to the package with the last word. An incomplete snapshot is counted and dropped.
+/// Reassembles snapshots, from offset 0 to the package with the last word. An incomplete snapshot is counted and discarded.
 #[derive(Clone, Debug, Default)]
 pub struct SnapshotAssembler {
     words: Vec<u16>,

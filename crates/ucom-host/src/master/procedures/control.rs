@@ -18,7 +18,7 @@ pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Err
     Ok(Outcome::Info(seen))
 }
 
-/// Sends PC_SETSTATUS and reads the status back. If a change takes longer than one answer, waits for it.
+/// Sends PC_SETSTATUS and reads the status back. If a change takes longer than one answer, waits for the change.
 pub(crate) async fn set_status_procedure(
     link: Link,
     board: u8,
@@ -106,7 +106,8 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
         None => link.broadcast_number(),
     };
     link.become_master(force).await?;
-    // Checks that the board exists. Without this check, the reset of a missing board would look like a reset that no board confirmed.
+    // Checks that the board exists. If this check were missing, the reset of a missing board would look like a reset that no board
+    // confirmed.
     let before = match board {
         Some(board) => {
             let before = confirmed(&link, board).await?.info;
@@ -171,7 +172,7 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
     }
 }
 
-/// Sends PC_XRESET. Afterwards the board is in its exloader with programming enabled (D-23).
+/// Sends PC_XRESET. After this step, the board is in its exloader with programming enabled (D-23).
 pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
@@ -313,7 +314,7 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
 /// outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
-    // A command that ends something must not wait for answers.
+    // A command that only ends motion must not wait for answers.
     if !ends {
         one_board_each(link, &[board]).await?;
     }
@@ -322,7 +323,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
-    // The last flags of the board may have been lost. The status byte shows whether the loop runs.
+    // The last flags of the board may have been lost. The status byte shows if the loop runs.
     Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
         run,
         active: flags.active && run,

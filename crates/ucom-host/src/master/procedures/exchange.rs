@@ -78,8 +78,8 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     }
     let answer = collector.answer();
     if let Answer::Info(info, text) = &answer {
-        // A package of a string could be mistaken for the first frame. Such a package contains neither the board's number nor a possible
-        // status.
+        // A package of a string could be mistaken for the first frame. A package of a string does not contain the board's number or a
+        // possible status.
         if info.status.contradiction().is_some() || !info.status.has(Status::INIT) {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }
@@ -186,7 +186,7 @@ pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error
     Err(ExchangeError::Contradiction { board, tries: TRIES + 1 }.into())
 }
 
-/// Returns the fields that are the same in all answers of a board.
+/// Returns the fields whose values are equal in all answers of a board.
 pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
     (info.flash_number, info.program_id, info.date)
 }

@@ -52,8 +52,8 @@ impl Link {
     }
 
     /// Reports heartbeats of another PC. A heartbeat with the number of a board may come from the board, or from another PC that sends it
-    /// only to this board. The status of the board decides: a board that is not started sends no heartbeats. If the board does not answer,
-    /// the heartbeat is assumed to come from the board.
+    /// only to this board. The status of the board shows the sender: a board that is not started sends no heartbeats. If the board does not
+    /// answer, the heartbeat is assumed to come from the board.
     async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);

@@ -19,7 +19,7 @@ use ucom::{FromBoard, Function, Sequence, Status, ToBoard};
 const ROUNDS: u32 = 6;
 
 /// Assigns the number `number` to its board again if the board no longer answers. Returns an error if the board has another flash number,
-/// or if another board has taken the number as well.
+/// or if another board has also taken the number.
 pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
     link.board(number)?;
     let mut lowered = Vec::new();

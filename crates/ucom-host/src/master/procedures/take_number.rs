@@ -6,8 +6,8 @@ use crate::master::procedures::exchange::{Answer, ask_info};
 use ucom::{ErrorCode, FromBoard, Function, Status, ToBoard};
 
 /// Sends PC_INIT at most three times, until the board acknowledges it or answers PC_INFO. If `lower` is set, the board's own pin is
-/// switched off before each repetition. Without this step, the next board would take the number as well if the board switches on its pin by
-/// itself.
+/// switched off before each repetition. If this step were missing, the next board would also take the number if the board switches on its
+/// pin by itself.
 pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<bool, Error> {
     let to = link.board(number)?;
     let nobody = link.profile().unnumbered().number();

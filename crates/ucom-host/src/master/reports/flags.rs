@@ -27,7 +27,7 @@ impl AdminChange {
         }
     }
 
-    /// Returns `true` if the change only ends motion. Such a change is neither delayed nor refused.
+    /// Returns `true` if the change only ends motion. A change that only ends motion is not delayed or refused.
     pub fn only_ends(&self) -> bool {
         let sets = [self.run, self.active, self.debug, self.global_debug].contains(&Some(true));
         !sets && (self.run == Some(false) || self.active == Some(false))

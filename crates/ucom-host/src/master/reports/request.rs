@@ -146,7 +146,7 @@ impl Request {
     }
 
     /// Returns `true` if the request continues when two boards have the same number. A stop must not wait, and reaches both of these
-    /// boards. The other requests detect such boards themselves and report them in more detail.
+    /// boards. The other requests detect boards with the same number themselves and report these boards in more detail.
     pub(crate) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,

@@ -67,7 +67,7 @@ fn d11_scale_offset_and_unit() {
         "{message}"
     );
     assert_eq!(word(&down, "0x0002"), Ok(2));
-    // A number that the table does not scale gives the same word with and without the table.
+    // A number that the table does not scale results in one word, with and without the table.
     assert_eq!(word(&signal(SignalType::Int16, 1.0, 0.0, ""), "2"), Ok(2));
 }
 
@@ -148,7 +148,7 @@ proptest! {
         }
     }
 
-    /// The displayed text of a word is read as the same word.
+    /// The displayed text of a word is read back as that word.
     #[test]
     fn d11_text_gives_the_word_again(w: u16, kind in 0..4_usize, exponent in -6..4_i32, mantissa in 1..100_u32, negative: bool, offset in -1000..1000_i32) {
         let kind = [SignalType::Int16, SignalType::Uint16, SignalType::Hex, SignalType::Bool][kind];

@@ -67,7 +67,7 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
         }
         other => other?,
     }
-    // If a board has rebooted in the meantime, it would take any number.
+    // If a board has rebooted in the meantime, it would accept any number.
     if bench.info(board).await.is_none() {
         return Ok(Verdict::Fail(
             "the board does not answer PC_INFO; it may have rebooted: `ucom scan`".into(),

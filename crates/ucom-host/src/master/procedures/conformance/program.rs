@@ -116,7 +116,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     ];
     for (what, code, case) in cases {
         enter_exloader(bench.link, board, flash).await?;
-        // Clears and sets PROG, so that the board drops the previous transfer.
+        // Clears and sets PROG, so that the board discards the previous transfer.
         bench.send(Function::SetStatus, board, &[4, 0]).await;
         bench.send(Function::SetStatus, board, &[4, 4]).await;
         bench.receive(20 * MS).await;

@@ -90,7 +90,7 @@ pub(super) async fn put_back(
         }
         return Ok(());
     }
-    // PROG is cleared first, so that a transfer in progress is dropped.
+    // PROG is cleared first, so that the board discards a transfer in progress.
     set_status(link, n, Status::MSTART | Status::PROG, Status(0)).await?;
     if was.has(Status::PROG) {
         set_status(link, n, Status::PROG, Status::PROG).await?;

@@ -48,7 +48,7 @@ impl<'a> Runner<'a> {
         let boards = self.found.boards.iter().map(|b| b.number);
         match test.scope {
             Scope::Chain | Scope::Numbers => vec![None],
-            // Without the permission, the test is listed only once, not once per board.
+            // If the permission is missing, the test is listed only once, not once per board.
             _ if test.level == Level::Init && !self.options.init => vec![None],
             Scope::First => boards.min().into_iter().map(Some).collect(),
             Scope::Board | Scope::Programmed => boards.map(Some).collect(),
@@ -116,7 +116,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Gives every board its number again.
+    /// Assigns the number of every board again.
     async fn numbered(&mut self) -> Result<(), Error> {
         if self.unnumbered {
             // The flag `unnumbered` stays set until all boards have their numbers.

@@ -9,7 +9,7 @@ use crate::master::reports::{ConformanceOptions, Verdict};
 /// Effect of a test on boards. The effect determines which permission the test needs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
-    /// The test changes nothing.
+    /// The test does not change any board.
     Ask,
     /// The test resets and numbers boards, or sets bits of their status.
     Init,

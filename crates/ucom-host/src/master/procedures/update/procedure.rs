@@ -70,8 +70,8 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     Ok(Outcome::Update(report))
 }
 
-/// Commands the boards in progress to drop the transfer. A partly written image is never valid. `why` is the cause: a cancel by the user,
-/// or two boards with the same number.
+/// Commands the boards in progress to discard the transfer. A partly written image is never valid. `why` is the cause: a cancel by the
+/// user, or two boards with the same number.
 async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
     for board in session.active.clone() {
         // The board may have received PC_START already. The update stops boards whose application it has started.

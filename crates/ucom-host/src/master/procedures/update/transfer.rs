@@ -54,7 +54,7 @@ pub(super) struct Transferred {
 
 impl Attempt<'_> {
     /// Sends both cycles. Calls `erasing` before the first frame of a cycle that may erase. The arguments are the boards that still take
-    /// part and the boards that have dropped out.
+    /// part, and the boards that do not take part any more.
     pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8], &[(u8, Broken)])) -> Transferred {
         let mut out = Transferred::default();
         let mask = self.boards.iter().fold(0, |mask, b| mask | 1 << b);

@@ -83,7 +83,7 @@ pub enum UpdateFailure {
     /// A step failed after memory was erased.
     #[error("{0}")]
     After(Box<Error>),
-    /// The board no longer takes part in the group and does not answer. Frames to the group may have erased it.
+    /// The board was removed from the group and does not answer. Frames to the group may have erased it.
     #[error("the board may be erased, because it could receive frames of the group: {0}")]
     MayBeErased(Box<Error>),
     /// The user cancelled the update.

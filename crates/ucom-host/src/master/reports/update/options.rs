@@ -31,10 +31,10 @@ pub struct UpdateTarget {
 /// Order in which several boards are updated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpdateMode {
-    /// One board after the other.
+    /// Updates one board after the other.
     #[default]
     OneByOne,
-    /// All boards at once by broadcast. Boards that leave the group are updated one by one afterwards.
+    /// All boards at once by broadcast. Boards that are removed from the group are updated one by one afterwards.
     Group,
 }
 
@@ -48,7 +48,7 @@ pub struct UpdateOptions {
     /// Image of the other cycle. With the plan `exloader-app` this is the first cycle, with `pmem-xmem` and `raw` the second.
     pub second: Option<UpdateImage>,
     /// Program ID. If the image does not determine the Program ID (plan `raw`, `prog.header` or `prog.checksum` `none`), the board must
-    /// show this ID at the end. Otherwise the image must have this Program ID.
+    /// show this ID at the end. If the image determines the Program ID, the image must have this ID.
     pub expect_program_id: Option<u16>,
     /// Flash date in 16 bits, see [`DateForm`](ucom::DateForm).
     pub date: u16,

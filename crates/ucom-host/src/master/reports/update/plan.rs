@@ -51,9 +51,9 @@ impl Expected {
 pub enum Unverifiable {
     /// Plan `raw`: the files do not show the Program ID.
     RawPlan,
-    /// `prog.header` is `none`: the board itself determines Program ID and date.
+    /// With `prog.header = none`, the board itself determines Program ID and date.
     NoHeader,
-    /// `prog.checksum` is `none`: a Program ID is not the checksum of an image.
+    /// With `prog.checksum = none`, a Program ID is not the checksum of an image.
     NoChecksum,
 }
 

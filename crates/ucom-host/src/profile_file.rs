@@ -47,7 +47,7 @@ fn unknown(key: &str) -> ProfileFileError {
     ProfileFileError::UnknownKey { key: key.to_string(), nearest }
 }
 
-/// Flattens tables: `a.b = 1` and `[a] b = 1` are the same key.
+/// Flattens tables: `a.b = 1` and `[a] b = 1` define one key.
 fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, toml::Value)>) {
     for (name, value) in table {
         let name = if prefix.is_empty() { name } else { format!("{prefix}.{name}") };

@@ -154,7 +154,7 @@ impl Driver {
     /// boards that may still run. Each reason is shown once, and the reason in `known` is not shown again.
     pub fn halt(&mut self, boards: &[u8], known: Option<String>) -> Vec<u8> {
         self.stop_at_once(Some(boards));
-        // A lost bus gives the same reason for all boards, so it is shown once.
+        // A lost bus is the reason for all boards, so it is shown only once.
         let mut noted: BTreeSet<String> = known.into_iter().collect();
         let mut running = BTreeSet::new();
         for level in [StopLevel::Loop, StopLevel::Application] {

@@ -16,7 +16,7 @@ pub struct CleanupList(Arc<Mutex<State>>);
 struct State {
     /// Work of the requests in progress that would remain undone, the outermost request first.
     now: Vec<Option<Cleanup>>,
-    /// Boards that a finished request left running.
+    /// Boards that run after a finished request.
     running: Vec<u8>,
     /// Boards that finished requests started.
     started: BTreeSet<u8>,
@@ -203,7 +203,7 @@ mod tests {
         assert!(cleanup.words().contains("ucom stop 2\n"));
     }
 
-    /// A dry run changes nothing, and the message says this.
+    /// A dry run does not change any board, and the message says this.
     #[test]
     fn a_dry_run_leaves_nothing_undone() {
         for dry_run in [true, false] {

@@ -16,7 +16,7 @@ pub enum SessionError {
     /// A procedure failed.
     #[error(transparent)]
     Procedure(#[from] Error),
-    /// The values are not valid for the boards, or it is not known whether the boards received them.
+    /// The values are not valid for the boards, or the boards may not have received the values.
     #[error(transparent)]
     Values(#[from] ValuesError),
     /// The inventory cannot be read.
@@ -25,7 +25,7 @@ pub enum SessionError {
     /// The bus cannot be opened.
     #[error("{0}")]
     Open(Box<OpenError>),
-    /// The open bus failed.
+    /// The bus failed after it was opened.
     #[error("{0}")]
     Bus(CanError),
     /// The bus cannot carry the frame.
@@ -76,12 +76,12 @@ pub enum SessionError {
         /// Boards without known names, each with its error.
         failed: Vec<(u8, SessionError)>,
     },
-    /// The type of the outcome does not match the request. This is an error in this library.
+    /// The type of the outcome does not match the request. The cause is an error in this library.
     #[error("unexpected outcome {0:?}")]
     Unexpected(Box<Outcome>),
 }
 
-/// Reasons why values cannot be sent to boards, or why it is not known whether the boards received them.
+/// Reasons why values cannot be sent to boards, or why the boards may not have received the values.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValuesError {

@@ -1,5 +1,5 @@
-//! Boards that a session has started, and the data about them. All programs that own a bus for others use this module. A board whose state
-//! is in doubt is listed as started, because an additional stop does no harm.
+//! Boards that a session has started, and the data about them. This module is used by all programs that own a bus and share it with other
+//! programs. A board whose state is in doubt is listed as started, because an additional stop does no harm.
 //!
 //! - [`Held`]: the state, which the session's [`Operator`](super::Operator) updates even during procedures.
 //! - [`Session`]: a driver with that state. Every start and stop of a board uses [`Session`].
@@ -176,9 +176,9 @@ impl Session {
         with_names(&cache, |cache| act(self, cache))
     }
 
-    /// Runs an action that starts or moves these boards. The boards are listed as started before anything is sent, because the user may end
-    /// the action at any time. After a failure, boards are removed from the list if nothing was sent to them or if they answer that they
-    /// are stopped.
+    /// Runs an action that starts or moves these boards. The boards are listed as started before any frame is sent, because the user may
+    /// end the action at any time. After a failure, a board is removed from the list if no frame was sent to it or if it answers that it is
+    /// stopped.
     pub fn starting<T>(
         &mut self,
         boards: &[u8],

@@ -78,7 +78,7 @@ mod tests {
         assert_eq!(Written { word: 0, at: 1_234_567_890 }.when(), "2009-02-13 23:31 UTC");
     }
 
-    /// Another program has other parameters, even at the same index.
+    /// Another program has other parameters, even at an equal index.
     #[test]
     fn d35_another_program_remembers_nothing() {
         let dir = tempfile::tempdir().unwrap();

@@ -100,7 +100,7 @@ pub struct ParameterFile {
 pub type FileWords = (Vec<Word>, Vec<Word>);
 
 impl ParameterFile {
-    /// Reads a file, and keeps only the selected boards.
+    /// Reads a file, and removes the boards that are not selected.
     pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, ValuesError> {
         let wrong = |message: String, hint| ValuesError::File { message, hint };
         let file =
@@ -117,7 +117,7 @@ impl ParameterFile {
         Ok(Self { file: path.display().to_string(), boards, inventory })
     }
 
-    /// Keeps only the selected boards. Used for a file that was read before the boards were known.
+    /// Removes the boards that are not selected. Used for a file that was read before the boards were known.
     #[must_use]
     pub fn of_boards(mut self, meant: impl Fn(u8) -> bool) -> Self {
         self.boards.retain(|board| meant(board.number));

@@ -1,5 +1,5 @@
-//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered before a timeout can
-//! end. Sending and receiving cannot block each other.
+//! Moves frames between the bus and the PC side, in an order that does not falsify times. Received frames are delivered before a timeout
+//! can end. Sending and receiving cannot block each other.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Conversion of values to words of the boards. Names and ranges are checked before anything is sent.
+//! Conversion of values to words of the boards. Names and ranges are checked before any frame is sent.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -103,8 +103,8 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops the applications that were started only to read names, so that the boards are left as before if the action is refused. A
-    /// second call has no effect. Failures are shown to the operator.
+    /// Stops the applications that were started only to read names. If the action is refused, the boards are then in their previous state.
+    /// A second call has no effect. Failures are shown to the operator.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

@@ -97,7 +97,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Stops the control loops of all boards. This PC need not be the master.
+    /// Stops the control loops of all boards. This PC does not need to be the master.
     pub fn stop(&mut self, driver: &mut Driver) {
         if self.listen_only {
             self.message =
@@ -156,9 +156,9 @@ pub struct Picture<'a> {
 /// Problems with the next command.
 #[derive(Clone, Debug, Default)]
 pub struct Problems {
-    /// Problems that keep boards from working.
+    /// Problems that prevent the operation of boards.
     pub causes: Vec<String>,
-    /// Problems that do not keep boards from working.
+    /// Problems that do not prevent the operation of boards.
     pub warnings: Vec<String>,
     /// Next command for the most serious problem; empty if no command is needed.
     pub next: String,

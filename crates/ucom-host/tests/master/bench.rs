@@ -132,7 +132,7 @@ impl Bench {
         Self::new(profile, boards.collect())
     }
 
-    /// Transfers one frame over the bus, or advances the time by a step; `false` if nothing happens before `limit`.
+    /// Transfers one frame over the bus, or advances the time by a step; returns `false` if no event occurs before `limit`.
     fn step(&mut self, limit: u64) -> bool {
         self.deliver_delayed();
         if self.pending_master.is_none() && !self.dead {

@@ -68,7 +68,7 @@ fn boards_of_this_crate_pass_every_test() {
     }
 }
 
-/// Without options, the run performs no action that needs permission. The frames of such a run are checked.
+/// Without options, the run performs no action that needs permission. The test checks the frames of this run.
 #[test]
 fn without_options_only_harmless_frames_leave() {
     let mut bench = numbered(Bench::chain(&[0x21, 0x42]));
@@ -79,7 +79,7 @@ fn without_options_only_harmless_frames_leave() {
     let mut last = 0;
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
-        // Allowed are PC_INFO, PC_REPORT, a number that the board already has, and dumps. Heartbeats are sent as well, because `start` has
+        // Allowed are PC_INFO, PC_REPORT, a number that the board already has, and dumps. Heartbeats are also sent, because `start` has
         // begun them.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
@@ -260,7 +260,7 @@ fn each_mistake_is_found_by_its_test() {
     ];
     for (id, mistake) in mistakes {
         let mut bench = with(mistake);
-        // `init` must give both boards their numbers.
+        // `init` must assign a number to each of the two boards.
         if bench.go(Request::Init(InitOptions::default()), 60).is_err() {
             panic!("{id}: no numbers");
         }

@@ -87,7 +87,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let result = bench.wait(id, 200);
         let report = match result {
             Ok(Outcome::Conformance(report)) => report,
-            // Nothing was changed before the first test.
+            // No board was changed before the first test.
             Err(Error::Master(MasterError::Cancelled)) => {
                 assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment}");
                 continue;
@@ -110,8 +110,8 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
     }
 }
 
-/// A board disconnects during the tests. The exit code is 3, the remaining tests are skipped with the reason, and the
-/// other boards are in the same state as before.
+/// A board disconnects during the tests. The exit code is 3, the remaining tests are skipped with the reason, and the state of the other
+/// boards does not change.
 #[test]
 fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     let mut bench = chain();

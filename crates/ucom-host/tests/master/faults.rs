@@ -90,7 +90,7 @@ fn every_frame_of_a_scan_disturbed() {
     }
 }
 
-/// Faults on every frame from the exloader to running outputs. A description is either correct or rejected.
+/// Faults on every frame from the exloader to running outputs. A description is correct or is rejected.
 #[test]
 fn every_frame_of_a_start_disturbed() {
     let options = RunOptions {

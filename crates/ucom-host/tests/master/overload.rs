@@ -39,7 +39,7 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
     let steps: Vec<u64> = alive.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(steps.iter().all(|step| (450 * MS..=550 * MS).contains(step)), "{steps:?}");
     assert!((0..BOARDS.into()).all(|i| bench.board(i).application.running));
-    // Every board's inputs are repeated, not only those of the first board.
+    // The inputs of every board are repeated, including boards after the first one.
     for board in 1..=u16::from(BOARDS) {
         let since = bench.now - 2_000 * MS;
         let repeated = bench.log.iter().filter(|(at, _, f)| *at > since && f.id() == 0x340 + board).count();

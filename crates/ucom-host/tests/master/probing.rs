@@ -48,8 +48,8 @@ fn p20_probe_finds_the_profile() {
     }
 }
 
-/// D-10: if the byte order is wrong, the error mentions the byte order and `probe`. It does not mention the wire, the load or the flash
-/// numbers.
+/// D-10: if the byte order is wrong, the error mentions the byte order and `probe`. The error does not mention the wire, the load or the
+/// flash numbers.
 #[test]
 fn d10_a_wrong_byte_order_is_named() {
     for (boards, here) in [(Endian::Big, Endian::Little), (Endian::Little, Endian::Big)] {
@@ -113,7 +113,7 @@ fn p20_probe_is_harmless_unless_allowed() {
     }
 }
 
-/// The probe finds the checksum of a board's program and the heartbeat mode that a running board accepts.
+/// The probe determines the checksum of a board's program and the heartbeat mode that a running board accepts.
 #[test]
 fn probe_of_checksum_and_heartbeats() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
@@ -129,7 +129,7 @@ fn probe_of_checksum_and_heartbeats() {
     assert!(!bench.board(0).application.running);
 }
 
-/// After any end of a probe, the session uses the same profile as before. Boards that did not run before do not run.
+/// After any end of a probe, the session uses its previous profile. Boards that did not run before do not run.
 #[test]
 fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };

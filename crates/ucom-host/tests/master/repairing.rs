@@ -1,5 +1,4 @@
-//! Repair of one board's number (5.4). After any losses, the repair never succeeds with two boards that have the same
-//! number.
+//! Repair of one board's number (5.4). A repair with any losses never succeeds while two boards have one number.
 
 use super::bench::Exit;
 use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
@@ -39,8 +38,8 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // The board did not receive the number, or the pin of its neighbour is still on. Such an error does not say which boards have
-        // numbers.
+        // The board did not receive the number, or the pin of its neighbour is still on. An error of these kinds does not say which boards
+        // have numbers.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
@@ -61,7 +60,8 @@ fn d21_a_number_goes_to_one_board_only() {
     assert_eq!((bench.count("281#"), bench.count("1C1#0200")), before);
 }
 
-/// The first board's incoming pin is always active. As long as this board has no number, it would take any other number that is assigned.
+/// The first board's incoming pin is always active. As long as this board has no number, it would take any number that is assigned to
+/// another board.
 #[test]
 fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);
@@ -123,7 +123,7 @@ fn d21_no_losses_give_a_number_twice() {
     assert!(shared > 0, "a pin that stays on silently is found out by its consequence");
 }
 
-/// U-4: the repair during an update uses the same steps.
+/// U-4: the repair during an update consists of these steps too.
 #[test]
 fn u4_an_update_gives_a_number_to_one_board_only() {
     let mut bench = rebooted(&[4]);

@@ -23,7 +23,7 @@ fn running(flash_ids: &[u16], boards: &[u8]) -> Bench {
     bench
 }
 
-/// Vector 13.2: the start of board 1 alone, frame by frame.
+/// Vector 13.2: the start of board 1 without other boards, frame by frame.
 #[test]
 fn start_order() {
     let mut bench = initialised(&[0x21]);
@@ -277,7 +277,7 @@ fn p15_d51_lost_boards() {
     }
 }
 
-/// A monitor that is not the master sends nothing when a board is lost.
+/// A monitor that is not the master does not send frames when a board is lost.
 #[test]
 fn only_a_master_stops_boards() {
     let script = (0..5).fold(Script::default(), |s, i| s.at(i * 1000, "681#"));
@@ -289,7 +289,7 @@ fn only_a_master_stops_boards() {
     assert!(bench.sent().is_empty());
 }
 
-/// D-26: if a board reboots while it runs, the other boards are stopped as well.
+/// D-26: if a board reboots while it runs, the other boards are also stopped.
 #[test]
 fn d26_reboot_of_a_running_board() {
     let mut bench = running(&[0x21, 0x42], &[1, 2]);

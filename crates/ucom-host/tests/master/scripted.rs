@@ -91,7 +91,7 @@ fn p3_lost_ack_asks_info_first() {
     let report = init(&mut bench);
     assert!(report.is_ok(), "{:?}", report.findings);
     assert_eq!(bench.count("281#"), 1, "{:?}", bench.sent());
-    // No board answers at all. The master always sends a PC_INFO between two PC_INIT.
+    // No board answers to any frame. The master always sends a PC_INFO between two PC_INIT.
     let sent: Vec<String> = bench.sent().into_iter().filter(|t| t == "282#" || t == "202#").collect();
     assert_eq!(sent, ["282#", "202#", "282#", "202#", "282#", "202#"]);
 }

@@ -13,7 +13,7 @@ use ucom_sim::memory::WirePins;
 
 use super::bench::{Bench, From, Member, Script, image, node};
 
-/// Two boards that are both wired as the first board of the chain.
+/// Two boards whose wiring is that of the first board in the chain.
 fn strapped(flash: [u16; 2]) -> Bench {
     let board =
         |flash| Box::new(node(flash, WirePins::chain(1).remove(0), Profile::default())) as Box<dyn Member>;
@@ -158,8 +158,8 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
 }
 
 /// A second board takes the number at any step while the first board is programmed. The second board either sends an error about program
-/// data, or is flashed together with the first board. In both cases the report gives the reason, no board stays in programming mode, and no
-/// success is reported.
+/// data, or is flashed together with the first board. In both cases, the report contains the reason and no success, and no board stays in
+/// programming mode.
 #[test]
 fn d24_it_is_named_when_it_shows_in_an_update() {
     let strap = |flash| node(flash, WirePins::chain(1).remove(0), Profile::default());
@@ -203,7 +203,7 @@ fn program_frames(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| f.to_string().starts_with("2C1#")).count()
 }
 
-/// A stop is neither delayed nor refused. Both boards stop, and the shared number is reported.
+/// A stop is not delayed or refused. Both boards stop, and the shared number is reported.
 #[test]
 fn d24_a_stop_stops_both() {
     let mut bench =

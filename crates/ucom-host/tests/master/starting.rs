@@ -13,7 +13,7 @@ use super::bench::{Bench, MS};
 use super::chain::initialised;
 
 const IDS: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
-/// Phase of the boards of [`found`] before the run, and whether their outputs are active; in the order of the boards.
+/// Phase of the boards of [`found`] before the run, and `true` if their outputs are active, in the order of the boards.
 const FOUND: [(Phase, bool); 4] =
     [(Phase::Idle, false), (Phase::Ready, false), (Phase::Running, false), (Phase::Running, true)];
 
@@ -45,7 +45,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
     assert!(matches!(error, Error::Running(RunningError::Load(_))) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
-    // All boards have the same program, and its description is known.
+    // All boards have one program, and its description is known.
     assert_eq!(bench.count("301#"), 0, "nothing was started");
 
     let mut bench = initialised(&IDS);
@@ -109,8 +109,8 @@ fn a_run_that_is_cancelled_is_undone() {
     }
 }
 
-/// D-51: a board is lost while others are still being started. With `StopAll`, no further loop is started; with
-/// `Report`, the start continues. In both cases, boards that were idle before are idle again.
+/// D-51: a board is lost while other boards are still being started. With `StopAll`, no further loop is started; with `Report`, the start
+/// continues. In both cases, boards that were idle before are idle again.
 #[test]
 fn d51_a_board_lost_while_others_start() {
     for on_lost in [OnLost::StopAll, OnLost::Report] {

@@ -1,5 +1,5 @@
-//! A stop works on a bus that loses frames and reports errors. It also works for a board that has received a start command but does not run
-//! yet.
+//! A stop works on a bus that loses frames and reports errors. The stop also works for a board that has received a start command but does
+//! not run yet.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -159,8 +159,8 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 
-/// U-2: the master sends two queries to determine if a board runs, because one answer can be lost. The outputs of the board can be lost as
-/// well.
+/// U-2: the master sends two queries to determine if a board runs, because one answer can be lost. The outputs of the board can also be
+/// lost.
 #[test]
 fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     let mut bench = initialised(&[0x21, 0x42]);

@@ -15,7 +15,7 @@ use super::update::{check_program, options, outcomes, recorded, update};
 
 const DATE: u16 = 0x3AC1;
 
-/// Starts an update and lets it run until `stop` returns `true`. Then `end` ends the update, and the report comes at once.
+/// Starts an update and continues it until `stop` returns `true`. Then `end` ends the update, and the report comes at once.
 fn ended(
     bench: &mut Bench,
     options: UpdateOptions,
@@ -154,8 +154,8 @@ fn p12_cancelled_while_it_starts() {
     assert!(report.boards[0].failure.as_ref().unwrap().to_string().contains("may be started"));
 }
 
-/// `--start` also starts a board that already has the image. If the user cancels before the start, the report says
-/// that the board is up to date.
+/// `--start` also starts a board that already has the image. If the user cancels before the start, the report states that the board is up
+/// to date.
 #[test]
 fn a_board_that_is_up_to_date_is_started() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -285,8 +285,8 @@ fn d08_a_dry_run_looks_for_another_pc() {
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
 }
 
-/// A board already has the image, but was left in programming mode, for example by a killed tool. An update ends this mode. A dry run
-/// changes nothing.
+/// A board already has the image, but is still in programming mode, for example after an update tool was killed. An update ends this mode.
+/// A dry run does not change any board.
 #[test]
 fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let left = || {
@@ -319,7 +319,7 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
 }
 
 /// P-12: the update is cancelled, or the bus fails, at any time while such boards are read and their programming mode is ended. The report
-/// lists each board that stays in this mode although it is up to date.
+/// lists each board that is up to date but stays in programming mode.
 #[test]
 fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
     let left = || {
@@ -328,7 +328,7 @@ fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
         for board in [1, 2] {
             bench.go(Request::XReset { board, force: false }, 20).unwrap();
         }
-        // A tool that has just started listens for another PC before it sends a command that changes anything (D-08).
+        // A tool that was started recently listens for another PC before it sends a command that changes a board (D-08).
         bench.master = Master::new(ucom::Profile::default());
         (bench, recorded(options(&[1, 2], 64), &report))
     };

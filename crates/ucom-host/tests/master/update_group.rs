@@ -93,7 +93,7 @@ fn d42_a_group_waits_for_every_board() {
 }
 
 /// A selected board executes XRESET and then sends no further frame. Frames to the group could erase this board without any report.
-/// Therefore the master sends no such frames, and updates the other boards one by one.
+/// Therefore the master sends no frames to the group, and updates the other boards one by one.
 #[test]
 fn a_silent_board_that_may_listen_ends_the_broadcast() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -151,8 +151,8 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
 }
 
 /// D-43: after an error code of its CAN controller or of its start, or after an unknown code, a board still accepts
-/// blocks. The board is erased together with the other boards. If the answers of the board are lost, the report states this. Otherwise the
-/// master reads the board, which shows the program.
+/// blocks. The board is erased together with the other boards. If the answers of the board are lost, the report states this. If the answers
+/// arrive, the master reads the board, which shows the program.
 #[test]
 fn d43_not_every_error_ends_a_transfer() {
     for code in ["06", "08", "09", "0B", "2A"] {
@@ -173,8 +173,8 @@ fn d43_not_every_error_ends_a_transfer() {
     }
 }
 
-/// U-3 with `force`: a board that was removed from the group had the same program before. Therefore the answer of the board does not prove
-/// that the program was written.
+/// U-3 with `force`: a board that was removed from the group already had this program before. Therefore the answer of the board does not
+/// prove that the program was written.
 #[test]
 fn u3_what_was_there_before_proves_nothing() {
     let mut bench = initialised(&[0x21, 0x42]);

@@ -23,7 +23,7 @@ fn written() -> (Bench, UpdateOptions) {
     (bench, recorded(options, &report))
 }
 
-/// Returns the outcome of each board and whether it is verified, the exit code, and whether program data were sent.
+/// Returns the outcome of each board and if it is verified, the exit code, and `true` if program data were sent.
 fn again(bench: &mut Bench, options: UpdateOptions) -> (Vec<(&'static str, bool)>, u8, bool) {
     let before = data_frames(bench);
     let report = update(bench, options);
@@ -35,8 +35,8 @@ fn both(outcome: &'static str, verified: bool) -> Vec<(&'static str, bool)> {
     vec![(outcome, verified); 2]
 }
 
-/// D-62: the board's answer alone is not enough; the flash record is needed as well. Tests ten differences between record and image, one by
-/// one and as a group.
+/// D-62: the board's answer is not enough; the flash record is also needed. Tests ten differences between record and image, one by one and
+/// as a group.
 #[test]
 fn d62_the_flash_record_decides() {
     type Change = fn(&mut UpdateOptions);
@@ -70,7 +70,7 @@ fn d62_the_flash_record_decides() {
             let expected = if is_sent { both("verified", true) } else { both("program-up-to-date", false) };
             assert_eq!((boards, code), (expected, if is_sent { 0 } else { 4 }), "{name} {mode:?}");
         }
-        // With the same image at the same address, the board is up to date.
+        // If image and address are equal to those in the record, the board is up to date.
         let (mut bench, mut options) = written();
         options.mode = mode;
         assert_eq!(again(&mut bench, options), (both("up-to-date", true), 0, false), "{mode:?}");
@@ -118,7 +118,7 @@ fn d62_data_memory_is_written_each_time() {
     }
 }
 
-/// U-3: a board that has the same program with another date is up to date, unless the user requires the date.
+/// U-3: a board that has this program with another date is up to date, unless the user requires the date.
 #[test]
 fn u3_another_date_is_up_to_date() {
     let today = |options: UpdateOptions| UpdateOptions { date: DATE + 1, any_date: true, ..options };

@@ -58,7 +58,7 @@ fn d40_what_the_first_cycle_may_have_erased() {
     }
 }
 
-/// Both images are written to their memories. The report contains address, length and Program ID of each image.
+/// Each of the two images is written to its memory. The report contains address, length and Program ID of each image.
 #[test]
 fn d40_two_images_reach_two_memories() {
     for (plan, memory) in [(Plan::ExloaderApp, Memory::Ram), (Plan::PmemXmem, Memory::Data)] {
@@ -79,7 +79,7 @@ fn d40_two_images_reach_two_memories() {
     }
 }
 
-/// Runs an update with the plan `raw`. Afterwards the board reports `after` and `done_status`.
+/// Runs an update with the plan `raw`. At the end, the board reports `after` and `done_status`.
 fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> UpdateReport {
     let board = Loader { info: ["34126E38", after], done_status, ..Loader::new(32) };
     let mut bench = Bench::new(with_plan(Plan::Raw), vec![Box::new(board)]);
@@ -87,8 +87,8 @@ fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> 
 }
 
 /// U-10: with this plan the image's Program ID is unknown. The outcome is never `verified`, and the update is done
-/// only when the board reports an application. The report gives the reason, a way to verify the program, and the
-/// board's answers before and after.
+/// only when the board reports an application. The report contains the reason, a method to verify the program, and the board's answers
+/// before and after the update.
 #[test]
 fn u10_what_cannot_be_verified_says_so() {
     let report = raw("3F4BC13A", 0x1B, None);
@@ -100,7 +100,7 @@ fn u10_what_cannot_be_verified_says_so() {
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
     let shown = [board.before, board.after].map(|info| info.map(|i| (i.program_id, i.date)));
     assert_eq!(shown, [Some(OLD), Some((0x4B3F, 0x3AC1))]);
-    // The board's report alone is not enough if the board has no application, or if an application runs.
+    // The board's report is not enough if the board has no application, or if an application runs.
     for (after, status) in [("FFFFFFFF", 0x1B), ("3F4BC13A", 0x8B)] {
         let report = raw(after, status, None);
         let failure = report.boards[0].failure.clone();

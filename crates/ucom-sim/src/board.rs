@@ -13,8 +13,8 @@ use ucom::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard
 
 /// Time step inside the board while one of its frames waits for the bus, µs.
 const WAIT_US: u64 = 500;
-/// Delay of a board relative to another board with the same number, µs. Two boards that answer in the same bit time would destroy each
-/// other's frames.
+/// Delay of a board relative to another board with the same number, µs. Two boards that answer in one bit time would destroy each other's
+/// frames.
 const BEHIND_US: u64 = 5_000;
 
 pub(super) struct Board {
@@ -206,7 +206,7 @@ impl Board {
         }
     }
 
-    /// Assigns a number that another board has already taken to the board, as if both boards had received the same PC_INIT.
+    /// Assigns to the board a number that another board has already taken, as if both boards had received one PC_INIT.
     pub(crate) fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;

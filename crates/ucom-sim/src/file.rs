@@ -201,7 +201,7 @@ impl ChainConfig {
         self
     }
 
-    /// Returns the chain with these flash ids, in the order of the wire. Boards beyond the end of the list keep their flash ids.
+    /// Returns the chain with these flash ids, in the order of the wire. Boards after the end of the list keep their flash ids.
     #[must_use]
     pub fn with_flash_ids(mut self, ids: &[u16]) -> Self {
         for (board, id) in self.boards.iter_mut().zip(ids) {
@@ -252,7 +252,7 @@ impl Board {
     }
 }
 
-/// Flattens tables: `a.b = 1` and `[a] b = 1` are the same key.
+/// Flattens tables: `a.b = 1` and `[a] b = 1` define one key.
 fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, String)>) {
     for (name, value) in table {
         let name = if prefix.is_empty() { name } else { format!("{prefix}.{name}") };

@@ -160,7 +160,7 @@ impl<'a> ChainServer<'a> {
                     };
                     self.chain.receive(i, frame.id().value(), format, frame.data());
                 }
-                // A client that is bus-off receives nothing, like any controller.
+                // A client that is bus-off does not receive frames, like any controller.
                 None => {
                     let copies = self.carried.iter().flat_map(|(_, _, copies)| copies);
                     for (client, frame) in
@@ -177,7 +177,7 @@ impl<'a> ChainServer<'a> {
                 }
                 // Frames of several members that are equal bit for bit are one frame on the wire (D-07).
                 if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
-                    // These faults were already applied to frames of clients.
+                    // The faults were already applied to frames of clients.
                     let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
                     self.carried = Some((event.at_ns, *frame, copies));
                 }

@@ -77,7 +77,8 @@ impl ChainSim {
         self.boards.iter().map(Board::state)
     }
 
-    /// Returns a status that no board can have, with the board's position. Such a status shows an error in the node's code (section 4.1).
+    /// Returns a status that no board can have, with the board's position. A status that no board can have shows an error in the node's
+    /// code (section 4.1).
     pub fn violation(&self) -> Option<(usize, &'static str)> {
         self.boards.iter().enumerate().find_map(|(i, board)| Some((i, board.violation?)))
     }
@@ -155,7 +156,7 @@ impl ChainSim {
 
     /// Applies the faults `lost`, `corrupted` and `doubled` to data between chain and clients. Returns zero, one or two copies of the data.
     pub fn through(&mut self, data: &[u8]) -> Vec<Vec<u8>> {
-        // Always draws the same number of random values, so that the setting of one fault does not change the effect of the others.
+        // The number of random values per call is constant, so that the setting of one fault does not change the effect of the others.
         let [lost, corrupted, doubled, place] = [self.chance(), self.chance(), self.chance(), self.chance()];
         if lost < self.lost {
             return Vec::new();

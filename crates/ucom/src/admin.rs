@@ -24,7 +24,7 @@ impl Admin {
         Payload::of(data, 4)
     }
 
-    /// Reads the four bytes of the frame. Returns `None` if a byte is neither 0 nor 1. The receiver ignores such a frame.
+    /// Reads the four bytes of the frame. Returns `None` if a byte is not 0 or 1. The receiver ignores a frame with such a byte.
     pub const fn from_bytes(bytes: [u8; 4]) -> Option<Self> {
         if bytes[0] > 1 || bytes[1] > 1 || bytes[2] > 1 || bytes[3] > 1 {
             return None;

@@ -10,7 +10,7 @@ pub struct BufferPackage {
     pub offset: u16,
     /// Number of valid `words`, 1..3.
     pub count: u8,
-    /// The words. Only the first `count` words are valid; the others are 0.
+    /// The words. Only the first `count` words are valid; the other words are 0.
     pub words: [u16; 3],
 }
 

@@ -9,7 +9,7 @@ macro_rules! error_codes {
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ErrorCode {
             $($(#[$doc])* $code,)+
-            /// Code that is not in the published list. The code is shown as a number and never dropped.
+            /// Code that is not in the published list. The code is shown as a number and never discarded.
             Unknown(u8),
         }
 

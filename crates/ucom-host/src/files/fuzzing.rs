@@ -1,4 +1,5 @@
-//! Code of the fuzz targets. Each target passes arbitrary bytes to a file reader. A panic or a violated property is an error.
+//! Code of the fuzz targets. Each target passes arbitrary bytes to a file reader. A panic, or a property that is not fulfilled, is an
+//! error.
 
 use std::io::Cursor;
 use ucom::Profile;

@@ -2,9 +2,10 @@
 //! S-record file are never sent themselves.
 //!
 //! The loader's addresses count 16-bit words, so every image starts at a word and consists of complete words. In S-records of the boards'
-//! tool chain the addresses also count words; in Intel HEX and all other formats they count bytes. The reader detects from the records if a
-//! file uses the other unit. In the wrong unit, the records leave gaps or overlap; in the right unit, each record follows the previous
-//! record without a gap. The reader does not guess the unit if the file has only one or two records. An option can always set the unit.
+//! toolchain, the addresses also count words. In Intel HEX and all other formats, the addresses count bytes. The reader detects from the
+//! records if a file uses the other unit. In the wrong unit, the records leave gaps or overlap; in the right unit, each record follows the
+//! previous record without a gap. The reader does not guess the unit if the file has only one or two records. An option can always set the
+//! unit.
 mod detect;
 mod error;
 mod hex;
@@ -68,7 +69,7 @@ impl FromStr for Format {
 pub enum AddressUnit {
     /// Bytes.
     Byte,
-    /// Words of 16 bits: each word is two bytes of the record.
+    /// Addresses count words of 16 bits: each word is two bytes of the record.
     Word,
 }
 
@@ -81,7 +82,7 @@ impl fmt::Display for AddressUnit {
     }
 }
 
-/// Treatment of gaps: addresses between the first and the last byte for which no record has data.
+/// Treatment of gaps. A gap consists of addresses, between the first and the last byte, for which no record has data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Gaps {
     /// Refuse the file.
@@ -136,7 +137,7 @@ pub enum ImageNote {
     },
     /// The last word had only one byte; 0xFF was added.
     LastWordPadded,
-    /// The file has no end record, but a count record at its end has the correct number of data records.
+    /// The file has no end record, but ends with a count record whose number of data records is correct.
     EndedByCount {
         /// Number of data records.
         records: u32,

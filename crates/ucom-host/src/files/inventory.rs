@@ -209,7 +209,7 @@ impl Inventory {
         write_atomically(path, self.to_toml().as_bytes()).map_err(io)
     }
 
-    /// Adds a board. Refuses a number above 31, a position that is already used, and a flash number that is already listed.
+    /// Adds a board. Refuses a number above 31, a position that is already used, and a flash number that the inventory already lists.
     pub fn insert(&mut self, board: InventoryBoard) -> Result<(), InventoryError> {
         let number = board.number;
         if number > 31 {
@@ -315,7 +315,7 @@ impl Inventory {
         write_atomically(path, document.to_string().as_bytes()).map_err(io)
     }
 
-    /// Returns the inventory as the text of a file.
+    /// Returns the inventory as text for a file.
     pub fn to_toml(&self) -> String {
         let mut text = String::from("# Boards of the chain, by position.\n");
         for board in self.boards.values() {
@@ -334,7 +334,7 @@ impl Inventory {
     }
 }
 
-/// Returns a text as a basic string of TOML.
+/// Returns a text as a TOML basic string.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {

@@ -35,7 +35,7 @@ pub struct ParamsBoard {
     pub flash_number: Option<u16>,
     /// Name in the inventory that the board at this position must have. Each board in the file has a flash number or a name, or both.
     pub name: Option<String>,
-    /// Program that the names apply to; `None` for `any` in the file.
+    /// Program to which the names apply; `None` for `any` in the file.
     pub program_id: Option<u16>,
     /// Parameters.
     pub par: Vec<ParamsEntry>,

@@ -59,7 +59,7 @@ impl RecordingFormat {
     }
 }
 
-/// Returns the path of the profile for a text recording: `NAME.profile.toml` next to it.
+/// Returns the path of the profile for a text recording, which is `NAME.profile.toml` in the same directory.
 pub fn profile_path(recording: &Path) -> PathBuf {
     let mut name = recording.as_os_str().to_owned();
     name.push(".profile.toml");
@@ -165,7 +165,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes all data to the file. If the writer is killed later, only newer records are lost.
+    /// Writes all data to the file. If the writer is killed later, only records after this call are lost.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.flush(),

@@ -49,7 +49,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), TextError> {
     write_atomically(path, text.as_bytes()).map_err(|source| TextError::Io { path: path.into(), source })
 }
 
-/// Returns a text as a basic string of TOML. The result is also a double-quoted scalar of YAML.
+/// Returns a text as a TOML basic string. The result is also a double-quoted scalar of YAML.
 pub(crate) fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {

@@ -1,4 +1,5 @@
-//! Base of all procedures: clock, queued frames, mailboxes, last known state of the boards, and their supervision.
+//! Base of all procedures. It contains the clock, the queued frames, the mailboxes, and the last known state of the boards and their
+//! supervision.
 //!
 //! Each file imports only files that come before it in this list: times, statistics, boards, holders, event, mailbox, shared, inputs,
 //! supervise, link.

@@ -76,7 +76,7 @@ mod tests {
         assert_eq!([frame_bits(0), frame_bits(2), frame_bits(8)], [55, 75, 135]);
     }
 
-    /// Loads of 7 and 16 boards with certain numbers of outputs and inputs, at periods of 10 ms and 1 ms.
+    /// Expected loads of 7 and 16 boards with certain numbers of outputs and inputs, at periods of 10 ms and 1 ms.
     #[test]
     fn p19_forecasts_of_the_requirements() {
         let forecast = |boards: usize, so: u16, ci: u16, period: u32| {

@@ -107,7 +107,7 @@ mod tests {
         let on_disk = Cache::new(Some(dir.path().join("new")), false);
         on_disk.write("a.json".into(), "1".into());
         let cache = on_disk.clone().in_memory();
-        // From here on the cache does not read from the disk.
+        // From this point on, the cache does not read from the disk.
         on_disk.write("a.json".into(), "2".into());
         assert_eq!(cache.read("a.json").as_deref(), Some("1"));
         cache.write("b.json".into(), "3".into());

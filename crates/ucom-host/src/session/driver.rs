@@ -82,7 +82,7 @@ impl Driver {
         turned
     }
 
-    /// Runs a procedure to its end. Ctrl-C cancels the procedure, which still undoes its changes on the boards.
+    /// Runs a procedure to its end. Ctrl-C cancels the procedure, but the procedure still undoes its changes on the boards.
     pub fn run(&mut self, request: Request) -> Result<Outcome, SessionError> {
         self.run_with(request, &mut |_| {})
     }
@@ -260,7 +260,7 @@ impl Driver {
     }
 }
 
-/// Returns the note for an event; `None` if the procedure reports the event itself.
+/// Returns the note for an event; returns `None` if the procedure itself reports the event.
 pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     Some(match event {
         Event::Note { text, .. } => text.clone(),

@@ -126,7 +126,7 @@ pub enum ValuesError {
         board: u8,
         /// Name of the signal.
         name: String,
-        /// Action for which the boards were selected, as a verb.
+        /// Verb for the action for which the boards were selected.
         to: &'static str,
     },
     /// Values were sent, but the application was not running and could not receive them.
@@ -147,7 +147,7 @@ pub enum ValuesError {
         /// Remedy.
         hint: &'static str,
     },
-    /// A parameter file does not match the boards. There is one line for each error.
+    /// A parameter file does not match the boards. The error contains one line for each difference.
     #[error("{}", lines.join("\n"))]
     Misfit {
         /// Lines, each with the file's name and the line number.

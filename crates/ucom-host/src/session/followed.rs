@@ -1,8 +1,8 @@
 //! Supervision of the boards of a run: boards that have left their control loops, and the age of the values of each board.
 //!
 //! A board leaves its control loop without a command from this PC if the PC's heartbeats are missing, if another PC stops it, or if its
-//! application ends the loop. The board reports this in a single MCA_ADMIN_DATA frame. If that frame is lost, the sensor outputs of the
-//! board stop in any case, and the master then reads the board's status.
+//! application ends the loop. The board reports the end of its loop in a single MCA_ADMIN_DATA frame. If that frame is lost, the sensor
+//! outputs of the board stop in any case, and the master then reads the board's status.
 
 use std::collections::BTreeMap;
 
@@ -225,7 +225,7 @@ impl Followed {
         }
     }
 
-    /// Returns the last outputs of each board, their age in s, and `true` if they may no longer be current.
+    /// Returns the last outputs of each board, their age in s, and `true` if they may be outdated.
     pub fn outputs(&self, master: &Master, now_us: u64) -> Vec<(u8, &Snapshot, f64, bool)> {
         let boards = master.boards();
         let rows = self.boards.iter().filter_map(|(number, one)| Some((number, one, one.last.as_ref()?)));

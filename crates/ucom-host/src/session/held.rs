@@ -259,7 +259,7 @@ impl Session {
     pub fn updated(&mut self, report: &UpdateReport, start: bool) {
         for result in report.boards.iter().filter(|_| !report.dry_run) {
             match result.outcome {
-                // In these cases the board may still run as before.
+                // In these cases, the board may run as before the update.
                 UpdateOutcome::NotStarted
                 | UpdateOutcome::Cancelled
                 | UpdateOutcome::UpToDate

@@ -10,7 +10,8 @@ use crate::master::Master;
 
 /// Longest wait. Interval at which Ctrl-C is checked.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Limits before the due frames are sent: number of delivered frames, and time. With these limits, heartbeats continue on a flooded bus.
+/// Limits of the number of delivered frames, and of the time, before the due frames are sent. With these limits, heartbeats continue on a
+/// flooded bus.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
 /// Limit of frames that are sent before received frames are handled.
@@ -36,7 +37,7 @@ pub struct Pump {
 }
 
 impl Pump {
-    /// Waits for a frame until an action is due, at most `patience`. Delivers all received frames, then sends the due frames.
+    /// Waits for a frame until the next action is due, at most `patience`. Delivers all received frames, then sends the due frames.
     pub fn turn(
         &mut self,
         master: &mut Master,
@@ -107,9 +108,9 @@ mod tests {
     /// Simulated bus with board 1, which answers PC_INFO within a millisecond. The process of the PC side sometimes loses the CPU.
     struct Bench {
         now: u64,
-        /// Frames that travel to the PC, by time.
+        /// Frames on their way to the PC, sorted by time.
         coming: VecDeque<(u64, Frame)>,
-        /// CPU losses before and after each access to the bus, µs. Each entry is used once.
+        /// Times in µs for which the process loses the CPU, before and after each access to the bus. Each entry is used once.
         lost: VecDeque<u64>,
         /// Period of frames from another member of the bus, µs.
         flood_us: Option<u64>,
@@ -219,7 +220,7 @@ mod tests {
         }
     }
 
-    /// D-50: heartbeats and timeouts continue on a bus with more frames than can be delivered.
+    /// D-50: heartbeats and timeouts continue on a bus that carries more frames than can be delivered.
     #[test]
     fn d50_a_flood_does_not_stop_heartbeats() {
         let mut bench = Bench::new([]);

@@ -84,7 +84,7 @@ impl Recorder {
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match &mut self.sink {
             Sink::File(writer) => writer.flush(),
-            // A stream is already written line by line.
+            // A stream is already written line by line, so no data remain to be written.
             Sink::Stream(_) => Ok(()),
         }
     }

@@ -39,7 +39,7 @@ pub struct Watch {
     loaded: Instant,
 }
 
-/// Time that boards have for an answer before silence is reported, µs.
+/// Time in µs that boards have for an answer before the view reports silence.
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {

@@ -45,7 +45,7 @@ fn value(signal: &Signal, data: &[u8]) -> i64 {
     raw
 }
 
-/// Returns the decoded signals of a frame. Multiplexed signals are included only if the frame carries them.
+/// Returns the decoded signals of a frame. Multiplexed signals are included only if the frame contains them.
 fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     let message = message(dbc, frame.id());
     let data = frame.payload().padded();
@@ -107,7 +107,7 @@ fn d11_signals_carry_scale_offset_and_unit() {
     assert!(text.contains("(0.01,0) [-60|60] \"deg\""), "{text}");
 }
 
-/// Limits are written without digits that come only from floating-point arithmetic.
+/// Limits are written without the digits that floating-point arithmetic adds.
 #[test]
 fn d11_ranges_of_signals_are_short() {
     let table = "[[program]]\nprogram_id = 1\nso.tenths = { scale = 0.1 }\nso.odd = { scale = 0.1, min = -0.125, max = 7.25 }\n\

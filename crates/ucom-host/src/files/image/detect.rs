@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Minimum percentage of printable bytes in a text.
 const TEXT_PERCENT: usize = 90;
-/// Minimum percentage of hexadecimal digits in a line that is considered a record, complete or damaged.
+/// Minimum percentage of hexadecimal digits in a line that is treated as a complete or damaged record.
 const HEX_PERCENT: usize = 80;
 const MARKED_PERCENT: usize = 50;
 /// Number of characters of a text that an error message shows.

@@ -195,7 +195,7 @@ pub enum LineProblem {
 pub enum ImageAdvice {
     /// No remedy in addition to the error text.
     None,
-    /// The file is damaged or not an image: create it again.
+    /// The file is damaged or is not an image, so the user must create it again.
     MakeAgain,
     /// The bytes are not text. Raw bytes need a file name with the extension `.bin`, or the option for raw bytes.
     NameRaw,

@@ -4,7 +4,7 @@ use super::{Format, ImageError, LineProblem};
 
 pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageError> {
     let mut base = 0_u64;
-    // With 8086 segment addresses the offset wraps at 64 KiB; with linear addresses it does not.
+    // With 8086 segment addresses, the offset wraps at 64 KiB. With linear addresses, it does not wrap.
     let mut wraps = false;
     let mut ended = false;
     let mut last = 0;

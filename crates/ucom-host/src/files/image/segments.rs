@@ -113,7 +113,7 @@ impl Segments {
     }
 }
 
-/// Reads two hexadecimal digits per byte. An error includes its column, counted from 0.
+/// Reads two hexadecimal digits per byte. An error contains the column of the digit, counted from 0.
 pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> {
     if let Some(i) = digits.iter().position(|d| !d.is_ascii_hexdigit()) {
         return Err((i, LineProblem::Digit));

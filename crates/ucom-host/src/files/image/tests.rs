@@ -103,7 +103,7 @@ fn the_unit_of_addresses_is_taken_from_the_records() {
     assert_eq!(other(&file(2, 16, 16)), "no record contains the 16 bytes at word address 0x108");
     // A table of vectors: two words, then a gap of two words.
     assert_eq!(other(&file(16, 4, 4)), "no record contains the 4 bytes at word address 0x102");
-    // Intel HEX with addresses that count words. Read as byte addresses, the data would overlap.
+    // Intel HEX file with addresses that count words. If the reader interprets these addresses as byte addresses, the data overlap.
     let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
     let hex = lines.collect::<String>() + ":00000001FF\n";
     let note = ImageNote::AddressesCount(AddressUnit::Word);

@@ -111,7 +111,7 @@ pub enum ParamsProblemKind {
     },
 }
 
-/// Checks that the board and its program are the ones in the file.
+/// Checks that the board and its program agree with the file.
 pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<ParamsProblem> {
     let mut problems = Vec::new();
     let mut add = |kind| problems.push(ParamsProblem { place: board.place, board: board.number, kind });

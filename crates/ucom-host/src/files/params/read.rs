@@ -1,4 +1,4 @@
-//! Conversion of YAML to values with their places in the file.
+//! Conversion of YAML to values, with their positions in the file.
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
@@ -15,7 +15,7 @@ struct File {
     boards: Vec<Spanned<Board>>,
 }
 
-// Every scalar is read as text, so 0x10 and 16 are different here.
+// Every scalar is read as text, so the reader distinguishes `0x10` from `16`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Board {

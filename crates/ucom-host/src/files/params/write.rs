@@ -1,11 +1,11 @@
-//! Writes a parameter file: the requested values, and all other signals as comments.
+//! Writes a parameter file. Requested values become entries; all other signals become comments.
 
 use crate::files::signals::{Signal, SignalType, SignalValue};
 use crate::files::text::quoted;
 use crate::master::io::{IoDescription, Kind, short};
 use std::fmt::Write;
 
-/// Board to be saved.
+/// Board that is saved.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SavedBoard {
     /// Board number.
@@ -24,7 +24,7 @@ pub struct SavedBoard {
     pub ci: Vec<SavedSignal>,
 }
 
-/// Signal of a board to be saved.
+/// Signal of a board that is saved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavedSignal {
     /// Meaning of the word.
@@ -101,7 +101,7 @@ fn value(signal: &Signal, word: u16) -> String {
         }
         _ => return raw,
     };
-    // Writes the raw word if rounding lost a digit or the word is beyond a limit.
+    // Writes the raw word if rounding removed a digit or if the word is beyond a limit.
     if text.parse::<SignalValue>().map(|given| signal.word(&given)) != Ok(Ok(word)) {
         return raw;
     }

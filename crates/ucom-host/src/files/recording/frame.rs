@@ -13,7 +13,7 @@ pub enum FrameKind {
     },
     /// CAN FD frame.
     Fd {
-        /// Flags in candump's form: bit 0 is the bit rate switch, bit 1 the error state.
+        /// Flags in candump's form: bit 0 is the bit rate switch, and bit 1 is the error state.
         flags: u8,
     },
     /// Error report of the adapter; not a frame on the bus.

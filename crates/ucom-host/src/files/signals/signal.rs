@@ -15,7 +15,7 @@ pub enum SignalType {
     Int16,
     /// Unsigned.
     Uint16,
-    /// Bits, displayed like 0x0000. Has no scale.
+    /// Bits, displayed as `0x0000`. Has no scale.
     Hex,
     /// Off (0) or on (1). Has no scale.
     Bool,
@@ -46,7 +46,7 @@ pub struct Signal {
 const SLACK: f64 = 1e-9;
 
 impl Signal {
-    /// Creates a signal that is in no table: a raw word, signed or unsigned as the profile defines.
+    /// Creates a signal that no table contains. Its value is the raw word, signed or unsigned as the profile defines.
     pub fn bare(profile: &Profile) -> Self {
         let kind = if profile.pd_signed { SignalType::Int16 } else { SignalType::Uint16 };
         Self {

@@ -249,12 +249,12 @@ impl Core {
         addressed.for_each(|(_, board)| board.stopped_at = None);
     }
 
-    /// Drops the queued frames of a procedure.
+    /// Discards the queued frames of a procedure.
     pub(crate) fn forget_queued(&mut self, owner: ProcedureId) {
         self.retain_queued(|next| next.owner != Some(owner));
     }
 
-    /// Drops a board's queued inputs.
+    /// Discards a board's queued inputs.
     pub(crate) fn forget_inputs(&mut self, board: u8) {
         self.waiting_inputs.retain(|(of, _)| *of != board);
         self.retain_queued(|next| !matches!(next.what, What::Inputs { board: of, .. } if of == board));

@@ -68,7 +68,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
     Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
-/// Polls PC_INFO every 200 ms until some bits have the requested values.
+/// Polls PC_INFO every 200 ms until the selected bits have the requested values.
 pub(crate) async fn wait_status(
     link: &Link,
     board: u8,

@@ -25,7 +25,7 @@ impl Collector {
         let profile = link.profile();
         let Some(dimensions) = self.dimensions else {
             let need = 6;
-            // Strings begin with a package of 2 bytes, followed by packages of 1 to 8 bytes. Only the first frame is different: its 6 bytes
+            // Strings begin with a package of 2 bytes, followed by packages of 1 to 8 bytes. The first frame is an exception: its 6 bytes
             // are the dimensions.
             let start = Incomplete::Start { len: payload.len(), need };
             let dimensions = Dimensions::parse(payload, profile.endian).ok_or(start)?;
@@ -136,7 +136,7 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
 }
 
-/// Returns the description of a board whose application runs. The board must have sent it since the application started.
+/// Returns the description of a board whose application runs. The board must have sent the description since the application started.
 ///
 /// A description that is only stored for this Program ID and date (D-36) may belong to another application. Therefore its names are not
 /// used to write values.

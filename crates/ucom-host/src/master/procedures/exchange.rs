@@ -4,7 +4,7 @@ use crate::master::error::{Error, ExchangeError, IdentityError, Incomplete, Stat
 use crate::master::reports::BoardSeen;
 use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
 
-/// Maximum number of times that a request is sent. Only requests whose repetition has no further effect are repeated.
+/// Maximum number of times that a request is sent. A request is repeated only if its repetition has no further effect.
 pub(crate) const TRIES: u32 = 3;
 
 /// Result of one PC_INFO.

@@ -54,7 +54,7 @@ async fn stop_unreset(link: &Link, report: &mut InitReport) {
 }
 
 /// Returns `true` if the board has continued to run despite the reset. After a reset, a board with ASTART starts its application by itself,
-/// but never its control loop.
+/// but it never starts its control loop.
 fn runs_on(status: Status) -> bool {
     status.has(Status::MCARUN) || (status.has(Status::MSTART) && !status.has(Status::ASTART))
 }

@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use ucom::profile::OnLost;
 use ucom::{Admin, BoardInfo, Dimensions, Status};
 
-/// Runs boards. At the end either all boards run, or all boards are in their previous state again: idle, started or running. A board that
-/// was running before keeps its values, except for inputs and parameters that the user sets.
+/// Runs boards. At the end, either all boards run, or all boards are in their previous state (idle, started or running). A board that was
+/// running before keeps its values, except for inputs and parameters that the user sets.
 pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Error> {
     let mut begun = Vec::new();
     let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
@@ -104,7 +104,7 @@ fn known_description(link: &Link, info: &BoardInfo) -> Option<IoDescription> {
     link.with(|core| core.descriptions.get(&key).filter(|_| info.has_application()).cloned())
 }
 
-/// Adds a board with its description. Checks the names of its values, and the bus load.
+/// Adds a board with its description. Checks the names of the board's values, and the bus load.
 fn add(
     link: &Link,
     options: &RunOptions,

@@ -1,4 +1,4 @@
-//! Stops a board, even if it does not answer: outputs, control loop, application.
+//! Stops a board, even if the board does not answer. The stop covers outputs, control loop and application.
 use crate::master::engine::{Link, MS};
 use crate::master::error::Error;
 use crate::master::procedures::control::change_flags;

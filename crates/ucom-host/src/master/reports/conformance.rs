@@ -18,7 +18,7 @@ pub struct ConformanceOptions {
     pub program: Option<ConformanceProgram>,
     /// Names of the tests to run. Empty: all tests.
     pub only: Vec<String>,
-    /// Permission to run the tests although another PC is on the bus.
+    /// Permission to run the tests while another PC is on the bus.
     pub force: bool,
 }
 
@@ -34,7 +34,7 @@ impl ConformanceOptions {
 pub struct ConformanceProgram {
     /// Board number.
     pub board: u8,
-    /// Flash number that the board must have. The header of the image contains it, so that other boards refuse the image.
+    /// Flash number that the board must have. The header of the image contains this number, so that other boards refuse the image.
     pub flash_number: u16,
     /// The program.
     pub image: UpdateImage,
@@ -68,9 +68,9 @@ pub struct ConformanceTest {
     pub verdict: Verdict,
     /// Option that would have allowed the test; `None` if the test was allowed.
     pub needs: Option<&'static str>,
-    /// Frames sent, in candump's form.
+    /// Sent frames in candump's form.
     pub sent: Vec<String>,
-    /// Frames received, in candump's form; at most 64.
+    /// Received frames in candump's form, at most 64.
     pub came: Vec<String>,
 }
 

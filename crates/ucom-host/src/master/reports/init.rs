@@ -11,7 +11,7 @@ use ucom::profile::Endian;
 pub struct InitOptions {
     /// Expected board numbers and flash numbers, from an inventory. A difference from the inventory is reported as a finding.
     pub expected: Vec<(u8, u16)>,
-    /// Permission to assign numbers although another PC is on the bus.
+    /// Permission to assign numbers while another PC is on the bus.
     pub force: bool,
 }
 

@@ -15,7 +15,7 @@ pub struct ProbeOptions {
     pub alive: bool,
     /// Image that a board contains, as it was sent. The probe then also determines how the Program ID is computed.
     pub image: Option<Arc<[u8]>>,
-    /// Permission to probe although another PC is on the bus. With `init` and `alive`, also permission to end running control loops.
+    /// Permission to probe while another PC is on the bus. With `init` and `alive`, also permission to end running control loops.
     pub force: bool,
 }
 

@@ -13,7 +13,7 @@ pub struct Reports {
     pub ids: BTreeSet<u8>,
     /// Number of report frames from each board.
     pub frames: BTreeMap<u8, u32>,
-    /// With `report.mode = flash7`: boards whose report has different ids in identifier and data.
+    /// Boards whose report has different ids in identifier and data, with `report.mode = flash7`.
     pub disagree: BTreeSet<u8>,
 }
 

@@ -41,7 +41,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Err
     if first != second {
         return Ok(Verdict::Fail(format!("first {}; then {}", list(first), list(second))));
     }
-    // There may be more reports, because a board of the chain may be excluded from the test.
+    // The number of reports may be higher, because a board of the chain may be excluded from the test.
     if let Some(missing) = expected_reports(bench)
         .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
     {

@@ -73,7 +73,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
             let (wanted, found) = (program.flash_number, seen.info.flash_number);
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
-        // U-2: program data have priority over the process data of every running board, even of boards that are not tested.
+        // U-2: program data have a higher priority than the process data of every running board, even if the board is not tested.
         let states = board_states(link).await;
         running.extend(states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b));
         running.sort_unstable();

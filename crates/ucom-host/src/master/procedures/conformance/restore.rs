@@ -54,7 +54,7 @@ pub(super) async fn put_all_back(
     Ok(())
 }
 
-/// Restores one board: ends its control loop, then restores ASTART, PROG and its application.
+/// Restores one board. Ends its control loop, then restores ASTART, PROG and its application.
 pub(super) async fn put_back(
     link: &Link,
     before: &BoardSeen,
@@ -67,7 +67,7 @@ pub(super) async fn put_back(
     if now.status.has(Status::MSTART) {
         halt(link, n).await?;
     }
-    // The board may start soon: by itself, or because PC_START was the last command that it received.
+    // The board may start soon, either by itself or because PC_START was the last command that it received.
     let coming = now.status.has(Status::ASTART) || in_work;
     if now.status.has(Status::ASTART) != was.has(Status::ASTART) {
         now = set_status(link, n, Status::ASTART, was & Status::ASTART).await?;

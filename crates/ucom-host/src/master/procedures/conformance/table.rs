@@ -82,7 +82,7 @@ macro_rules! talk {
     };
 }
 
-/// All tests in the order of execution, with the numbers of the acceptance tests.
+/// All tests in the order in which they run, with the numbers of the acceptance tests.
 #[rustfmt::skip]
 pub(super) static TESTS: [Test; 21] = [
     Test { id: "D-T2", level: Level::Ask, scope: Scope::Chain, run: talk!(ask::reports),

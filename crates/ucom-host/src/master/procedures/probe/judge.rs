@@ -80,7 +80,7 @@ impl Rows {
     }
 }
 
-/// Returns the status byte of a first frame of DSP_INFO. Its position does not depend on the profile.
+/// Returns the status byte of a first frame of DSP_INFO. The position of this byte does not depend on the profile.
 pub(super) fn status_of(payload: &Payload) -> Option<Status> {
     payload.bytes().get(3).filter(|_| payload.len() >= 8).map(|byte| Status(*byte))
 }
@@ -141,7 +141,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         seen.infos.len()
     );
     let value = broadcast.map(|b| b.to_string());
-    // Decided after the broadcast number, because 0 cannot be both the broadcast number and the first board's number.
+    // The number 0 is evaluated after the broadcast number, because 0 cannot be both the broadcast number and the first board's number.
     let first = if seen.zero_answers {
         Some("0")
     } else {
@@ -156,8 +156,8 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
 
 fn strings(rows: &mut Rows, seen: &Seen) {
     let headers = seen.headers();
-    // Number of headers that match an interpretation: byte order, and count with or without the header. The best interpretation must match
-    // more headers than any other.
+    // Number of headers that match an interpretation. An interpretation consists of a byte order and of a count that includes or excludes
+    // the header. The best interpretation must match more headers than any other.
     let fits = |endian: Endian, inclusive: bool| {
         let fit = |(count, packages): &&([u8; 2], usize)| {
             usize::from(endian.word(*count)) == packages + usize::from(inclusive) && (count[0] != count[1])

@@ -200,7 +200,7 @@ async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     offsets
 }
 
-/// Checks whether a control loop continues with only broadcast heartbeats, and with only unicast heartbeats.
+/// Checks if a control loop continues with only broadcast heartbeats, and if it continues with only unicast heartbeats.
 async fn alive_form(link: &Link, board: u8) -> Result<[bool; 2], Error> {
     start_application(link, board).await?;
     let mut held = [false; 2];

@@ -71,7 +71,7 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
 }
 
 /// Checks a board whose READY was lost: it may have received the whole transfer together with the other boards. If the board is done,
-/// verifies it. Otherwise the session stores whether the board's flash was erased, as far as its answer shows this. If the board already
+/// verifies it. If the board is not done, the session stores if the flash was erased, as far as the answer shows this. If the board already
 /// had this program, its answer does not show if it is done.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };

@@ -109,7 +109,7 @@ impl Attempt<'_> {
                 continue;
             }
             match received.message {
-                // A READY after the very last block is ignored, because PROGFINISHED must follow.
+                // A READY after the last block of the update is ignored, because PROGFINISHED must follow.
                 FromBoard::Ready if !last => waiting.retain(|b| *b != received.from),
                 FromBoard::ProgFinished if last => waiting.retain(|b| *b != received.from),
                 FromBoard::Error(code) => {

@@ -83,7 +83,7 @@ pub enum UpdateFailure {
     /// A step failed after memory was erased.
     #[error("{0}")]
     After(Box<Error>),
-    /// The board was removed from the group and does not answer. Frames to the group may have erased it.
+    /// The board was removed from the group and does not answer. Frames to the group may have erased the board.
     #[error("the board may be erased, because it could receive frames of the group: {0}")]
     MayBeErased(Box<Error>),
     /// The user cancelled the update.
@@ -107,7 +107,7 @@ impl Diagnose for UpdateFailure {
 }
 
 impl UpdateFailure {
-    /// Returns the kind of failure. Every failure or cancel is a fault if memory may have been erased before.
+    /// Returns the kind of failure. If memory may have been erased before, every failure or cancel is a fault.
     fn kind_of(&self) -> ErrorKind {
         match self {
             Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {

@@ -45,12 +45,13 @@ pub struct UpdateOptions {
     pub targets: Vec<UpdateTarget>,
     /// The image.
     pub image: UpdateImage,
-    /// Image of the other cycle. With the plan `exloader-app` this is the first cycle, with `pmem-xmem` and `raw` the second.
+    /// Image of the other cycle. With the plan `exloader-app`, this image is sent in the first cycle. With `pmem-xmem` and `raw`, it is
+    /// sent in the second cycle.
     pub second: Option<UpdateImage>,
     /// Program ID. If the image does not determine the Program ID (plan `raw`, `prog.header` or `prog.checksum` `none`), the board must
     /// show this ID at the end. If the image determines the Program ID, the image must have this ID.
     pub expect_program_id: Option<u16>,
-    /// Flash date in 16 bits, see [`DateForm`](ucom::DateForm).
+    /// Flash date as a 16-bit word, see [`DateForm`](ucom::DateForm).
     pub date: u16,
     /// `true` if no date was requested. A board that shows the program with another date is then up to date (U-3).
     pub any_date: bool,

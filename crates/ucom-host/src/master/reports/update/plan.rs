@@ -49,7 +49,7 @@ impl Expected {
 /// Reasons why the program that a board must show after the update is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unverifiable {
-    /// Plan `raw`: the files do not show the Program ID.
+    /// With plan `raw`, the files do not show the Program ID.
     RawPlan,
     /// With `prog.header = none`, the board itself determines Program ID and date.
     NoHeader,
@@ -79,7 +79,7 @@ impl Unverifiable {
 pub struct PlannedImage {
     /// First and last cycle in which the image is sent: 1, 2 or both.
     pub cycles: (u32, u32),
-    /// Target memory; `None` with the plan `raw`, because only the file determines it.
+    /// Target memory; `None` with the plan `raw`, because only the content of the file determines the memory.
     pub memory: Option<Memory>,
     /// Load address in words; `None` if no address is sent.
     pub address_words: Option<u32>,

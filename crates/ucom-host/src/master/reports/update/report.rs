@@ -15,7 +15,7 @@ pub struct UpdateResult {
     pub flash_number: Option<u16>,
     /// Answer to PC_INFO before the update.
     pub before: Option<BoardInfo>,
-    /// Answer to PC_INFO after the board reported that it is done.
+    /// Answer to PC_INFO after the board reported the end of the update.
     pub after: Option<BoardInfo>,
     /// Outcome of the update.
     pub outcome: UpdateOutcome,

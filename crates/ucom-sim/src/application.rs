@@ -5,9 +5,9 @@ use super::texts::{Texts, latin1};
 use ucom::Dimensions;
 use ucom::node::{Application, Text};
 
-/// Time from the start of the program until it serves requests, µs.
+/// Time in µs from the start of the program until it accepts requests.
 const UP_US: u64 = 60_000;
-/// Longest time that one call simulates for the axes, s.
+/// Longest time, in s, for which one call simulates the axes.
 const MOST_S: f64 = 5.0;
 
 /// Program of a board: its model, connected to the words of the protocol.

@@ -29,7 +29,7 @@ pub struct AxisConfig {
     pub damping_per_s: f64,
     /// Dry friction, °/s².
     pub friction_deg_s2: f64,
-    /// Acceleration by gravity at 90°, °/s²; negative if gravity moves the axis upright.
+    /// Acceleration by gravity at 90°, in °/s²; negative if gravity moves the axis to the upright position.
     pub gravity_deg_s2: f64,
 }
 
@@ -79,7 +79,7 @@ pub(super) struct Axis {
     pub current: f64,
     /// Temperature, °C.
     pub temperature: f64,
-    /// Set point that moves to the set position within the speed limit, degrees.
+    /// Set point, in degrees, that moves to the set position within the speed limit.
     pub reference: f64,
 }
 
@@ -121,7 +121,7 @@ impl Axis {
             self.velocity = 0.0;
         } else {
             let way = if self.velocity.abs() < STANDS_DEG_S { push } else { self.velocity };
-            // The damping is integrated implicitly, which is stable for every step.
+            // The damping is integrated implicitly, so the integration is stable for every step.
             let free = self.velocity + dt * (push - c.friction_deg_s2 * way.signum());
             self.velocity = free / (1.0 + dt * c.damping_per_s);
         }

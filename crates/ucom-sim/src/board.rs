@@ -35,7 +35,7 @@ pub(super) struct Board {
     /// INITACK that the board does not send because of a fault.
     held: Option<Frame>,
     next_us: u64,
-    /// Status that no board can have, if it occurred.
+    /// Contradictory status of the board, if it has occurred.
     pub violation: Option<&'static str>,
 }
 
@@ -141,7 +141,7 @@ impl Board {
         }
     }
 
-    /// Reports that the board's controller gave up the frame.
+    /// Reports that the board's controller discarded the frame.
     pub(crate) fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
@@ -217,7 +217,7 @@ impl Board {
             let forget = ToBoard::SetStatus { mask: Status::INIT.0, value: 0 };
             self.node.receive(now_us, &forget.encode(own, &profile));
         }
-        // The incoming pin is active only for this moment.
+        // The incoming pin is active only during this assignment.
         let level = self.node.pins.input.swap(true, Ordering::SeqCst);
         self.node.receive(now_us, &ToBoard::Init.encode(number, &profile));
         self.node.pins.input.store(level, Ordering::SeqCst);
@@ -264,7 +264,7 @@ fn image(config: &BoardConfig) -> Vec<u8> {
     let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();
     image.extend([0, 0]);
     let Some(wanted) = config.program_id else { return image };
-    // The last word adjusts the checksum to the value that the file requires.
+    // The last word is selected so that the checksum has the value in the file.
     for word in 0..=u16::MAX {
         image.truncate(254);
         image.extend(word.to_le_bytes());

@@ -4,7 +4,7 @@ use ucom::Frame;
 
 use super::bench::{Member, frame};
 
-/// Answers a frame by a rule. The first answer is due 300 µs after the frame, each further answer 1 µs after the previous one.
+/// Answers a frame by a rule. The first answer is due 300 µs after the frame. Each further answer is due 1 µs after the previous answer.
 pub(super) struct Answering<A> {
     answers: A,
     out: Vec<(u64, Frame)>,

@@ -18,7 +18,7 @@ pub(super) trait Member {
     fn sent(&mut self, now: u64, frame: &Frame);
     fn receive(&mut self, now: u64, frame: &Frame);
     fn deadline(&self) -> u64;
-    /// Returns the board that answers for this member, if any.
+    /// Returns the board that this member simulates, if it simulates a board.
     fn board(&mut self) -> Option<&mut TestNode> {
         None
     }
@@ -55,7 +55,7 @@ pub(super) enum Fault {
     Doubled,
     /// The frame arrives after the next frame.
     Swapped,
-    /// The frame is delayed by this time in milliseconds.
+    /// The frame is delayed by the given time in milliseconds.
     Delayed(u64),
     /// One bit of the data is wrong, or one bit of the identifier if the frame has no data.
     Corrupted(u8),
@@ -75,10 +75,10 @@ pub(super) struct Bench {
     /// Every frame that was put on the bus, with the time at which it was complete.
     pub log: Vec<(u64, From, Frame)>,
     pub events: Vec<(u64, Event)>,
-    /// Number of a frame, and its fault.
+    /// Number of the frame that has a fault, and the fault.
     pub fault: Option<(usize, Fault)>,
-    /// Beginnings of frames that are lost, and the number of frames to lose for each beginning. `<` marks a frame of the master, `>` a
-    /// frame of a board.
+    /// Beginnings of frames that are lost, and the number of frames to lose for each beginning. `<` marks a frame of the master, and `>`
+    /// marks a frame of a board.
     pub lose: Vec<(&'static str, u32)>,
     /// Members that are disconnected. No frame reaches them, and none of their frames arrives.
     pub cut: Vec<usize>,
@@ -311,7 +311,7 @@ pub(super) const CI: [&str; 2] = ["target velocity", "current limit"];
 pub(super) const SO: [&str; 4] = ["pos_soll", "pos_ist", "current", "temperature"];
 pub(super) const PAR: [&str; 3] = ["P", "I", "D"];
 
-/// Program ID and date of the program that every board of the bench has.
+/// Program ID and date of the program on every board of the bench.
 pub(super) const OLD: (u16, u16) = (0x1234, 0x386E);
 
 pub(super) fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {

@@ -1,4 +1,4 @@
-//! The master with the boards of this crate.
+//! Tests of the master with the boards of this crate.
 
 use ucom_host::master::{InitOptions, Outcome, Request};
 

@@ -80,8 +80,8 @@ fn reset(board: u8) -> Request {
     Request::Reset { board: Some(board), force: false }
 }
 
-/// Resets a single board. The board must answer before the reset, and must have no number afterwards. The master
-/// sends no reset to a board that does not answer.
+/// Resets a single board. The board must answer before the reset, and must not have a number after the reset. The master does not send a
+/// reset to a board that does not answer.
 #[test]
 fn a_single_reset_is_checked() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -113,7 +113,7 @@ fn a_single_reset_is_checked() {
         }
         assert_eq!((bench.board(0).phase(), bench.board(2).phase()), (Phase::Idle, Phase::Idle), "{what}");
     }
-    // The board has reset, but from now on none of its frames arrive.
+    // The board has executed the reset, but none of its later frames arrives.
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     bench.lose = vec![("> 482#", 100)];
     let error = bench.go(reset(2), 20).unwrap_err();

@@ -151,7 +151,7 @@ fn address_assignment_is_refused_when_a_board_has_no_number() {
     assert!(!bench.log[from..].iter().any(|(_, who, f)| *who == From::Master && changes(f)));
 }
 
-/// Programs only the selected board. The header contains its flash number and the address of the image.
+/// Programs only the selected board. The header contains the flash number of this board and the address of the image.
 #[test]
 fn programs_the_board_that_is_named_alone() {
     let mut bench = chain();
@@ -179,7 +179,7 @@ fn programs_the_board_that_is_named_alone() {
         }
     }
     assert_eq!((&header[8..12], &header[20..22]), (&[0x40, 0, 1, 0][..], &[0x21, 0][..]));
-    // U-2: the test is refused if any board runs, even one outside the test.
+    // U-2: the test is refused if any board runs, even if the test does not cover this board.
     let run = RunOptions { boards: vec![RunBoard { board: 2, ..Default::default() }], ..Default::default() };
     bench.go(Request::Run(run), 20).unwrap();
     let tested = ConformanceOptions { boards: vec![1], ..options(0x21) };

@@ -1,5 +1,5 @@
-//! Faults on every single frame of scan, init and process data. The result is success or a specific error, never a
-//! wrong number or an endless wait. Every wait is limited in virtual time.
+//! Tests with a fault on every single frame of scan, init and process data. The result is success or a specific error, never a wrong number
+//! or an endless wait. Every wait is limited in virtual time.
 
 use ucom_host::master::{InitFinding, InitOptions, Outcome, Request, RunBoard, RunOptions, Setting};
 
@@ -83,14 +83,14 @@ fn every_frame_of_a_scan_disturbed() {
             if !matches!(fault, Fault::Corrupted(_)) {
                 assert_eq!(report.boards.len(), 3, "{what}");
             } else if report.boards.len() < 3 {
-                // A request was corrupted into a reset, so the boards have no numbers; the scan reports this.
+                // The fault changed a request into a reset, so the boards have no numbers. The scan reports this.
                 assert!(!report.findings.is_empty(), "{what}");
             }
         }
     }
 }
 
-/// Faults on every frame from the exloader to running outputs. A description is correct or is rejected.
+/// Tests with a fault on every frame from the exloader to running outputs. A description is correct or is rejected.
 #[test]
 fn every_frame_of_a_start_disturbed() {
     let options = RunOptions {

@@ -53,7 +53,7 @@ fn a_stop_does_not_depend_on_answers() {
     }
 }
 
-/// D-51: the stop of all boards is a single frame, which may also be lost.
+/// D-51: the stop of all boards is a single frame, and this frame may also be lost.
 #[test]
 fn d51_a_lost_stop_is_repeated() {
     let mut bench = running(&[1, 2], &[0x21, 0x42]);

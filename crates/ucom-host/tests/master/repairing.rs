@@ -73,7 +73,7 @@ fn d21_the_first_board_takes_any_number() {
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
 }
 
-/// Every single frame of a repair is lost or doubled once.
+/// The test loses or doubles every single frame of a repair.
 #[test]
 fn d21_no_single_fault_gives_a_number_twice() {
     let (from, to) = {

@@ -1,4 +1,4 @@
-//! Descriptions, inputs, parameters, flags, and supervision of running boards.
+//! Tests of descriptions, inputs, parameters, flags, and supervision of running boards.
 
 use super::bench::Exit;
 use ucom::profile::OnLost;
@@ -47,7 +47,7 @@ fn start_order() {
         .filter(|t| !repeated.contains(&t.as_str()))
         .collect();
     assert_eq!(sent.join(" "), "301# 581# 5C1# 3C1#00007800 541# 601#01000000 601#01010000");
-    // Inputs before the loop starts, and every 20 ms after that.
+    // Inputs are sent before the loop starts, and every 20 ms after that.
     let inputs = bench.times_of("341#0000DC0509000000");
     assert!(inputs[0] < bench.times_of("541#")[0]);
     bench.run(1000);
@@ -124,11 +124,11 @@ fn d36_kept_names_of_another_application_start_nothing() {
     let error = bench.go(Request::Run(options.clone()), 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::StaleNames { board: 1 }));
     assert_eq!((bench.count("341#"), bench.count("541#")), (0, 0), "no inputs, no loop");
-    // Now the stored names are those of the board.
+    // Now the stored names belong to the board.
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
-/// D-14: a dump with wrong totals is read again, at most three times.
+/// D-14: a dump with incorrect totals is read again, at most three times.
 #[test]
 fn d14_dump_is_accepted_only_if_the_totals_fit() {
     let good = ["581#010000000000", "581#0100", "581#6865616420", "581#0100", "581#737065656400"];
@@ -216,8 +216,8 @@ fn d37_flags() {
     assert!(!bench.board(0).application.running);
 }
 
-/// A stop performs its steps in the order outputs, loop, application, which is the reverse of a start. The status changes from AB to 8B to
-/// 1B.
+/// A stop performs its steps in the order outputs, loop, application, which is the reverse of a start. The status changes from 0xAB to 0x8B
+/// to 0x1B.
 #[test]
 fn stop_in_reverse() {
     let mut bench = running(&[0x21], &[1]);
@@ -343,7 +343,7 @@ fn p19_load_forecast() {
     assert!(bench.board(2).application.running);
 }
 
-/// D-33: snapshots of a running board, with its words.
+/// D-33: the master returns snapshots of a running board with the words of the board.
 #[test]
 fn d33_snapshots() {
     let mut bench = running(&[0x21], &[1]);

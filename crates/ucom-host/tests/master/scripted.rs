@@ -34,7 +34,7 @@ fn init(bench: &mut Bench) -> ucom_host::master::InitReport {
     }
 }
 
-/// P-1: a scan sends only `240#` and `200+n#`, on a silent and on a busy bus, and no heartbeats.
+/// P-1: a scan sends only `240#` and `200+n#`, and no heartbeats, on a silent and on a busy bus.
 #[test]
 fn p1_scan_is_harmless() {
     for boards in [0, 3] {

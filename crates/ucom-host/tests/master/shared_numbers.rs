@@ -134,8 +134,8 @@ fn d24_the_second_answer_may_come_late() {
     }
 }
 
-/// The second board answers only when the board is read back. The error still reports it, and the started application
-/// is stopped.
+/// The second board answers only when the board is read back. The error still reports the shared number, and the started application is
+/// stopped.
 #[test]
 fn d24_it_is_named_when_it_shows_on_the_way() {
     let one = |flash: &str, status: &str| {
@@ -240,7 +240,7 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
         Error::Identity(IdentityError::NumberShared { board: 1, found: vec![0x21, 0x42], given_back: true });
     assert_eq!(error, wanted);
     assert!((0..2).all(|i| bench.board(i).number().is_none()));
-    // A chain was numbered wrongly before; the shared number is detected.
+    // A chain was numbered wrongly before the test, and the master detects the shared number.
     let mut bench = Bench::chain(&[0x21, 0x42]);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
     bench.members[1] = Box::new(node(0x42, WirePins::chain(1).remove(0), Profile::default()));

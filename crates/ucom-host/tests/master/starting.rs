@@ -38,7 +38,7 @@ fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
 }
 
 /// P-19: a start that would cause too much bus load is refused. Boards that were idle before are idle afterwards. If the master knows the
-/// descriptions, it does not even start a board.
+/// descriptions, it refuses the request before it starts a board.
 #[test]
 fn p19_a_refusal_leaves_every_board_as_it_was() {
     let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
@@ -58,7 +58,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
         assert!(matches!(error, Error::Signal(SignalError::NoSignal { board: 4, .. })), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
-        // Board 4 has the names of board 1, which are known after board 1 has been read.
+        // Board 4 has the names of board 1. These names are known after board 1 has been read.
         assert_eq!(bench.count("301#") - before, usize::from(!known));
     }
 }

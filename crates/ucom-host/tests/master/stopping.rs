@@ -68,7 +68,7 @@ fn an_error_of_a_bad_bus_does_not_end_a_start() {
     assert_eq!(bench.count("301#"), 1);
 }
 
-/// If a board is silent, every level of stop is repeated.
+/// If a board is silent, the stop is repeated at every level.
 #[test]
 fn a_silent_board_gets_the_stop_more_than_once() {
     for level in [StopLevel::Outputs, StopLevel::Loop, StopLevel::Application] {

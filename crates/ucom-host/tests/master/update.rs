@@ -1,4 +1,4 @@
-//! Firmware updates of boards of this crate, and of boards that are tables of frames.
+//! Tests of firmware updates, with boards of this crate and with boards that are tables of frames.
 
 use super::bench::Exit;
 use ucom::{BoardInfo, Memory};
@@ -118,7 +118,7 @@ fn p7_p14_flow_control_and_heartbeats() {
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))), "{alive:?}");
 }
 
-/// P-8: READY takes 0.9 s and the erase 8 s. No timeout is reported.
+/// P-8: READY takes 0.9 s, and the erase takes 8 s. No timeout is reported.
 #[test]
 fn p8_slow_boards_are_waited_for() {
     let mut bench =
@@ -356,7 +356,7 @@ fn progress_is_of_both_cycles() {
     assert_eq!(bytes, (1..=34).map(|i| 64 * i).collect::<Vec<u64>>());
 }
 
-/// A fault on one frame of an update: the report describes the result correctly.
+/// A fault affects one frame of an update, and the report describes the result correctly.
 #[test]
 fn every_frame_of_an_update_disturbed() {
     let (from, to) = {

@@ -108,7 +108,7 @@ fn an_abandoned_update_sends_nothing() {
         assert!(bench.sent()[sent..].iter().all(|t| t == "680#"), "{:?}", &bench.sent()[sent..]);
         assert!(!bench.master.is_busy());
     }
-    // Every other procedure ends with the error.
+    // Every other procedure ends with this error.
     let mut bench = initialised(&[0x21]);
     let id = bench.master.start(bench.now, Request::Scan).unwrap();
     bench.master.abandon(id, "the adapter is gone");
@@ -265,7 +265,8 @@ fn u4_repair_that_finds_another_board_is_refused() {
     assert!(place("1C1#0200") < place("281#"));
 }
 
-/// D-08: a dry run also checks for another PC, because it shows what an update would do. The dry run still sends only queries.
+/// D-08: a dry run also checks for another PC, because it shows the result that a real update would have. The dry run still sends only
+/// queries.
 #[test]
 fn d08_a_dry_run_looks_for_another_pc() {
     let info = ["141#2100011B34126E38", "141#0000"];

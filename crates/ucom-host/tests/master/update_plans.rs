@@ -17,7 +17,7 @@ fn with_plan(prog_plan: Plan) -> Profile {
     Profile { prog_plan, ..Profile::default() }
 }
 
-/// An image of 16 data blocks, and a second image of 64 bytes if the plan needs one.
+/// An image of 16 data blocks, and a second image of 64 bytes if the plan requires a second image.
 fn two(plan: Plan) -> UpdateOptions {
     let second = UpdateImage { bytes: [9; 64].into(), address_words: 0x20 };
     let second = (plan != Plan::VerifyWrite).then_some(second);
@@ -143,7 +143,7 @@ fn u9_not_where_nothing_is_expected() {
     assert_eq!((report.exit(), report.boards[0].attempts), (5, 3), "{report:?}");
 }
 
-/// Boards of this crate without checksums or without headers are written and started, and reported as unverified.
+/// Boards of this crate that have no checksums or no headers are written and started, and are reported as unverified.
 #[test]
 fn boards_without_checksum_or_header() {
     let none = Profile { prog_checksum: Checksum::None, ..Profile::default() };

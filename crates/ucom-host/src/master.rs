@@ -1,4 +1,4 @@
-//! The PC side: procedures as state machines without I/O.
+//! PC side of the protocol: procedures as state machines without I/O.
 //!
 //! A [`Master`] gets received frames and the time, and returns frames to send. The master never waits, and has no clock and no thread. A
 //! driver is a loop of a few lines:
@@ -9,7 +9,7 @@
 //! 4. wait for the next frame, at most until [`Master::next_deadline`].
 //!
 //! Deliver all received frames before you call `poll`. A wait ends only in `poll`. A late driver therefore does not treat a board as silent
-//! although its answer has arrived. [`Master::poll_behind`] is for frames that arrive during the delivery. Times are in microseconds since
+//! although its answer has arrived. Use [`Master::poll_behind`] if frames may arrive during the delivery. Times are in microseconds since
 //! an arbitrary start, from a monotonic clock.
 //!
 //! ```
@@ -31,9 +31,9 @@
 //! assert!(report.boards.is_empty());
 //! ```
 //!
-//! A procedure that changes something first makes this PC the master of the bus. The procedure listens for another master (D-08); then
-//! heartbeats are sent until [`Master::end_session`]. Procedures that only scan or read information and descriptions change nothing and
-//! send no heartbeats.
+//! A procedure that changes a board first makes this PC the master of the bus. The procedure listens for another master (D-08); then
+//! heartbeats are sent until [`Master::end_session`]. Procedures that only scan, or only read information and descriptions, do not change
+//! boards and do not send heartbeats.
 
 mod counted;
 pub mod doctor;

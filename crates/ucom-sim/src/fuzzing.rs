@@ -3,8 +3,8 @@
 use ucom::node::{Application, Flash, Node, NodeConfig, Phase, Pins, Store};
 use ucom::{Frame, FromBoard, Profile};
 
-/// Runs a board through a sequence of steps. The first byte of a step defines the time that passes, the length of a frame, and if the board
-/// is polled in that time. Two bytes of identifier and up to eight bytes of data follow. The status of the board must never be
+/// Runs a board through a sequence of steps. The first byte of a step defines the time that passes, the length of a frame, and whether the
+/// board is polled in that time. Two bytes of identifier and up to eight bytes of data follow. The status of the board must never be
 /// contradictory, and the board must send only allowed frames.
 pub fn node(data: &[u8]) {
     use crate::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};

@@ -103,7 +103,7 @@ pub fn edges(data: &[u8]) {
     }
 }
 
-/// Reads parameter files and checks them against a board. The valid values are then written as a text. A reader must read this text as
+/// Reads parameter files and checks them against a board. The valid values are then written as a text. A reader must convert this text to
 /// equal words.
 pub fn params(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };

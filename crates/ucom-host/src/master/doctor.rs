@@ -42,7 +42,7 @@ pub struct Observation {
     pub controller: Option<Controller>,
     /// Report of a scan, which changes nothing.
     pub scan: Option<ScanReport>,
-    /// Report of an init, if one was run.
+    /// Report of an init, if the user ran an init.
     pub init: Option<InitReport>,
     /// Another bit rate at which frames were received, in bit/s.
     pub other_bitrate: Option<u32>,
@@ -249,7 +249,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
     }
 }
 
-/// Adds a finding about how many boards have a number.
+/// Adds a finding about the number of boards that have a number.
 fn numbers(scan: &ScanReport, f: &mut Findings) {
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {

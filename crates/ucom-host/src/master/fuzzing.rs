@@ -7,7 +7,8 @@ use crate::master::reports::{
 };
 use ucom::{Format, Frame, Profile, Status};
 
-/// Longest virtual time that a procedure may take for any input, in µs. The limit is the number of attempts × blocks × the longest timeout.
+/// Longest virtual time that a procedure may take for any input, in µs. The limit is the product of the number of attempts, the number of
+/// blocks and the longest timeout.
 const LIMIT_US: u64 = 3_600_000_000;
 
 fn request(choice: u8) -> Request {

@@ -54,9 +54,9 @@ impl Master {
         self.run();
     }
 
-    /// Ends a procedure without sending another frame, because the bus is lost. [`Event::Done`] is reported at once. For an update, the
-    /// event contains the known state of each board; for conformance tests, the finished tests; and for all other procedures,
-    /// [`MasterError::Bus`].
+    /// Ends a procedure without sending another frame, because the bus is lost. [`Event::Done`] is reported at once. The event contains the
+    /// known state of each board for an update, the finished tests for conformance tests, and [`MasterError::Bus`] for all other
+    /// procedures.
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.bus_gone = Some(reason.into());
@@ -245,9 +245,8 @@ impl Master {
         core.start_session();
     }
 
-    /// Stops control loops (ADMIN_DATA, all 0) ahead of all queued frames, and sends the stop twice more shortly afterwards. The stop is
-    /// sent to the given boards, in reverse order, or to all boards by broadcast. Does not wait for an answer; [`Request::Stop`] checks
-    /// each board.
+    /// Stops control loops (ADMIN_DATA, all 0) before all queued frames, and repeats the stop twice shortly afterwards. The stop is sent to
+    /// the given boards, in reverse order, or to all boards by broadcast. Does not wait for an answer; [`Request::Stop`] checks each board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);

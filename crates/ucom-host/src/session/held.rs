@@ -39,7 +39,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// Creates a state without started boards. `has_started` shows other threads if there are started boards.
+    /// Creates a state without started boards. `has_started` shows other threads whether there are started boards.
     pub fn new(has_started: Arc<AtomicBool>) -> Self {
         Self { has_started, ..Self::default() }
     }

@@ -1,4 +1,4 @@
-//! Parameters of boards. They are read from parameter files and written with a check that the boards received them.
+//! Parameters of boards: reads parameters from files, and writes parameters with a check that the boards received them.
 
 use std::path::Path;
 

@@ -196,7 +196,7 @@ fn u3_what_was_there_before_proves_nothing() {
     assert_eq!(own, 48, "it was programmed by itself");
 }
 
-/// One board of the group gets an attempt on its own. A cancel during this attempt ends the programming mode of all boards of the group.
+/// A board of the group gets an attempt on its own. A cancel during this attempt ends the programming mode of all boards of the group.
 #[test]
 fn p12_a_cancel_reaches_every_board_of_the_group() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);

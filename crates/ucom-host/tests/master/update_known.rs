@@ -23,7 +23,7 @@ fn written() -> (Bench, UpdateOptions) {
     (bench, recorded(options, &report))
 }
 
-/// Returns the outcome of each board and if it is verified, the exit code, and `true` if program data were sent.
+/// Returns the outcome and the verification of each board, the exit code, and `true` if program data were sent.
 fn again(bench: &mut Bench, options: UpdateOptions) -> (Vec<(&'static str, bool)>, u8, bool) {
     let before = data_frames(bench);
     let report = update(bench, options);

@@ -39,15 +39,15 @@ pub struct Board {
     pub so_at: Option<u64>,
     /// `true` if the board has rebooted since it got its number.
     pub rebooted: bool,
-    /// The last errors reported by the board, at most 16, newest last: time in µs and code.
+    /// Last errors that the board reported, at most 16, the newest last. Each entry contains the time in µs and the code.
     pub errors: Vec<(u64, ErrorCode)>,
     /// Number of reported errors.
     pub error_count: u64,
     /// Number of strings of the board that could not be reassembled.
     pub bad_strings: u64,
-    /// Number of MCA_DSP_READY frames, requested or not.
+    /// Number of MCA_DSP_READY frames, including frames that were not requested.
     pub ready_count: u64,
-    /// Time since when the application is known to be stopped, with no automatic start pending.
+    /// Start of the time in which the application is known to be stopped and no automatic start is pending.
     pub(crate) stopped_at: Option<u64>,
     /// Time of the last start command. The time is cleared when the board shows that it has started.
     pub(crate) starting_since: Option<u64>,
@@ -102,7 +102,7 @@ impl Board {
         self.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Returns the last status that was read.
+    /// Returns the last status that the master has read.
     pub fn status(&self) -> Option<Status> {
         self.info.map(|info| info.status)
     }
@@ -119,7 +119,8 @@ impl Board {
             || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
     }
 
-    /// Handles a package of a text of the board. Returns the text when it is complete. `passed_us` is the sum of the times between frames.
+    /// Handles a package of a text of the board. Returns the text when it is complete. `passed_us` is the total of the times between
+    /// frames.
     pub(crate) fn debug_text(
         &mut self,
         passed_us: u64,

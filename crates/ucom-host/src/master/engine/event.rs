@@ -1,4 +1,4 @@
-//! Events: reports of the master that its user has not requested.
+//! Events: reports of the master that its user did not request.
 use crate::master::error::Error;
 use crate::master::io::Snapshot;
 use crate::master::reports::update::Progress;
@@ -90,11 +90,11 @@ pub enum Event {
         /// The words.
         snapshot: Snapshot,
     },
-    /// A frame is not of this protocol (D-02). Only the first frame of each kind is reported, but all are counted.
+    /// A frame is not of this protocol (D-02). Only the first frame of each kind is reported, but all frames are counted.
     Foreign(Foreign),
     /// Another PC sent a frame and is therefore a competing master (D-08). The event is reported only after at least one second without
-    /// frames of another PC. [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that sends all the
-    /// time.
+    /// frames of another PC. [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that sends
+    /// permanently.
     CompetingMaster {
         /// Function of the frame.
         function: Function,
@@ -105,7 +105,7 @@ pub enum Event {
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash numbers of these boards. The list contains the number twice if the boards cannot be distinguished.
+        /// Flash numbers of these boards. The list contains one number twice if the boards cannot be distinguished.
         found: Vec<u16>,
     },
     /// Events were discarded because the caller did not fetch them.

@@ -1,8 +1,8 @@
 //! Detection of numbers that two boards share. The master checks every answer to PC_INFO, for all procedures.
 //!
 //! If two boards have the same number, both boards carry out every command to this number: both are flashed, and both move. A board cannot
-//! detect this, but the PC can, because two boards answer one PC_INFO. All answers are compared ([`Holders::received`]). Before a procedure
-//! changes a board, it waits until no other board can answer (`one_board_each`).
+//! detect a shared number, but the PC can, because two boards answer one PC_INFO. All answers are compared ([`Holders::received`]). Before
+//! a procedure changes a board, it waits until no other board can answer (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
@@ -110,7 +110,7 @@ impl Holder {
     }
 }
 
-/// Step that is missing to be sure that a number belongs to one board.
+/// Next step that is needed to be sure that a number belongs to one board.
 pub(crate) enum Open {
     Nothing,
     /// Another board may still answer until this time.
@@ -174,7 +174,7 @@ impl Holders {
         mine.filter_map(|(_, holder)| holder.asked_at).max()
     }
 
-    /// Removes a number that another board may have now: the number was assigned or withdrawn, or its board has rebooted.
+    /// Removes a number that another board may have now, because the number was assigned or withdrawn, or its board has rebooted.
     pub(crate) fn forget(&mut self, number: u8) {
         self.numbers.remove(&number);
     }
@@ -203,8 +203,8 @@ impl Holders {
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// Returns the step that is missing for a number. All frames up to the time `received` have been delivered. Answers to PC_INFO requests
-    /// older than `oldest` µs are not accepted.
+    /// Returns the next step that is needed for a number. All frames up to the time `received` have been delivered. Answers to PC_INFO
+    /// requests older than `oldest` µs are not accepted.
     pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
         match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {

@@ -1,11 +1,11 @@
-//! Sending of inputs and parameters to the boards.
+//! Transmission of inputs and parameters to the boards.
 use crate::master::engine::mailbox::Forget;
 use crate::master::engine::shared::{Core, Session};
 use crate::master::io::process_data::ProcessData;
 use crate::master::load::frame_bits;
 use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
-/// Percentage of the bus that repeated inputs may use.
+/// Percentage of the bus time that repeated inputs may use.
 const INPUTS_SHARE: u64 = 70;
 /// Longest delay of the repetitions, in µs, for which the master later compensates.
 const INPUTS_CREDIT: u64 = 5_000;
@@ -87,7 +87,8 @@ impl Core {
 
     /// Writes one parameter. The shadow stores the value as assumed (D-35).
     ///
-    /// The package contains only this word (DLC 4, which every receiver accepts). The other words may be unknown here and must not change.
+    /// The package contains only this word (DLC 4, which every receiver accepts). The other words of the package may be unknown and must
+    /// not change.
     pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
         let Some(to) = Sequence::new(board) else { return false };
         let Some(data) = self.data.get_mut(&board) else { return false };

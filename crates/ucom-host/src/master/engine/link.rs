@@ -17,7 +17,7 @@ use crate::master::error::{Error, ExchangeError, MasterError};
 use crate::master::reports::ProcedureId;
 use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
 
-/// Access of a procedure to the bus.
+/// Interface of a procedure to the bus.
 #[derive(Clone)]
 pub(crate) struct Link {
     pub(crate) core: Arc<Mutex<Core>>,
@@ -75,7 +75,7 @@ impl Link {
         self.with(|core| core.sent_at)
     }
 
-    /// Like [`Link::send`], but for a frame of any form.
+    /// Like [`Link::send`], but for a frame in any format.
     pub(crate) async fn send_frame(&self, frame: Frame) {
         let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::Nothing));
         self.left(serial).await;
@@ -132,7 +132,7 @@ impl Link {
         self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }
 
-    /// Begins or stops storing every unparsed frame for [`Link::next_raw`].
+    /// Starts or stops the storage of every unparsed frame for [`Link::next_raw`].
     pub(crate) fn tap(&self, on: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -175,7 +175,7 @@ impl Link {
 
     /// Runs `work`, and ends it early in three cases. [`MasterError::Cancelled`]: the caller cancels it. [`MasterError::Bus`]: the caller
     /// reports that the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared): two boards with the same number appear,
-    /// and the procedure does not tolerate this; reported only once. The queued frames of the procedure are then discarded.
+    /// and the procedure does not tolerate this. This error is reported only once. The queued frames of the procedure are then discarded.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -206,7 +206,7 @@ impl Link {
         .await
     }
 
-    /// Sets if two boards with the same number are tolerated by the procedure or end it.
+    /// Sets whether the procedure tolerates two boards with the same number. If `bears` is `false`, such boards end the procedure.
     pub(crate) fn bear_shared_numbers(&self, bears: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {

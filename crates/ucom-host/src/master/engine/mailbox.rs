@@ -9,7 +9,7 @@ pub(crate) const MAX_RECEIVED: usize = 16_384;
 /// A frame of a board that a procedure receives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Received {
-    /// Time in µs that has certainly passed between frames so far.
+    /// Time in µs that has certainly passed between frames since the start.
     pub at: u64,
     pub from: u8,
     pub message: FromBoard,

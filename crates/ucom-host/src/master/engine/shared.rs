@@ -26,7 +26,7 @@ struct Outgoing {
 
 enum What {
     Frame(Frame),
-    /// Package of a board's inputs that begins with this word. The values are read when the package is sent, so queued inputs are never
+    /// Package of a board's inputs that begins with word `offset`. The values are read when the package is sent, so queued inputs are never
     /// outdated.
     Inputs {
         board: u8,
@@ -65,7 +65,7 @@ pub(crate) struct Core {
     pub report_until: u64,
     /// Stop commands of the policy that will be repeated, and their times. The stops are repeated because a frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
-    /// Earliest time at which inputs may be repeated again.
+    /// Earliest time at which inputs may be repeated.
     pub inputs_from: u64,
     pub boards: Boards,
     /// Boards that have answered, by number.
@@ -262,7 +262,7 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // A procedure may wait for a removed frame before the first remaining one. The procedure must not wait for ever.
+        // A procedure may wait for a removed frame that was queued before the first remaining frame. The procedure must not wait endlessly.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }

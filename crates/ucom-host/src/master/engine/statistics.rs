@@ -12,7 +12,7 @@ const SLOT_US: u64 = WINDOW_US / SLOTS as u64;
 /// Rate, computed as the sum of the amounts in the last second.
 #[derive(Clone, Debug, Default)]
 pub struct Rate {
-    /// Time slots, each with its number and sum.
+    /// Time slots. Each slot has a number and a sum.
     slots: VecDeque<(u64, u64)>,
 }
 

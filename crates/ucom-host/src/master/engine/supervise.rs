@@ -1,4 +1,4 @@
-//! Background tasks of the master: heartbeats in both directions, policies, repeated inputs.
+//! Background tasks of the master: receiving and sending heartbeats, policies, and repeated inputs.
 use crate::master::engine::boards::Life;
 use crate::master::engine::event::{Event, Supervision};
 use crate::master::engine::shared::{Core, Session};
@@ -89,7 +89,8 @@ impl Core {
         }
     }
 
-    /// Sends run = 0 at once and twice more, because a stop must not depend on one frame. The repetitions have no further effect.
+    /// Sends `run = 0` at once, and then two more times, because a stop must not depend on one frame. The repetitions have no further
+    /// effect.
     pub(crate) fn stop_running(&mut self, to: Sequence) {
         self.urgent(to, ToBoard::Admin(Admin::default()));
         self.stops.extend([(self.now + STOP_AGAIN, to), (self.now + 2 * STOP_AGAIN, to)]);

@@ -120,7 +120,7 @@ pub struct LastReceived {
     pub ago_ms: u64,
 }
 
-/// Prints the last frame as `last received: MCA_ALIVE 120 ms ago`, or that no frame was received.
+/// Prints the last frame as `last received: MCA_ALIVE 120 ms ago`, or prints that no frame was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received(pub Option<LastReceived>);
 
@@ -163,7 +163,7 @@ pub enum Incomplete {
     /// The answer contains more frames than its totals announce.
     #[error("the board sent more frames than it had announced")]
     Surplus,
-    /// The answer announces more strings than possible.
+    /// The answer announces more strings than a bus could carry.
     #[error("the board announces {strings} strings, which is too many; check the byte order")]
     TooMany {
         /// Number of strings.

@@ -27,7 +27,7 @@ pub enum IdentityError {
         /// Flash number of the board.
         found: u16,
     },
-    /// The flash numbers of boards match their reports only if their bytes are swapped (D-10).
+    /// The flash numbers of boards match their reports only after their bytes are swapped (D-10).
     #[error("{}", other_order(*endian))]
     ByteOrder {
         /// Byte order of the profile.
@@ -42,8 +42,8 @@ pub enum IdentityError {
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash numbers of the boards that answered to this number. The list has the same number twice if the boards cannot be
-        /// distinguished.
+        /// Flash numbers of the boards that answered to this number. The list contains one number twice if the boards
+        /// cannot be distinguished.
         found: Vec<u16>,
         /// `true` if the number was withdrawn and no board answers to this number any more.
         given_back: bool,

@@ -13,7 +13,7 @@ pub enum RunningError {
         /// Numbers of the boards.
         boards: Vec<u8>,
     },
-    /// Control loops are running. The request could stop the boards in any position or have worse effects.
+    /// Control loops are running. The request could stop the boards in any position, or could have a worse effect.
     #[error("{} running its control loop", Boards(boards))]
     LoopRuns {
         /// Numbers of the boards.

@@ -37,7 +37,7 @@ pub enum StatusError {
         /// The last status.
         status: Status,
     },
-    /// The board confirmed other flags than those that were sent.
+    /// The flags that the board confirmed differ from the flags that were sent.
     #[error("board {board} answers MCA_ADMIN_DATA with `{is}` instead of `{wanted}`")]
     AdminRefused {
         /// Board number.

@@ -27,7 +27,7 @@ impl Kind {
     }
 }
 
-/// Key of a description. The key contains Program ID and flash date (D-36). It also contains the board, because boards with equal images
+/// Key of a description. The key contains Program ID, flash date (D-36) and board. The board is included because boards with equal images
 /// can have different applications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DescriptionKey {

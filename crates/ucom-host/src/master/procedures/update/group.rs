@@ -71,8 +71,8 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
 }
 
 /// Checks a board whose READY was lost: it may have received the whole transfer together with the other boards. If the board is done,
-/// verifies it. If the board is not done, the session stores if the flash was erased, as far as the answer shows this. If the board already
-/// had this program, its answer does not show if it is done.
+/// verifies it. If the board is not done, the session stores whether the flash was erased, as far as the answer shows this. If the board
+/// already had this program, its answer does not show whether it is done.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));

@@ -4,8 +4,8 @@ use core::fmt;
 
 use ucom::{Dimensions, Profile};
 
-/// Returns the length of a classic frame in bits, including worst-case stuffing and the pause after the frame: 55 for DLC 0, 75 for DLC 2,
-/// 135 for DLC 8.
+/// Returns the length of a classic frame in bits, including worst-case stuffing and the pause after the frame. The length is 55 for DLC 0,
+/// 75 for DLC 2, and 135 for DLC 8.
 pub const fn frame_bits(dlc: u8) -> u64 {
     let data = 8 * if dlc > 8 { 8 } else { dlc as u64 };
     // Stuff bits can occur in 34 of the 44 bits outside the data. Three more bits separate frames.

@@ -1,8 +1,8 @@
 //! Supervision of the boards of a run: boards that have left their control loops, and the age of the values of each board.
 //!
-//! A board leaves its control loop without a command from this PC if the PC's heartbeats are missing, if another PC stops it, or if its
-//! application ends the loop. The board reports the end of its loop in a single MCA_ADMIN_DATA frame. If that frame is lost, the sensor
-//! outputs of the board stop in any case, and the master then reads the board's status.
+//! A board can leave its control loop without a command from this PC. The cause may be missing heartbeats of this PC, a stop from another
+//! PC, or the end of the loop in the application. The board reports the end of its loop in a single MCA_ADMIN_DATA frame. If that frame is
+//! lost, the sensor outputs of the board stop in any case, and the master then reads the board's status.
 
 use std::collections::BTreeMap;
 

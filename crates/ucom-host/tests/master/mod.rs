@@ -1,5 +1,5 @@
 //! Tests of the master on a bus in memory, in virtual time. Tests run the master against tables of frames (rows P-1 to P-21 of the
-//! acceptance tests), and against the boards of this crate with faults on every single frame.
+//! acceptance tests). With faults on every single frame, tests also run the master against the boards of this crate.
 
 mod answering;
 mod bench;

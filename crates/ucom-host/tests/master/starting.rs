@@ -58,7 +58,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
         assert!(matches!(error, Error::Signal(SignalError::NoSignal { board: 4, .. })), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
-        // Board 4 has the names of board 1. These names are known after board 1 has been read.
+        // Board 4 has the names of board 1. The names are known after board 1 has been read.
         assert_eq!(bench.count("301#") - before, usize::from(!known));
     }
 }

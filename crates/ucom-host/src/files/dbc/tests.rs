@@ -60,7 +60,7 @@ fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     message.signals.iter().filter(applies).map(|s| (s.name.clone(), value(s, &data))).collect()
 }
 
-/// P-21: process data have the names in the description. Their values are equal in both byte orders.
+/// P-21: process data have the names in the description. The values are equal in both byte orders.
 #[test]
 fn p21_so_frames_decode_by_name() {
     let numbers = [100_i16, -20, 32767, -32768, 5];

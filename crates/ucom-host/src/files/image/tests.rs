@@ -75,7 +75,7 @@ fn s_records_as_published_count_words_here() {
     );
 }
 
-/// Records that follow one another in only one unit show the unit of the addresses. One or two records are not enough to determine the
+/// Records that follow one another in only one unit show the unit of the addresses. A file with only one or two records does not show the
 /// unit.
 #[test]
 fn the_unit_of_addresses_is_taken_from_the_records() {

@@ -46,7 +46,7 @@ pub struct Signal {
 const SLACK: f64 = 1e-9;
 
 impl Signal {
-    /// Creates a signal that no table contains. Its value is the raw word, signed or unsigned as the profile defines.
+    /// Creates a signal that no table contains. The value of this signal is the raw word, signed or unsigned as the profile defines.
     pub fn bare(profile: &Profile) -> Self {
         let kind = if profile.pd_signed { SignalType::Int16 } else { SignalType::Uint16 };
         Self {

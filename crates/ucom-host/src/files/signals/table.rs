@@ -149,8 +149,8 @@ impl SignalTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Skips a key that is already used. This occurs if two signals share a name, and a third signal has the name `#2`,
-                    // which is the index of one of the two.
+                    // Skips a key that is already used. For example, two signals share a name, and a third signal has the name `#2`, which
+                    // is the index of one of the two.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", keys(name));
                     }

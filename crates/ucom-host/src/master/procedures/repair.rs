@@ -1,9 +1,9 @@
 //! Assigns a lost number to its board again while the other boards keep their numbers (section on initialisation: D-21, D-24).
 //!
-//! *Every* board that has no number and whose incoming pin is active takes PC_INIT(n). Therefore only the outgoing pin of the board before
-//! n may be on at that moment. The incoming pin of the first board is always active, so the first board must have its number. Other pins
-//! may stay off, for example after a cancel. Pins that are off do no harm: only PC_INIT depends on them, and a repair switches on the pin
-//! that it needs.
+//! PC_INIT(n) assigns the number to *every* board that has no number and whose incoming pin is active. Therefore only the outgoing pin of the
+//! board before n may be on at that moment. The incoming pin of the first board is always active, so the first board must have its number.
+//! Other pins may stay off, for example after a cancel. Pins that are off do no harm: only PC_INIT depends on them, and a repair switches on
+//! the pin that it needs.
 
 use crate::master::engine::{Link, MS, head};
 use crate::master::error::{AddressError, Error, IdentityError};

@@ -17,7 +17,7 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     Ok(Outcome::Status { board, info: info? })
 }
 
-/// Switches off the outputs, then stops the loop, then the application. This is the reverse order of a start. If a board does not answer a
+/// Switches off the outputs, then stops the loop, then the application. The order is the reverse of a start. If a board does not answer a
 /// step, the next steps are still performed. The first failure is returned.
 pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
     let mut known = match info(link, board).await {

@@ -103,7 +103,7 @@ error_codes! {
     ExloadCycle = 10, "DSP_ERROR_EXLOAD_CYCLE":
         "The transfer paused too long, was out of order, or the second cycle differed from the first.",
         "Send the image again. Stop after three attempts.";
-    /// 11: there is no valid application to start.
+    /// 11: the board has no valid application to start.
     AutostartForbidden = 11, "DSP_ERROR_AUTOSTART_FORBIDDEN":
         "There is no valid application to start.",
         "Program the board first: `ucom update`.";

@@ -156,7 +156,7 @@ impl Master {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns the numbers that two boards share. Each number is returned as the error with which a procedure ends.
+    /// Returns the numbers that two boards share. Each number is returned as the error that ends a procedure.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }

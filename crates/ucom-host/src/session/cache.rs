@@ -20,7 +20,7 @@ pub struct Cache {
 
 #[derive(Clone, Debug, Default)]
 enum Place {
-    /// There is no cache.
+    /// The session has no cache.
     #[default]
     Nowhere,
     Directory(PathBuf),

@@ -63,7 +63,7 @@ pub struct Notice {
     pub change: Change,
     /// Time in s.
     pub time_s: f64,
-    /// Age of the board's last outputs in s; `None` if there were no outputs, or if the change concerns heartbeats.
+    /// Age of the board's last outputs in s; `None` if the board has sent no outputs, or if the change concerns heartbeats.
     pub age_s: Option<f64>,
 }
 

@@ -14,7 +14,7 @@ use crate::files::recording::{FrameKind, RecordedFrame};
 const COARSE: Duration = Duration::from_millis(12);
 /// Interval at which the bus is polled during a wait that is timed precisely.
 const LOOK: Duration = Duration::from_micros(100);
-/// Largest time by which a sleep may end late. The thread does not sleep during this last part of a wait.
+/// Largest delay at the end of a sleep. The thread does not sleep during this last part of a wait.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
 /// Open bus with its clock.

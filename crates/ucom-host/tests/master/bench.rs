@@ -57,7 +57,7 @@ pub(super) enum Fault {
     Swapped,
     /// The frame is delayed by the given time in milliseconds.
     Delayed(u64),
-    /// One bit of the data is wrong, or one bit of the identifier if the frame has no data.
+    /// A bit of the data is wrong, or a bit of the identifier if the frame has no data.
     Corrupted(u8),
 }
 

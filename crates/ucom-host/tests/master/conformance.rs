@@ -172,7 +172,7 @@ impl Member for Flawed {
     }
 }
 
-/// Two boards, of which the first has the fault.
+/// Two boards; the first board has the fault.
 fn with(mistake: Mistake) -> Bench {
     let mut pins = WirePins::chain(2);
     let profile = Profile::default();

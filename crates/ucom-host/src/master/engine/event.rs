@@ -23,7 +23,7 @@ pub enum Event {
         /// Progress.
         progress: Progress,
     },
-    /// An update is about to reset this board for programming, so its flash record is no longer valid (D-62). The board's memory is erased
+    /// An update will reset this board for programming, so the board's flash record is no longer valid (D-62). The board's memory is erased
     /// only after the board has answered the reset.
     FlashBegins {
         /// Procedure.

@@ -132,7 +132,7 @@ fn shared(board: u8, found: [u16; 2]) -> Error {
 }
 
 impl ScanFinding {
-    /// Returns the error with which other commands refuse such a chain; returns `None` if they accept the chain.
+    /// Returns the error that other commands report when they refuse such a chain; returns `None` if they accept the chain.
     pub fn error(&self) -> Option<Error> {
         match self {
             Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),

@@ -14,7 +14,7 @@ use ucom::{Sequence, Status, ToBoard};
 /// Updates all boards that are not done yet by one broadcast transfer. A board that leaves the group gets further attempts on its own.
 ///
 /// If a board outside the group keeps PROG = 1, the update is refused. If a selected board fails before the transfer and may still accept
-/// program data, there is no broadcast. The other boards are then updated one by one.
+/// program data, the procedure does not send a broadcast. The other boards are then updated one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("the boards are updated one by one, because `addr.broadcast` is none".into());

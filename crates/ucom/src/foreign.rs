@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Reasons why a frame is not of this protocol. Such a frame is counted and shown, but has no effect (D-02).
+/// Reasons why a frame is not of this protocol. A foreign frame is counted and shown, but has no effect (D-02).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
     /// 29-bit identifier.
@@ -11,11 +11,11 @@ pub enum Foreign {
     Remote,
     /// CAN FD frame.
     Fd,
-    /// Bit 5 of the identifier is set. This bit is 0 in every identifier of this protocol (D-01).
+    /// Bit 5 of the identifier is set. Bit 5 is 0 in every identifier of this protocol (D-01).
     Bit5,
-    /// Function number 28 to 31: it fits into the identifier, but the protocol does not define it.
+    /// Function number 28 to 31, which the protocol does not define.
     NoFunction(u8),
-    /// More than 11 bits of identifier or more than 8 bytes of data.
+    /// Identifier of more than 11 bits, or more than 8 data bytes.
     Malformed,
 }
 

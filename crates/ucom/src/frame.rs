@@ -14,7 +14,7 @@ pub struct Payload {
 }
 
 impl Payload {
-    /// No data, DLC 0.
+    /// Payload without data; its DLC is 0.
     pub const EMPTY: Self = Self { len: 0, data: [0; 8] };
 
     /// Creates a payload. Returns `None` if `data` is longer than 8 bytes.
@@ -31,7 +31,7 @@ impl Payload {
         Some(payload)
     }
 
-    /// Returns the first `len` bytes of `data`; `len` is at most 8. For encoders.
+    /// Returns the first `len` bytes of `data` (`len` ≤ 8). For encoders.
     pub(crate) const fn of(data: [u8; 8], len: usize) -> Self {
         let len = if len > 8 { 8 } else { len };
         let mut payload = Self { len: len as u8, data: [0; 8] };
@@ -48,7 +48,7 @@ impl Payload {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// Returns all 8 bytes, 0 beyond the length (padding is 0, D-12).
+    /// Returns all 8 bytes. The bytes after the payload are 0 (D-12).
     pub const fn padded(&self) -> [u8; 8] {
         self.data
     }
@@ -94,8 +94,8 @@ impl Format {
 }
 
 impl Frame {
-    /// Creates a frame. Returns `None` if `id` has more than 11 bits or `data` more than 8 bytes. The identifier may have no function;
-    /// [`Frame::address`] checks this.
+    /// Creates a frame. Returns `None` if `id` has more than 11 bits or `data` more than 8 bytes. The function number in the
+    /// identifier may be undefined; [`Frame::address`] checks it.
     pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
         if id > 0x7FF {
             return None;
@@ -106,7 +106,7 @@ impl Frame {
         }
     }
 
-    /// Creates a frame of this protocol. This cannot fail, because a [`Sequence`] is always valid.
+    /// Creates a frame of this protocol. The creation cannot fail, because a [`Sequence`] is always valid.
     pub const fn of(function: Function, sequence: Sequence, payload: Payload) -> Self {
         Self { id: function.id(sequence), payload }
     }
@@ -150,7 +150,7 @@ impl Frame {
     }
 }
 
-/// Prints a frame as candump does: `1C1#0202`.
+/// Prints a frame in candump's form, for example `1C1#0202`.
 impl fmt::Display for Frame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:03X}#", self.id)?;
@@ -170,7 +170,7 @@ impl fmt::Display for NotAFrame {
 
 impl core::error::Error for NotAFrame {}
 
-/// Reads the form that candump prints. Blanks and dots between the bytes are allowed.
+/// Parses a frame in the form that candump prints. Blanks and dots between the bytes are allowed.
 impl FromStr for Frame {
     type Err = NotAFrame;
 

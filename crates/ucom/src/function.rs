@@ -1,11 +1,11 @@
-//! The 28 functions, and the identifier of a function and a sequence number (D-01).
+//! The 28 functions of the protocol, and the identifiers that consist of a function and a sequence number (D-01).
 
 use core::fmt;
 
 use crate::foreign::Foreign;
 
-/// Node address of a board: its position in the chain, 0..31. The manual calls it the sequence number; this project also says "number". The
-/// meaning of 0 depends on the sender (D-04): from the PC it is broadcast, from a board "I have no number yet".
+/// Node address of a board: its position in the chain, 0..31. The manual calls this address the sequence number; this project also calls it
+/// "number". From the PC, address 0 means broadcast; from a board, address 0 means that the board has no number yet (D-04).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(u8);
 
@@ -15,7 +15,7 @@ impl Sequence {
     /// The highest number, 31.
     pub const MAX: Self = Self(31);
 
-    /// Creates a number. Returns `None` above 31; the value is never masked silently (D-01).
+    /// Creates a number. Returns `None` for values above 31 instead of masking the value silently (D-01).
     pub const fn new(number: u8) -> Option<Self> {
         if number > 31 { None } else { Some(Self(number)) }
     }
@@ -49,7 +49,8 @@ pub enum Sender {
     Pc,
     /// The boards only.
     Board,
-    /// The PC and the boards, with the same identifier. D-05 defines how they avoid sending it at the same time.
+    /// The PC and the boards use the same identifier. D-05 defines how the PC and a board avoid sending it at the
+    /// same time.
     Both,
 }
 
@@ -142,7 +143,7 @@ functions! {
 }
 
 impl Function {
-    /// Returns the function of a number; `None` above 27.
+    /// Returns the function with this number; `None` for numbers above 27.
     pub const fn from_number(number: u8) -> Option<Self> {
         if number < 28 { Some(Self::ALL[number as usize]) } else { None }
     }
@@ -157,7 +158,7 @@ impl Function {
         (sequence.0 as u16 & 0x1F) | ((self as u16 & 0x3F) << 6)
     }
 
-    /// Returns the function DSP_REPORT0..3 of a number 0..3; `None` above 3.
+    /// Returns the function DSP_REPORT0..3 for an index 0..3; `None` for an index above 3.
     pub const fn report(k: u8) -> Option<Self> {
         if k < 4 { Self::from_number(16 + k) } else { None }
     }
@@ -177,12 +178,12 @@ impl Function {
         }
     }
 
-    /// Returns `true` if the PC may send this function. Boards react only to such functions.
+    /// Returns `true` if the PC may send this function. Boards react only to functions that the PC may send.
     pub const fn from_pc(self) -> bool {
         !matches!(self.sender(), Sender::Board)
     }
 
-    /// Returns `true` if a board may send this function. The PC reacts only to such functions.
+    /// Returns `true` if a board may send this function. The PC reacts only to functions that a board may send.
     pub const fn from_board(self) -> bool {
         !matches!(self.sender(), Sender::Pc)
     }
@@ -207,7 +208,8 @@ impl fmt::Display for Function {
 mod tests {
     use super::*;
 
-    /// C-1: the identifiers of all 28 functions with 32 numbers follow the published formula, and are split back into function and number.
+    /// C-1: the identifiers of all 28 functions with 32 numbers follow the published formula. Each identifier decodes
+    /// to its function and number.
     #[test]
     fn d01_c1_identifiers_follow_the_formula() {
         for (number, function) in Function::ALL.into_iter().enumerate() {

@@ -10,7 +10,7 @@ pub const BLOCK_LEN: usize = 64;
 const MAGIC: u16 = 0x5543;
 const VERSION: u16 = 1;
 
-/// Target memory of an image.
+/// Memory of the board that an image is written to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Memory {
     /// Program flash.
@@ -31,7 +31,7 @@ impl Memory {
         }
     }
 
-    /// Returns the memory of a number; `None` for a number without a meaning.
+    /// Returns the memory with this number; `None` if the number is not defined.
     pub const fn from_number(number: u16) -> Option<Self> {
         match number {
             0 => Some(Self::Program),
@@ -45,9 +45,9 @@ impl Memory {
 /// The contents of the header block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Number of the cycle, 1 or 2. Boards refuse other values.
+    /// Number of the cycle, 1 or 2. Boards refuse headers with another cycle number.
     pub cycle: u16,
-    /// Number of the memory, see [`Memory::from_number`].
+    /// Number of the target memory, see [`Memory::from_number`].
     pub memory: u16,
     /// Load address in words.
     pub address: u32,
@@ -68,7 +68,7 @@ pub enum HeaderError {
     Magic(u16),
     /// Word 1 has this value instead of 1.
     Version(u16),
-    /// The sum of the 32 words is this value instead of 0.
+    /// The sum of the 32 words of the header is this value instead of 0.
     Sum(u16),
 }
 
@@ -85,10 +85,10 @@ impl fmt::Display for HeaderError {
 impl core::error::Error for HeaderError {}
 
 impl Header {
-    /// Target of an image that any board may take.
+    /// Target value of an image that any board accepts.
     pub const ANY_BOARD: u16 = 0xFFFF;
 
-    /// Returns the block with words in this byte order.
+    /// Returns the header block; each word has this byte order.
     pub fn build(&self, endian: Endian) -> [u8; BLOCK_LEN] {
         let mut words = [0xFFFFu16; 32];
         let fields = [
@@ -118,7 +118,7 @@ impl Header {
         block
     }
 
-    /// Reads the header from a block.
+    /// Parses a header block.
     pub fn parse(block: &[u8; BLOCK_LEN], endian: Endian) -> Result<Self, HeaderError> {
         let mut words = [0u16; 32];
         for (word, bytes) in words.iter_mut().zip(block.chunks_exact(2)) {

@@ -1,10 +1,10 @@
-//! Report of a board about itself: the first frame of DSP_INFO and of the IO description.
+//! The first frames of DSP_INFO and of the IO description, in which a board describes itself.
 
 use crate::frame::Payload;
 use crate::profile::Endian;
 use crate::status::Status;
 
-/// First frame of DSP_INFO; the description follows as a string.
+/// First frame of DSP_INFO. The description of the board follows as a string.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BoardInfo {
     /// Number chosen when the bootloader was flashed; its low byte is the UCoM id (D-07).
@@ -72,7 +72,7 @@ impl Dimensions {
         Some(Self { ci: endian.word([c0, c1]), so: endian.word([s0, s1]), par: endian.word([p0, p1]) })
     }
 
-    /// Returns the number of strings in a complete description: one for the application and one for each signal.
+    /// Returns the number of strings in a complete IO description (one for the application and one for each signal).
     pub const fn strings(&self) -> u32 {
         1 + self.ci as u32 + self.so as u32 + self.par as u32
     }
@@ -82,7 +82,7 @@ impl Dimensions {
 mod tests {
     use super::*;
 
-    /// D-10: both byte orders, on the first board of the golden chain.
+    /// D-10: the information of the first board of the golden chain decodes in both byte orders.
     #[test]
     fn d10_info_in_both_orders() {
         let info = BoardInfo {

@@ -16,7 +16,7 @@ use crate::frame::{Frame, Payload};
 use crate::function::Function;
 use crate::profile::Profile;
 
-/// Reasons why a frame is not a message of the expected direction.
+/// Reasons why a frame is not a message in the expected direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
     /// The frame is not of this protocol (D-02).
@@ -32,7 +32,7 @@ pub enum DecodeError {
         /// Bytes that the message needs.
         need: u8,
     },
-    /// The length is not valid for a message whose length has a meaning (D-12). With `dlc.strict`, every length except the exact one is
+    /// The length of the message is not one of its valid lengths (D-12). With `dlc.strict`, every length except the exact one is
     /// invalid.
     Length {
         /// Function of the frame.
@@ -40,12 +40,12 @@ pub enum DecodeError {
         /// Bytes received.
         len: u8,
     },
-    /// A flag that is neither 0 nor 1 (D-37).
+    /// A flag of the message is neither 0 nor 1 (D-37).
     Value(Function),
 }
 
 impl DecodeError {
-    /// Returns `true` if the length is wrong. A board then sends DSP_ERROR 7.
+    /// Returns `true` if the length is wrong. In this case a board sends DSP_ERROR 7.
     pub const fn is_length(&self) -> bool {
         matches!(self, Self::TooShort { .. } | Self::Length { .. })
     }
@@ -67,7 +67,8 @@ impl fmt::Display for DecodeError {
 
 impl core::error::Error for DecodeError {}
 
-/// Returns the payload if it has at least `need` bytes. With `dlc.strict` it must have exactly `need` bytes.
+/// Returns the payload if it has at least `need` bytes. With `dlc.strict`, the payload must have exactly `need`
+/// bytes.
 fn need(frame: &Frame, function: Function, need: u8, profile: &Profile) -> Result<Payload, DecodeError> {
     let len = frame.dlc();
     if len < need {

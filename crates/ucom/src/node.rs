@@ -1,13 +1,13 @@
-//! The board side: a UCoM board as a state machine without clock, heap or I/O. A board's firmware can use it unchanged, and every simulated
-//! board runs it.
+//! The board side of the protocol: a UCoM board as a state machine that uses no clock, heap or I/O. The firmware of a board can
+//! use this state machine unchanged, and every simulated board runs it.
 //!
-//! The caller passes received frames ([`Node::receive`]), polls for frames to send ([`Node::poll`]) and reports when a frame has left the
-//! controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`] returns the time until which the node does
-//! nothing by itself. Flash, pins, non-volatile memory and the application are traits ([`Flash`], [`Pins`], [`Store`], [`Application`]);
-//! the crate `ucom-sim` implements all four in memory.
+//! The caller passes received frames ([`Node::receive`]), polls for frames to send ([`Node::poll`]) and reports when the CAN controller
+//! has sent a frame ([`Node::sent`]). Each call passes the time in microseconds. [`Node::next_deadline`] returns the time at which the
+//! node must be called next if no frame arrives. Flash, pins, non-volatile memory and the application are traits ([`Flash`], [`Pins`],
+//! [`Store`], [`Application`]); the crate `ucom-sim` implements all four in memory.
 //!
-//! The node offers one frame at a time. The next frame is offered after [`Node::sent`]. Frames of strings and dumps are created only when
-//! the bus can take them, so a node needs no queue for them.
+//! The node offers one frame at a time. The next frame is offered after [`Node::sent`]. The frames of strings and dumps are created only
+//! when the bus is ready for them, so a node needs no queue for these frames.
 
 mod answers;
 mod application;
@@ -41,15 +41,16 @@ use crate::message::FromBoard;
 /// Phase of the board; the states S1 to S6 of the protocol page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// Between reset and listening.
+    /// Boot phase, between the reset and the time at which the board begins to listen.
     Booting,
     /// S1: no number.
     Uninitialised,
-    /// S2: exloader, has a number.
+    /// S2: the exloader runs, and the board has a number.
     Idle,
-    /// S3: exloader, program data are accepted.
+    /// S3: the exloader runs and accepts program data.
     Programming,
-    /// S3x: like S3, but after an error. Program data are discarded until PC_XRESET or PROG 0→1.
+    /// S3x: like S3, but after an error. The board discards program data until PC_XRESET arrives or PROG changes from
+    /// 0 to 1.
     Aborted,
     /// S4: the application is starting.
     Starting,
@@ -86,13 +87,14 @@ pub struct Node<F, P, S, A> {
     /// Time at which the board begins to listen after a reset; `None` while it listens.
     boot_until: Option<u64>,
     number: Option<Sequence>,
-    /// Number that the board is taking. Its INITACK has not left yet; INIT is set when it has (D-24).
+    /// Number that the board accepts with an INITACK that is not sent yet. INIT is set when the INITACK has been sent
+    /// (D-24).
     taking: Option<Sequence>,
     /// Level of the outgoing init pin.
     opinit: bool,
     prog: bool,
     app: App,
-    /// Flags of MCA_ADMIN_DATA. The flag `run` is `app == Running`.
+    /// Flags of MCA_ADMIN_DATA. The flag `run` is not stored here: it is `app == Running`.
     active: bool,
     debug: bool,
     global_debug: bool,
@@ -120,7 +122,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             application,
             config,
             counters: Counters::default(),
-            // Boards with the same seed must draw different numbers, or their back-offs collide.
+            // Boards with the same configured seed must generate different random numbers, because boards with
+            // equal back-off times would collide.
             random: (config.seed ^ u32::from(config.flash_number).wrapping_mul(0x9E37_79B9)).max(1),
             now_us,
             boot_until: None,
@@ -160,8 +163,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.reboot(self.now_us, false);
     }
 
-    /// Returns the next frame for the bus; `None` while no frame is due or the previous frame has not left. As in a controller, a frame
-    /// blocks the frames after it until [`Node::sent`] or [`Node::not_sent`] is called for it.
+    /// Returns the next frame for the bus; `None` while no frame is due or the previous frame has not been sent. A frame blocks the
+    /// frames after it until [`Node::sent`] or [`Node::not_sent`] is called for this frame, as in a CAN controller.
     pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
         self.advance(now_us);
         if self.outbox.in_flight.is_some() || self.boot_until.is_some() {
@@ -172,7 +175,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Some(frame)
     }
 
-    /// Confirms that the frame of the last [`Node::poll`] has left the controller. Other frames are ignored.
+    /// Confirms that the CAN controller has sent the frame of the last [`Node::poll`]. Calls for other frames are
+    /// ignored.
     pub fn sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {
@@ -183,7 +187,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             self.error(ErrorCode::CanTransmit);
         }
         match FromBoard::decode(frame, &self.config.profile) {
-            // Ignores the INITACK of a number that the board has forgotten since: it does not confirm the number that the board is taking.
+            // The INITACK of a number that the board has lost in the meantime does not confirm the new number.
             Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
                 self.numbered();
             }
@@ -192,8 +196,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reports that the controller gave up the frame of the last [`Node::poll`] (bus-off). An INITACK is offered again; other frames are
-    /// lost. DSP_ERROR 6 follows when the bus works again.
+    /// Reports that the CAN controller stopped trying to send the frame of the last [`Node::poll`] (bus-off). The node offers an
+    /// INITACK again; other frames are lost. DSP_ERROR 6 follows when the bus works again.
     pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {
@@ -209,7 +213,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reports that the controller's receive buffer overran: frames were lost (DSP_ERROR 8).
+    /// Reports that frames were lost because the receive buffer of the CAN controller overflowed (DSP_ERROR 8).
     pub fn overrun(&mut self, now_us: u64) {
         self.advance(now_us);
         if self.boot_until.is_none() {
@@ -217,7 +221,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Returns the time until which the node does nothing by itself. Call [`Node::poll`] then. A time in the past means "at once".
+    /// Returns the time at which [`Node::poll`] must be called if no frame arrives. A time in the past means that the
+    /// call is due now.
     pub fn next_deadline(&self) -> u64 {
         self.deadline()
     }

@@ -1,7 +1,7 @@
 //! The compatibility profile: the board's interpretation of points that the published description leaves open.
 //!
-//! Each decision of this project has a key here, so that the same code can work with a board that was built with another interpretation.
-//! [`KEYS`] lists the keys with default, range and meaning; [`Profile`] holds the values.
+//! Each of these decisions has a key, so that this crate can also work with a board that interprets the description differently.
+//! [`KEYS`] lists the keys with default, range and meaning; [`Profile`] contains the values.
 
 mod keys;
 mod values;
@@ -12,14 +12,14 @@ pub(crate) use values::{Value, words};
 
 use crate::function::Sequence;
 
-/// Reasons why a value or a whole profile is refused.
+/// Reasons why a value or a complete profile is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProfileError {
     /// The key does not exist.
     UnknownKey,
     /// The value is outside the key's range.
     Value(&'static Key),
-    /// Two values contradict each other. The text contains the keys and the reason.
+    /// Two values of the profile contradict each other. The error text contains both keys and the reason.
     Contradiction(&'static str),
 }
 
@@ -36,13 +36,14 @@ impl core::fmt::Display for ProfileError {
 impl core::error::Error for ProfileError {}
 
 impl Profile {
-    /// Sets one key from text: a number, one of the key's words, or `yes`/`no`.
+    /// Sets one key from text. The text is a number, one of the words of the key, or `yes`/`no`.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), ProfileError> {
         let key = KEYS.iter().find(|known| known.name == key).ok_or(ProfileError::UnknownKey)?;
         if (key.set)(self, value) { Ok(()) } else { Err(ProfileError::Value(key)) }
     }
 
-    /// Checks that the values can be used together. Values can contradict each other although each is in its range.
+    /// Checks that the values can be used together. Values can contradict each other even if each value is in its
+    /// range.
     pub const fn check(&self) -> Result<(), ProfileError> {
         let contradiction = if self.addr_first == 0 && matches!(self.addr_broadcast, Broadcast::Zero) {
             "addr.first and addr.broadcast cannot both be 0: the first board would receive all broadcasts"
@@ -94,7 +95,7 @@ impl Profile {
         if self.pd_signed { word as i16 as i32 } else { word as i32 }
     }
 
-    /// Returns `string.max`, but at most 512, the upper limit of the key.
+    /// Returns `string.max`, limited to 512, which is the upper limit of the key.
     pub const fn string_limit(&self) -> usize {
         if self.string_max > 512 { 512 } else { self.string_max as usize }
     }
@@ -112,7 +113,8 @@ mod tests {
     use std::string::ToString;
     use std::vec::Vec;
 
-    /// Every key's default equals the default in the table, is within its range, and can be read back.
+    /// The default of every key equals the default in the table and is within the range of the key. Its text can be
+    /// parsed again.
     #[test]
     fn keys_and_defaults_agree() {
         let mut profile = Profile::default();

@@ -10,11 +10,11 @@ words! {
     pub enum Checksum {
         /// CRC-16/CCITT-FALSE over the bytes in wire order: polynomial 0x1021, start value 0xFFFF.
         Crc16 = "crc16",
-        /// Sum of the 16-bit words modulo 65 536. Does not detect swapped frames.
+        /// Sum of the 16-bit words modulo 65 536. The sum does not detect swapped frames.
         Sum16 = "sum16",
         /// Exclusive-or of the 16-bit words.
         Xor16 = "xor16",
-        /// No computation: the number in the header is accepted without a check.
+        /// No checksum; the Program ID in the header is accepted without a check.
         None = "none",
     }
 }
@@ -26,9 +26,10 @@ words! {
         Fat = "fat",
         /// Days since 2000-01-01, up to 2179.
         Days2000 = "days2000",
-        /// Four decimal digits, YYMM, 2000 to 2099. The day is lost; a date is read as the first day of the month.
+        /// Four decimal digits, YYMM, 2000 to 2099. The day is not stored, so a decoded date is the first day of the
+        /// month.
         Bcd = "bcd",
-        /// A number whose meaning this tool does not know.
+        /// A raw number that this tool does not interpret as a date.
         Raw = "raw",
     }
 }
@@ -36,7 +37,7 @@ words! {
 const CCITT_FALSE: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 static CCITT_FALSE_TABLE: Crc<u16> = CCITT_FALSE;
 
-/// Computation of a Program ID in progress. The image can be passed in pieces of any size.
+/// Computation of a Program ID in progress. The image can be added in pieces of any size.
 #[derive(Clone)]
 pub struct Digest {
     checksum: Checksum,
@@ -80,8 +81,8 @@ impl Digest {
         if self.checksum == Checksum::Xor16 { self.word ^ word } else { self.word.wrapping_add(word) }
     }
 
-    /// Returns the Program ID of the data so far; 0 for [`Checksum::None`]. For an odd number of bytes, the sum includes 0xFF as the
-    /// missing byte, like the padding of the last block.
+    /// Returns the Program ID of the data that were added so far; 0 for [`Checksum::None`]. For an odd number of bytes, the sum
+    /// includes 0xFF as the missing byte, like the padding of the last block.
     pub fn finish(&self) -> u16 {
         match self.checksum {
             Checksum::Crc16 => self.crc.clone().finalize(),
@@ -106,7 +107,8 @@ pub const fn block_count(len: usize) -> usize {
     len.div_ceil(BLOCK_LEN)
 }
 
-/// Returns the `i`-th data block of an image, the last one padded with 0xFF; `None` after the last block (D-41).
+/// Returns the `i`-th data block of an image, or `None` after the last block. The last block is padded with 0xFF
+/// (D-41).
 pub fn data_block(image: &[u8], i: usize) -> Option<[u8; BLOCK_LEN]> {
     let rest = image.get(i.checked_mul(BLOCK_LEN)?..)?;
     if rest.is_empty() {
@@ -133,7 +135,8 @@ const fn month_days(year: u16, month: u8) -> u8 {
 }
 
 impl DateForm {
-    /// Returns the 16 bits of a date; `None` if the day does not exist or the form cannot hold it. The form `raw` never holds a date.
+    /// Returns the 16 bits of a date; `None` if the day does not exist or this form cannot encode it. The form `raw`
+    /// cannot encode a date.
     pub fn encode(self, year: u16, month: u8, day: u8) -> Option<u16> {
         if day == 0 || day > month_days(year, month) {
             return None;
@@ -179,7 +182,7 @@ impl DateForm {
                 (year, month, days as u8 + 1)
             }
             Self::Bcd => {
-                // Digits above 9 are refused below: their date is not encoded to the same 16 bits.
+                // Digits above 9 are refused below, because encoding the decoded date returns other 16 bits.
                 let number = |byte: u16| 10 * (byte >> 4) + (byte & 15);
                 (2000 + number(date >> 8), number(date & 0xFF) as u8, 1)
             }
@@ -207,7 +210,7 @@ mod tests {
         assert_eq!(block_count(1000), 16);
     }
 
-    /// A sum does not detect two swapped frames of a block. This is why crc16 is the default.
+    /// A sum does not detect two swapped frames of a block. Therefore crc16 is the default.
     #[test]
     fn d44_sum_is_blind_to_swapped_frames() {
         let image = image();
@@ -276,8 +279,8 @@ mod tests {
         }
     }
 
-    /// Compares with a calendar that counts day by day. Each 16-bit value is one day later than the value before; the last one is
-    /// 2179-06-05.
+    /// Compares with a calendar that counts day by day. Each 16-bit value is one day later than the previous value; the last
+    /// value means 2179-06-05.
     #[test]
     fn d45_days_in_a_row() {
         let (mut year, mut month, mut day) = (2000, 1, 1);
@@ -309,12 +312,12 @@ mod tests {
             for form in [DateForm::Fat, DateForm::Days2000] {
                 prop_assert_eq!(form.encode(year, month, day).and_then(|date| form.decode(date)), Some((year, month, day)));
             }
-            // This form has no day.
+            // The form `Bcd` does not store the day.
             let date = DateForm::Bcd.encode(year, month, day);
             prop_assert_eq!(date.and_then(|date| DateForm::Bcd.decode(date)), Some((year, month, 1)));
         }
 
-        /// An image in pieces of any size gives the same Program ID as the whole image.
+        /// The Program ID does not depend on the size of the pieces in which the image is added.
         #[test]
         fn d44_pieces(bytes in proptest::collection::vec(any::<u8>(), 0..200), at in 0..200usize, i in 0..3usize) {
             let kind = [Checksum::Crc16, Checksum::Sum16, Checksum::Xor16][i];

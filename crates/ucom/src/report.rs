@@ -8,14 +8,14 @@ use crate::profile::ReportMode;
 pub struct Report {
     /// Index of the DSP_REPORT function, 0..3.
     pub k: u8,
-    /// The sequence field of the identifier.
+    /// Sequence field of the identifier.
     pub id_field: Sequence,
     /// Data byte: the low byte of the flash number, which distinguishes boards.
     pub ucom_id: u8,
 }
 
 impl Report {
-    /// Returns the report of a board in mode `flash7`: 128 identifiers, one for each 7-bit flash id.
+    /// Returns the report of a board in mode `flash7`: which has one of 128 identifiers, one for each 7-bit flash id.
     pub const fn flash7(flash_number: u16) -> Self {
         Self {
             k: (flash_number >> 5 & 3) as u8,
@@ -24,9 +24,10 @@ impl Report {
         }
     }
 
-    /// Returns the `i`-th frame, from 0, that a board sends for one request in a mode; `None` after the last.
+    /// Returns the `i`-th frame (counted from 0) that a board sends after one request in this mode; `None` after the
+    /// last frame.
     ///
-    /// `sequence` is the board's number. For a board without a number it is the number that the board uses instead.
+    /// `sequence` is the number of the board, or the number that a board without a number uses instead.
     pub const fn nth(mode: ReportMode, i: u8, flash_number: u16, sequence: Sequence) -> Option<Self> {
         let report = Self::flash7(flash_number);
         match mode {

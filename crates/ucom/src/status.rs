@@ -61,7 +61,7 @@ impl Status {
         Self((self.0 & !mask) | value)
     }
 
-    /// Returns the contradiction in this status, if any. No board can be in such a state.
+    /// Returns the contradiction between bits of this status, if any. No board can be in a contradictory state.
     pub const fn contradiction(self) -> Option<&'static str> {
         if self.has(Self::EXLRUN) == self.has(Self::MSTART) {
             Some("EXLRUN must be the opposite of MSTART")

@@ -23,9 +23,10 @@ impl fmt::Display for Latin1<'_> {
     }
 }
 
-/// Returns the `i`-th package of a string; `None` after the last package. Package 0 is the header, the others are data.
+/// Returns the `i`-th package of a string; `None` after the last package. Package 0 is the header, and the other
+/// packages are data.
 ///
-/// Texts longer than `string.max` are cut there.
+/// Texts longer than `string.max` are truncated.
 pub fn string_package(text: &[u8], i: u16, profile: &Profile) -> Option<Payload> {
     let text = text.get(..profile.string_limit()).unwrap_or(text);
     let Some(i) = i.checked_sub(1) else {
@@ -46,7 +47,7 @@ pub struct StringPackages<'a> {
 }
 
 impl<'a> StringPackages<'a> {
-    /// Creates the packages of `text`, which is Latin-1 without NUL.
+    /// Creates the packages of `text`, which must be Latin-1 without NUL characters.
     pub const fn new(text: &'a [u8], profile: &'a Profile) -> Self {
         Self { text, next: 0, profile }
     }
@@ -74,15 +75,15 @@ pub enum Assembled<'a> {
     Refused,
 }
 
-/// Assembles one string at a time. Each function of each board needs its own assembler (D-14).
+/// Assembles one string at a time. A receiver needs one assembler for each function of each board (D-14).
 ///
-/// A loss inside a string cannot be detected: after a lost package the assembler waits for more. [`StringAssembler::expired`] shows that no
-/// package arrived for 100 ms (`string.gap`); the next package then starts a new string.
+/// The assembler cannot detect a lost package: it continues to wait for packages. [`StringAssembler::expired`] shows that no package
+/// arrived for 100 ms (`string.gap`); the next package then starts a new string.
 #[derive(Clone, Debug)]
 pub struct StringAssembler<const N: usize = 512> {
     text: [u8; N],
     len: usize,
-    /// Number of packages that are still missing; `None` before the header.
+    /// Number of packages that are still missing; `None` until the header has arrived.
     open: Option<u16>,
     last_us: u64,
 }
@@ -115,7 +116,7 @@ impl<const N: usize> StringAssembler<N> {
         self.open.is_some() && now_us.saturating_sub(self.last_us) >= profile.string_gap_us()
     }
 
-    /// Returns the number of packages that the string in progress still lacks.
+    /// Returns the number of packages of the string in progress that are still missing.
     pub const fn missing(&self) -> u16 {
         match self.open {
             Some(missing) => missing,
@@ -250,7 +251,7 @@ mod tests {
         assert_eq!(assembler.missing(), 2);
     }
 
-    /// A data package that is empty or exceeds the buffer drops the string.
+    /// If a data package is empty or exceeds the buffer, the string is dropped.
     #[test]
     fn d13_data_that_cannot_be_are_refused() {
         let [profile, ..] = profiles();
@@ -276,7 +277,7 @@ mod tests {
         assert_eq!(assembler.push(0, &payload(b"9"), &profile), Assembled::Complete(Latin1(b"123456789")));
     }
 
-    /// `string.max` also cuts a text in the middle of a package.
+    /// `string.max` truncates a text even in the middle of a package.
     #[test]
     fn d13_longest_string() {
         let profile = Profile { string_max: 12, ..Profile::default() };
@@ -289,7 +290,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-13: any text without trailing NULs is assembled unchanged.
+        /// D-13: the assembler returns any text without trailing NULs unchanged.
         #[test]
         fn d13_round_trip(mut text in proptest::collection::vec(any::<u8>(), 0..=512), i in 0..4usize) {
             while text.last() == Some(&0) {

@@ -12,27 +12,28 @@ use crate::report::Report;
 
 /// A message from a board.
 ///
-/// DSP_INFO, the IO description and debug texts are sent in several frames with the same identifier and no tag (G-15). A receiver must
-/// therefore count the frames to know which part a frame is. These messages are returned as bare payloads; read them with
-/// [`BoardInfo::parse`](crate::BoardInfo::parse), [`Dimensions::parse`](crate::Dimensions::parse) and
-/// [`StringAssembler`](crate::StringAssembler).
+/// DSP_INFO, the IO description and debug texts are sent in several frames with the same identifier and without a frame number (G-15).
+/// A receiver must therefore count the frames to know which part a frame carries. The parts of DSP_INFO, the IO description and debug
+/// texts are returned as payloads, which can be decoded with [`BoardInfo::parse`](crate::BoardInfo::parse),
+/// [`Dimensions::parse`](crate::Dimensions::parse) and [`StringAssembler`](crate::StringAssembler).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FromBoard {
     /// DSP_ERROR.
     Error(ErrorCode),
-    /// DSP_INITACK with the number that the board took. The identifier must contain the same number (D-24).
+    /// DSP_INITACK with the sequence number that the board accepted. The identifier must contain the same number
+    /// (D-24).
     InitAck(u8),
     /// DSP_PROGFINISHED.
     ProgFinished,
     /// A part of DSP_INFO: 8 bytes with the values of [`BoardInfo`](crate::BoardInfo), then a string.
     Info(Payload),
-    /// DSP_READY: the block is taken.
+    /// DSP_READY: the board has accepted the block.
     Ready,
     /// MCA_DSP_SO.
     So(BufferPackage),
-    /// DSP_REPORT0..3. The sequence field of its identifier is part of the flash id (D-07).
+    /// DSP_REPORT0..3. In the identifier of a report, the sequence field is part of the flash id (D-07).
     Report(Report),
-    /// MCA_DSP_READY: the application is up.
+    /// MCA_DSP_READY: the application is ready.
     McaReady,
     /// A part of MCA_DUMP_IO_DESCRIPTION: 6 bytes of dimensions, then strings.
     IoDescription(Payload),
@@ -83,7 +84,7 @@ impl FromBoard {
         Frame::of(self.function(), sequence, payload)
     }
 
-    /// Decodes a frame. Returns the sequence field of its identifier and the message.
+    /// Decodes a frame. Returns the message and the sequence field of the frame's identifier.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, from) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -105,7 +106,7 @@ impl FromBoard {
                 Self::Report(Report { k, id_field: from, ucom_id: byte()? })
             }
             Function::McaReady => empty(Self::McaReady)?,
-            // A frame without data is always the PC's request (D-12).
+            // On this identifier, a frame without data is always the PC's request (D-12).
             Function::DumpIo if frame.dlc() > 0 => Self::IoDescription(some()?),
             Function::Admin => Self::Admin(admin(frame, profile)?),
             Function::Debug => Self::Debug(some()?),

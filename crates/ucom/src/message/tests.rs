@@ -20,7 +20,7 @@ fn from(text: &str) -> Result<FromBoard, DecodeError> {
     FromBoard::decode(&frame(text), &Profile::default()).map(|(_, message)| message)
 }
 
-/// C-6: surplus bytes are ignored. If bytes are missing, the message is refused with that reason.
+/// C-6: surplus bytes are ignored. A message with missing bytes is refused as too short.
 #[test]
 fn d12_c6_lengths() {
     assert_eq!(to("201#0000000000000000"), Ok(ToBoard::Info));
@@ -46,7 +46,8 @@ fn d12_c6_lengths() {
     assert!(ToBoard::decode(&frame("341#00000100"), &strict).is_ok());
 }
 
-/// D-05: functions that both sides send are distinguished by the side, and by their length if possible.
+/// D-05: if both sides send a function, the sender distinguishes the two messages. Their lengths also distinguish
+/// them if possible.
 #[test]
 fn d05_shared_functions() {
     assert_eq!(to("581#"), Ok(ToBoard::DumpIo));
@@ -216,7 +217,7 @@ fn profiles() -> impl Strategy<Value = Profile> {
 }
 
 proptest! {
-    /// D-12: in every profile, an encoded message decodes to the same message.
+    /// D-12: in every profile, encoding and then decoding a message returns the original message.
     #[test]
     fn d12_round_trip(pc in pc_messages(), board in board_messages(), number in 0..32u8, profile in profiles()) {
         let number = Sequence::new(number).unwrap();
@@ -227,7 +228,8 @@ proptest! {
         prop_assert_eq!(FromBoard::decode(&frame, &profile), Ok((seen, board)));
     }
 
-    /// D-12: any frame gives a message or an error, never a panic. A decoded message is encoded with the same function.
+    /// D-12: decoding any frame returns a message or an error and never panics. A decoded message is encoded with the
+    /// function of its frame.
     #[test]
     fn d12_any_frame(id in 0..0x800u16, data in prop::collection::vec(any::<u8>(), 0..=8), profile in profiles()) {
         let frame = Frame::new(id, &data).unwrap();

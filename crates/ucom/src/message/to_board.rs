@@ -16,9 +16,9 @@ pub enum ToBoard {
     XReset,
     /// PC_SETSTATUS: `(old & ~mask) | value` (D-22).
     SetStatus {
-        /// Bits that are cleared first.
+        /// Bits of the status byte that are cleared first.
         mask: u8,
-        /// Bits that are set afterwards, even bits outside the mask.
+        /// Bits of the status byte that are set afterwards, including bits outside the mask.
         value: u8,
     },
     /// PC_INFO.
@@ -27,7 +27,7 @@ pub enum ToBoard {
     Report,
     /// PC_INIT: the identifier carries the new number.
     Init,
-    /// PC_PROG: an eighth of a block.
+    /// PC_PROG: 8 bytes of program data, one eighth of a block.
     Prog([u8; 8]),
     /// PC_START.
     Start,
@@ -81,7 +81,7 @@ impl ToBoard {
         Frame::of(self.function(), to, payload)
     }
 
-    /// Decodes a frame. Returns its destination and the message.
+    /// Decodes a frame. Returns the destination of a frame and its message.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, to) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -100,7 +100,7 @@ impl ToBoard {
             Function::Ci => Self::Ci(package(frame, function, profile)?),
             Function::Par => Self::Par(package(frame, function, profile)?),
             Function::McaStart => empty(Self::McaStart)?,
-            // A frame with data is always a board's answer (D-12).
+            // On this identifier, a frame with data is always a board's answer (D-12).
             Function::DumpIo if frame.dlc() == 0 => Self::DumpIo,
             Function::DumpCi => empty(Self::DumpCi)?,
             Function::Admin => Self::Admin(admin(frame, profile)?),
@@ -111,13 +111,13 @@ impl ToBoard {
     }
 }
 
-/// Reads the four flags of MCA_ADMIN_DATA.
+/// Decodes the four flags of MCA_ADMIN_DATA.
 pub(super) fn admin(frame: &Frame, profile: &Profile) -> Result<Admin, DecodeError> {
     let [run, active, debug, global, ..] = need(frame, Function::Admin, 4, profile)?.padded();
     Admin::from_bytes([run, active, debug, global]).ok_or(DecodeError::Value(Function::Admin))
 }
 
-/// Reads a buffer package of 4, 6 or 8 bytes.
+/// Decodes a buffer package of 4, 6 or 8 bytes.
 pub(super) fn package(
     frame: &Frame,
     function: Function,

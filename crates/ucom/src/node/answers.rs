@@ -1,4 +1,5 @@
-//! Answers of several frames: DSP_INFO, dumps, outputs, texts. Their frames are created one at a time.
+//! Answers that consist of several frames (DSP_INFO, dumps, outputs, texts). The frames of an answer are created one
+//! at a time.
 
 use super::jobs::{Place, package};
 use super::{App, Application, Flash, Node, Pins, Store, Text};
@@ -39,7 +40,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         };
         match made {
             Some((_, next @ Place::String { string: 0, .. })) => self.jobs.info = Some(next),
-            // The answer has ended, or the description became shorter meanwhile. In the second case the PC requests it again.
+            // The answer is complete, or the description became shorter during the answer. In the second case the PC
+            // requests the description again.
             _ => self.jobs.info_done(),
         }
         made.map(|(payload, _)| FromBoard::Info(payload))
@@ -78,7 +80,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Some((_, next @ Place::String { string, .. })) if string < dimensions.strings() => {
                 self.jobs.dump_io = Some(next);
             }
-            // The answer has ended, or a text became shorter meanwhile. In the second case the PC requests it again.
+            // The answer is complete, or a text became shorter during the answer. In the second case the PC requests
+            // the answer again.
             _ => self.jobs.dump_io_done(),
         }
         made.map(|(payload, _)| FromBoard::IoDescription(payload))

@@ -1,4 +1,5 @@
-//! The application level: start, control loop, inputs and parameters (D-30 to D-37), supervision (D-50).
+//! The application level of a board: start, control loop, inputs and parameters (D-30 to D-37), and supervision of
+//! the PC (D-50).
 
 use super::{App, Application, Flash, Node, Pins, Store};
 use crate::admin::Admin;
@@ -23,7 +24,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.jobs.forget_application();
     }
 
-    /// Handles the end of the application's start: queues MCA_DSP_READY, the first heartbeat and the flags (D-30, D-37).
+    /// Called when the application has started: queues MCA_DSP_READY, the first heartbeat and the flags (D-30, D-37).
     pub(super) fn application_up(&mut self) {
         self.app = App::Up;
         self.outbox.mca_ready = true;
@@ -43,7 +44,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.so_at = Some(self.after_ms(self.config.profile.so_period));
     }
 
-    /// Ends the control loop and makes the outputs safe, even if the loop was not running.
+    /// Ends the control loop. Makes the outputs safe, even if the loop was not running.
     pub(super) fn stop_loop(&mut self) {
         self.set_active(false);
         if self.app == App::Running {

@@ -7,17 +7,17 @@ use crate::profile::Profile;
 pub struct NodeConfig {
     /// Number chosen when the bootloader was flashed; the low byte is the UCoM id (D-07).
     pub flash_number: u16,
-    /// Profile of this board.
+    /// Compatibility profile of this board.
     pub profile: Profile,
     /// Seed of the board's random numbers, which are used for the back-off of D-05.
     pub seed: u32,
-    /// Time from a reset until the board listens, µs. At most 200 000 (D-07).
+    /// Time from a reset until the board listens, µs; at most 200 000 µs (D-07).
     pub boot_us: u64,
     /// Shortest time from the last frame of a block to the board's answer, µs.
     pub block_us: u64,
     /// Time between control cycles, µs.
     pub control_period_us: u64,
-    /// Length of an image in words if `prog.header` is `none`; 0 for the whole area.
+    /// Length of an image in words, used if `prog.header` is `none`; 0 means the whole area.
     pub headerless_words: u32,
 }
 
@@ -41,7 +41,7 @@ impl NodeConfig {
 pub struct Counters {
     /// Frames that are not of this protocol (D-02).
     pub foreign: u32,
-    /// Messages for this board that it did not answer, because its state does not allow them.
+    /// Messages to this board that the board did not answer because its state does not allow them.
     pub ignored: u32,
     /// Messages that were too short or had a wrong length (D-12).
     pub wrong_length: u32,
@@ -49,8 +49,8 @@ pub struct Counters {
     pub errors_dropped: u32,
     /// Debug texts that were not sent (D-38).
     pub texts_dropped: u32,
-    /// Output transfers that were left out because the previous transfer was not finished (D-33).
+    /// Output transfers that were skipped because the previous transfer was not finished (D-33).
     pub so_skipped: u32,
-    /// Frames that the CAN controller gave up sending.
+    /// Frames that the CAN controller failed to send.
     pub not_sent: u32,
 }

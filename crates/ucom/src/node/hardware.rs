@@ -1,4 +1,4 @@
-//! Hardware of a board: flash, init pins, a little non-volatile memory, and the application.
+//! Traits for the hardware of a board (flash, init pins, a small non-volatile memory) and for its application.
 
 use crate::header::Memory;
 use crate::info::Dimensions;
@@ -31,18 +31,18 @@ pub enum FlashState {
     Failed,
 }
 
-/// The flash could not start or complete an operation.
+/// Error: the flash could not start or complete an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashError;
 
-/// Bytes of the validity record.
+/// Number of bytes of the validity record.
 pub const RECORD_LEN: usize = 16;
 
-/// Flash of the board, and the RAM that an exloader may be loaded into.
+/// Flash of the board, and the RAM into which an exloader can be loaded.
 ///
-/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when it is done. The node starts no operation
-/// while another is in progress. Implementations MUST keep the validity record apart from the application area: erasing one leaves the
-/// other intact.
+/// The methods `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when the operation is complete. The
+/// node starts no operation while another is in progress. Implementations MUST keep the validity record outside the application area.
+/// Erasing the area must not change the record, and erasing the record must not change the area.
 pub trait Flash {
     /// Returns the area for applications in a memory; `None` if the board has no such memory.
     fn area(&self, memory: Memory) -> Option<Area>;
@@ -50,7 +50,7 @@ pub trait Flash {
     /// Returns the state of the last operation.
     fn state(&mut self, now_us: u64) -> FlashState;
 
-    /// Starts to erase `area`. Whole sectors may be erased, but nothing beyond the application area.
+    /// Starts to erase `area`. Implementations may erase whole sectors, but no data outside the application area.
     fn erase(&mut self, now_us: u64, memory: Memory, area: Area) -> Result<(), FlashError>;
 
     /// Starts to write up to 64 bytes in wire order, beginning at a word address. The number of bytes is even.
@@ -59,7 +59,7 @@ pub trait Flash {
     /// Reads bytes from a word address on, in the order in which they were written.
     fn read(&self, memory: Memory, address: u32, data: &mut [u8]) -> Result<(), FlashError>;
 
-    /// Returns the stored validity record. If none was written, the bytes are arbitrary.
+    /// Returns the stored validity record. If no record was written, the bytes are arbitrary.
     fn record(&self) -> [u8; RECORD_LEN];
 
     /// Starts to make the record invalid.
@@ -74,7 +74,7 @@ pub trait Pins {
     /// Returns the level of the incoming pin, which is strapped active on the first board.
     fn init_in(&self) -> bool;
 
-    /// Drives the outgoing pin. After power-up it MUST be inactive by itself.
+    /// Drives the outgoing pin. After power-up, the outgoing pin MUST be inactive without a call of this method.
     fn set_init_out(&mut self, active: bool);
 }
 
@@ -93,7 +93,7 @@ pub trait Store {
 /// A text of the application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Text {
-    /// The application itself; may differ from the board's description (D-36).
+    /// Description of the application, which may differ from the board's description (D-36).
     Application,
     /// A controller input.
     Ci(u16),
@@ -109,13 +109,13 @@ pub trait Application {
     /// Starts the program.
     fn start(&mut self, now_us: u64);
 
-    /// Ends the program; its outputs MUST be safe when this returns.
+    /// Ends the program. The outputs of the program MUST be safe when this method returns.
     fn stop(&mut self);
 
     /// Returns `true` if the program has started and can serve requests.
     fn is_up(&mut self, now_us: u64) -> bool;
 
-    /// Returns the number of inputs, outputs and parameters. MUST NOT change while the program runs.
+    /// Returns the number of inputs, outputs and parameters. The numbers MUST NOT change while the program runs.
     fn dimensions(&self) -> Dimensions;
 
     /// Returns a description in Latin-1. The text is empty if the application has no such description.
@@ -145,15 +145,16 @@ pub trait Application {
     /// Runs a control cycle. Called only while the loop runs.
     fn step(&mut self, now_us: u64);
 
-    /// Enables the outputs of the board, or makes them safe.
+    /// Enables the outputs of the board (`true`), or makes the outputs safe (`false`).
     fn outputs(&mut self, active: bool);
 
-    /// Returns the oldest waiting debug text in Latin-1. MUST stay the same until [`Application::debug_done`].
+    /// Returns the oldest waiting debug text in Latin-1. The text MUST NOT change until [`Application::debug_done`]
+    /// is called.
     fn debug_text(&self) -> Option<&[u8]> {
         None
     }
 
-    /// Removes the oldest debug text. Called after it was sent, or if it is dropped because it may not be sent.
+    /// Removes the oldest debug text. Called after the text was sent, or if the text is dropped.
     fn debug_done(&mut self) {}
 }
 

@@ -1,10 +1,10 @@
-//! Answers of several frames in progress.
+//! Progress of answers that consist of several frames.
 
 use crate::frame::Payload;
 use crate::profile::Profile;
 use crate::string::string_package;
 
-/// Progress of an answer: nothing sent yet, or the next package to send of the string `string`.
+/// Progress of an answer: no frame sent yet, or the number of the next package of the string `string`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     First,
@@ -17,18 +17,19 @@ pub(super) struct Jobs {
     pub info: Option<Place>,
     pub info_again: bool,
     pub dump_io: Option<Place>,
-    /// Earliest time for the next frame of the dump.
+    /// Earliest time at which the next frame of the dump may be sent.
     pub dump_io_at: u64,
-    /// Earliest time of another dump, if the PC requested it during the current one.
+    /// Earliest time of another dump, if the PC requested another dump during the current one.
     pub dump_io_again: Option<u64>,
-    /// Offset of the next package.
+    /// Offset of the next package of the initial inputs.
     pub dump_ci: Option<u16>,
     pub dump_ci_again: bool,
     /// Offset of the next package of the outputs.
     pub so: Option<u16>,
-    /// Next package of the text in progress. The second value is `true` if the node itself wrote the text.
+    /// Index of the next package of the text in progress. The second value is `true` if the node itself wrote the
+    /// text.
     pub text: Option<(u16, bool)>,
-    /// Text that the node itself sends.
+    /// Text that the node itself wrote.
     pub own_text: Option<&'static [u8]>,
 }
 
@@ -48,14 +49,15 @@ impl Jobs {
         }
     }
 
-    /// Requests DSP_INFO. A request that arrives during such an answer is served afterwards, so strings are never mixed (D-14).
+    /// Requests DSP_INFO. A request that arrives during a DSP_INFO answer is served after that answer, so strings are
+    /// never mixed (D-14).
     pub(super) fn ask_info(&mut self) {
         self.info_again = self.info.is_some();
         self.info = self.info.or(Some(Place::First));
     }
 
-    /// Like `ask_info`, but sends no frame of the answer before `due_us`. By then the request with the same identifier has left the bus
-    /// (D-05).
+    /// Like `ask_info`, but sends no frame of the answer before `due_us`. At that time, the request with the same identifier has left
+    /// the bus (D-05).
     pub(super) fn ask_dump_io(&mut self, due_us: u64) {
         if let Some(Place::String { .. }) = self.dump_io {
             self.dump_io_again = Some(due_us);

@@ -4,7 +4,7 @@ use crate::error_code::ErrorCode;
 use crate::frame::Frame;
 use crate::function::Sequence;
 
-/// Largest number of waiting errors.
+/// Largest number of waiting DSP_ERROR frames.
 const ERRORS: usize = 8;
 /// Largest number of waiting reports.
 const REPORTS: usize = 4;
@@ -14,7 +14,7 @@ const REPORTS: usize = 4;
 pub(super) struct Outbox {
     /// Frame that the CAN controller has not sent yet.
     pub in_flight: Option<Frame>,
-    /// `true` if the controller gave up a frame; DSP_ERROR 6 follows the next frame that leaves.
+    /// `true` if the CAN controller failed to send a frame; DSP_ERROR 6 follows after the next frame that is sent.
     pub trouble: bool,
     /// INITACK.
     pub ack: bool,

@@ -1,4 +1,4 @@
-//! Programming of a new application: blocks, cycles, checks, flash (D-40 to D-46).
+//! Programming of a new application: receipt of blocks, the two cycles, checks and flash operations (D-40 to D-46).
 
 use super::transfer::{Cycle, Work};
 use super::{Application, Area, Flash, FlashError, FlashState, Node, Pins, RECORD_LEN, Record, Store};
@@ -7,7 +7,7 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::{HeaderForm, Plan};
 use crate::program::{Checksum, Digest};
 
-/// Bytes of flash read back in one step. The limit keeps a step short.
+/// Bytes of flash read back in one step. The limit ensures that a step is short.
 const VERIFY_STEP: usize = 1024;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
@@ -16,7 +16,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.record.is_some()
     }
 
-    /// Aborts the transfer: sends one error, then stays silent until PC_XRESET or PROG 0→1 (D-43).
+    /// Aborts the transfer: sends one error, and ignores program data until PC_XRESET arrives or PROG changes from 0
+    /// to 1 (D-43).
     pub(super) fn abort(&mut self, code: ErrorCode) {
         self.programming.cancel(&self.config.profile);
         self.programming.discard = true;
@@ -30,7 +31,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             return;
         }
         if !self.prog {
-            // Broadcast program data are for a group of boards (D-46). A board outside the group ignores them.
+            // Program data that are sent by broadcast are for a group of boards (D-46). A board outside the group
+            // ignores them.
             if !is_broadcast {
                 self.abort(ErrorCode::MemProtected);
             }
@@ -73,7 +75,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Work::Block(_) => return self.take_block(),
             _ => {}
         }
-        // No operation starts while the flash is busy for any reason.
+        // No operation starts while the flash is busy.
         let state = self.flash.state(now);
         if state == FlashState::Busy {
             return Ok(());
@@ -124,7 +126,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reads a header (D-41). Refuses headers that this board cannot accept.
+    /// Parses a header (D-41). Refuses headers that this board cannot accept.
     fn take_header(&mut self) -> Result<(), ErrorCode> {
         let endian = self.config.profile.prog_endian;
         let header = Header::parse(&self.programming.block, endian).map_err(|_| ErrorCode::Data)?;
@@ -154,7 +156,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             0 => area.words,
             words => words.min(area.words),
         };
-        // If the second cycle has another image, its own Program ID replaces this one.
+        // If the image of the second cycle is different, its Program ID replaces the Program ID of the first image.
         let program_id = self.programming.first.map_or(0, |first| first.program_id);
         let (address, target) = (area.start, Header::ANY_BOARD);
         Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })
@@ -201,7 +203,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if !cycle.writes {
             return self.after_data();
         }
-        // The bytes are written in wire order. The checksum uses the same order.
+        // The bytes are written in wire order. The checksum uses wire order, too.
         self.flash.write(self.now_us, cycle.memory, address, data).map_err(|_| ErrorCode::Flash)?;
         self.programming.work = Work::AwaitWrite;
         Ok(())
@@ -232,7 +234,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reads the image back (D-44: its checksum must match the Program ID).
+    /// Reads the image back from flash. The checksum of the image must match the Program ID (D-44).
     fn verify(&mut self, done: u32) -> Result<(), ErrorCode> {
         let checksum = self.config.profile.prog_checksum;
         let cycle = self.programming.cycle.as_mut().ok_or(ErrorCode::ExloadCycle)?;

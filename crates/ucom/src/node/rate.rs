@@ -5,7 +5,7 @@ const SECOND_US: u64 = 1_000_000;
 /// Times of the last events, at most `N` in any second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RateLimit<const N: usize> {
-    /// The times; the oldest is at `next`. `None`: no event yet.
+    /// Times of the events, the oldest at index `next`; `None` for entries without an event.
     times: [Option<u64>; N],
     next: usize,
 }
@@ -15,7 +15,8 @@ impl<const N: usize> RateLimit<N> {
         Self { times: [None; N], next: 0 }
     }
 
-    /// Records an event and returns `true` if it may happen now. At most `limit` events (and at most `N`) are allowed in any second.
+    /// Records an event and returns `true` if the event is allowed now. At most `limit` events (and at most `N`) are
+    /// allowed in any second.
     pub(super) fn allow(&mut self, now_us: u64, limit: u32) -> bool {
         let recent = |time: &&Option<u64>| time.is_some_and(|time| now_us.saturating_sub(time) < SECOND_US);
         if self.times.iter().filter(recent).count() >= (limit as usize).min(N) {

@@ -20,7 +20,8 @@ pub struct Record {
 const MAGIC: [u8; 2] = *b"UR";
 
 impl Record {
-    /// Returns the bytes for the flash, including a checksum. A record that a power loss has cut off is therefore invalid.
+    /// Returns the bytes for the flash, including a checksum. Because of the checksum, a record that was not
+    /// completely written before a power loss is invalid.
     pub fn build(&self) -> [u8; RECORD_LEN] {
         let [p0, p1] = self.program_id.to_le_bytes();
         let [d0, d1] = self.date.to_le_bytes();
@@ -35,7 +36,7 @@ impl Record {
         bytes
     }
 
-    /// Reads a record; `None` unless every byte is valid.
+    /// Parses a record. Returns `None` if any byte is invalid.
     pub fn parse(bytes: &[u8; RECORD_LEN]) -> Option<Self> {
         let [_, _, p0, p1, d0, d1, a0, a1, a2, a3, w0, w1, w2, w3, ..] = *bytes;
         let record = Self {
@@ -52,7 +53,7 @@ impl Record {
 mod tests {
     use super::*;
 
-    /// D-45: erased flash is not a valid record. A record in which a byte was not written is not valid either.
+    /// D-45: erased flash is not a valid record. A record is also invalid if one of its bytes was not written.
     #[test]
     fn d45_half_a_record_is_none() {
         let record = Record { program_id: 0x4B3F, date: 0x3AC1, address: 0x1000, words: 500 };

@@ -7,13 +7,13 @@ use crate::message::FromBoard;
 use crate::report::Report;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Returns the number in the identifiers of this board's frames. A board without a number uses the number that the profile requires
-    /// (D-06).
+    /// Returns the sequence number that this board uses in the identifiers of its frames. A board without a sequence number uses the
+    /// number that the profile requires (D-06).
     pub(super) fn own_number(&self) -> Sequence {
         self.number.unwrap_or(self.config.profile.unnumbered())
     }
 
-    /// Queues DSP_REPORT. Its delay in milliseconds is the UCoM id (D-07).
+    /// Queues DSP_REPORT. The delay of the report in milliseconds equals the UCoM id (D-07).
     pub(super) fn report(&mut self) {
         let wait = u32::from(self.config.flash_number & 0xFF);
         self.outbox.push_report(self.after_ms(wait));
@@ -25,15 +25,16 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }
 
-    /// Queues MCA_ADMIN_DATA without a request. The frame waits a random time, because the PC may be about to send the same identifier
-    /// (D-05). If the flags already wait to be sent, no second frame is queued.
+    /// Queues MCA_ADMIN_DATA that the PC did not request. The board waits a random time, because the PC may send the same identifier
+    /// soon (D-05). If MCA_ADMIN_DATA is already queued, no second frame is queued.
     pub(super) fn send_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);
         self.outbox.admin_at.get_or_insert(due);
     }
 
-    /// Returns the next frame: first single frames by urgency, then answers of several frames.
+    /// Returns the next frame. Single frames come first, ordered by urgency, and then answers that consist of several
+    /// frames.
     pub(super) fn next_frame(&mut self) -> Option<Frame> {
         let profile = self.config.profile;
         if let Some(number) = self.taking.or(self.number)
@@ -47,7 +48,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if let Some(report) = self.due_report() {
             return Some(FromBoard::Report(report).encode(self.own_number(), &profile));
         }
-        // Everything else needs a number.
+        // All other frames need a sequence number.
         let number = self.number?;
         let message = self.single_message().or_else(|| self.next_of_answers())?;
         Some(message.encode(number, &profile))

@@ -1,4 +1,4 @@
-//! Status byte, reset, number, and the effect of PC_SETSTATUS (D-20 to D-25).
+//! Status byte, reset and sequence number of a board, and the effect of PC_SETSTATUS (D-20 to D-25).
 
 use super::{App, Application, Flash, Node, Pins, Record, Store};
 use crate::error_code::ErrorCode;
@@ -33,7 +33,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.boot_until = Some(now_us.saturating_add(self.config.boot_us));
     }
 
-    /// Begins to listen in the exloader. Reads the record of the application that is in flash now.
+    /// Makes the exloader listen for frames. Reads the record of the application that is in flash at this time.
     pub(super) fn booted(&mut self) {
         self.boot_until = None;
         self.record = Record::parse(&self.flash.record());
@@ -42,7 +42,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Forgets the number and everything that depends on it.
+    /// Deletes the sequence number and all state that depends on it.
     pub(super) fn forget_number(&mut self) {
         self.number = None;
         self.taking = None;
@@ -57,7 +57,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.pins.set_init_out(active);
     }
 
-    /// Takes the number. Called when INITACK has left the controller (D-24).
+    /// Takes the number. Called when the CAN controller has sent INITACK (D-24).
     pub(super) fn numbered(&mut self) {
         let Some(number) = self.taking.take() else { return };
         self.number = Some(number);
@@ -117,7 +117,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.drive_init_out(new.has(Status::OPINIT));
     }
 
-    /// Starts the application from the exloader: PC_START, MSTART 0→1 or autostart (D-30).
+    /// Starts the application from the exloader, after PC_START, MSTART 0→1 or autostart (D-30).
     pub(super) fn start(&mut self) {
         self.autostart_at = None;
         match self.app {

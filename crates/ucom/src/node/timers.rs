@@ -18,7 +18,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         1 + self.random % most.max(1)
     }
 
-    /// Sends DSP_ERROR, unless this code was already sent too often within a second (section 9).
+    /// Sends DSP_ERROR, unless the rate limit for this error code is reached (section 9).
     pub(super) fn error(&mut self, code: ErrorCode) {
         let from = self.own_number();
         let limit = self.config.profile.error_rate;
@@ -95,7 +95,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// Returns the next due time after `at` that is in the future; missed ones are left out.
+/// Returns the next due time after `at` that is in the future, skipping the times that were missed.
 fn next_beat(at: Option<u64>, period_us: u64, now: u64) -> u64 {
     let period = period_us.max(1);
     let at = at.unwrap_or(now);

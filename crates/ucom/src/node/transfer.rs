@@ -6,23 +6,23 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::Profile;
 use crate::program::Digest;
 
-/// Work that follows a received block.
+/// Work that the board does after it has received a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Work {
     /// Waits for frames.
     None,
-    /// A complete block was received. The block is processed at this time.
+    /// A complete block was received and is processed at this time.
     Block(u64),
     /// The validity record will be cleared before the flash is erased.
     ClearRecord,
     Erase,
     AwaitErase,
     AwaitWrite,
-    /// The image is being read back. The number is the bytes read so far.
+    /// The image is being read back from flash; the value is the number of bytes read so far.
     Verify(u32),
     WriteRecord,
     AwaitRecord,
-    /// DSP_READY is being sent. The block buffer is in use until it has left.
+    /// DSP_READY is being sent. Until it has been sent, the block buffer must not change.
     Answer,
 }
 
@@ -32,11 +32,11 @@ pub(super) struct Cycle {
     pub header: Header,
     pub area: Area,
     pub memory: Memory,
-    /// `true` if its data are written to memory; `false` if they are only checked.
+    /// `true` if the data of the cycle are written to memory; `false` if the data are only checked.
     pub writes: bool,
     /// Bytes of the image received so far.
     pub done: u32,
-    /// Digest of the received data, later of the data read back.
+    /// Digest of the received data, and later of the data that are read back.
     pub digest: Digest,
 }
 
@@ -81,7 +81,7 @@ impl Programming {
         *self = Self::new(profile);
     }
 
-    /// Drops the transfer. If an error occurred before, the board stays silent.
+    /// Drops the transfer. If an error occurred before, the board continues to ignore program data.
     pub(super) fn cancel(&mut self, profile: &Profile) {
         *self = Self { discard: self.discard, ..Self::new(profile) };
     }
@@ -90,7 +90,7 @@ impl Programming {
         self.discard
     }
 
-    /// Allows the next block. Called when DSP_READY has left.
+    /// Allows the next block. Called when DSP_READY has been sent.
     pub(super) fn answered(&mut self) {
         if self.work == Work::Answer {
             self.work = Work::None;
@@ -104,7 +104,7 @@ impl Programming {
             Work::None | Work::Answer => u64::MAX,
             Work::Block(at) => at,
             Work::Verify(_) => 0,
-            // The state of the flash is read again soon.
+            // The state of the flash is polled again after 500 µs.
             _ => now_us.saturating_add(500),
         }
     }

@@ -12,21 +12,21 @@ pub enum Kind {
     Number,
     /// `yes` or `no`.
     YesNo,
-    /// A word from a fixed set.
+    /// A word from a fixed list.
     Word,
 }
 
 /// Key of the profile.
 pub struct Key {
-    /// Name in files, `prog.frame_gap_us`.
+    /// Name of the key in files, for example `prog.frame_gap_us`.
     pub name: &'static str,
     /// Default as text.
     pub default: &'static str,
-    /// Allowed values, in words.
+    /// Allowed values of the key, as text.
     pub range: &'static str,
-    /// Rule and meaning, with the unit.
+    /// Rule and meaning of the key, with the unit.
     pub doc: &'static str,
-    /// Kind of its values.
+    /// Kind of the key's values.
     pub kind: Kind,
     pub(super) set: fn(&mut Profile, &str) -> bool,
     write: fn(&Profile, &mut fmt::Formatter<'_>) -> fmt::Result,

@@ -4,7 +4,7 @@ use core::fmt;
 
 /// Conversion of a key's value to and from text.
 pub(crate) trait Value: Sized {
-    /// Reads a value from a text.
+    /// Parses a value from text.
     fn read(text: &str) -> Option<Self>;
     /// Writes a value as text.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
@@ -80,7 +80,7 @@ words! {
         Zero = "0",
         /// 31.
         ThirtyOne = "31",
-        /// No number addresses all numbered boards; 0 addresses the boards without a number.
+        /// There is no broadcast number for numbered boards; number 0 addresses the boards without a number.
         None = "none",
     }
 }
@@ -88,11 +88,11 @@ words! {
 words! {
     /// Form of the boards' reports to PC_REPORT and PC_RESET (D-07).
     pub enum ReportMode {
-        /// A single frame; function and sequence field are the 7-bit flash id.
+        /// A single frame whose function and sequence field contain the 7-bit flash id.
         Flash7 = "flash7",
         /// A single DSP_REPORT0 with the board's sequence number.
         Seq = "seq",
-        /// Four frames, one with each function.
+        /// Four frames, one for each of the functions DSP_REPORT0..3.
         All4 = "all4",
     }
 }
@@ -100,13 +100,13 @@ words! {
 words! {
     /// Content of the two cycles of an update (D-40).
     pub enum Plan {
-        /// The same image twice: it is checked first, then written.
+        /// The image is sent twice: the first cycle checks it, the second cycle writes it.
         VerifyWrite = "verify-write",
-        /// An exloader into RAM, then the application.
+        /// The first cycle loads an exloader into RAM, the second cycle writes the application.
         ExloaderApp = "exloader-app",
-        /// Program memory, then data memory.
+        /// The first cycle writes program memory, the second cycle writes data memory.
         PmemXmem = "pmem-xmem",
-        /// Two files, sent unchanged.
+        /// Each cycle sends one of two files unchanged.
         Raw = "raw",
     }
 }
@@ -116,7 +116,7 @@ words! {
     pub enum HeaderForm {
         /// The header block of this project.
         V1 = "v1",
-        /// No header. The first block is data, and the board knows the length.
+        /// No header. The first block contains data, and the length is configured in the board.
         None = "none",
     }
 }
@@ -126,7 +126,7 @@ words! {
     pub enum CiLatch {
         /// Each package takes effect when it arrives.
         Frame = "frame",
-        /// All inputs take effect together with the package that holds the last word.
+        /// All inputs take effect together with the package that contains the last word.
         Last = "last",
     }
 }
@@ -134,9 +134,9 @@ words! {
 words! {
     /// Receivers of the PC's heartbeat (D-04, D-50).
     pub enum AliveMode {
-        /// A single broadcast frame.
+        /// The PC sends a single broadcast frame.
         Broadcast = "broadcast",
-        /// A frame to each board; boards ignore broadcast heartbeats.
+        /// The PC sends a frame to each board, and boards ignore broadcast heartbeats.
         Unicast = "unicast",
         /// Both.
         Both = "both",
@@ -146,7 +146,7 @@ words! {
 words! {
     /// Reaction of the PC if a board's heartbeat is missing (D-51).
     pub enum OnLost {
-        /// Only reports an event.
+        /// The PC only reports an event.
         Report = "report",
         /// Stops that board.
         StopBoard = "stop-board",

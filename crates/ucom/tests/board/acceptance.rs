@@ -1,5 +1,5 @@
-//! The acceptance table for boards: D-T1 to D-T16, D-T20 and D-T21. Rows with words on the wire run in both byte
-//! orders.
+//! The acceptance table for boards: D-T1 to D-T16, D-T20 and D-T21. Rows of the table that transmit 16-bit words
+//! are tested in both byte orders.
 
 use ucom::profile::Endian;
 use ucom::{Frame, Profile, Sequence, Status};
@@ -20,7 +20,7 @@ fn d_t1_reset_reports() {
     assert_eq!(sorted(bus.take()), frames(FIVE_REPORTS));
 }
 
-/// D-T2: PC_REPORT resets nothing.
+/// D-T2: PC_REPORT does not reset a board.
 #[test]
 fn d_t2_report_without_reset() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -33,7 +33,7 @@ fn d_t2_report_without_reset() {
     }
 }
 
-/// D-T3, D-06: a board without a number is silent.
+/// D-T3, D-06: a board without a number does not answer.
 #[test]
 fn d_t3_unnumbered_boards_are_silent() {
     let mut bus = Bus::one();
@@ -50,7 +50,7 @@ fn d_t3_unnumbered_boards_are_silent() {
     assert_eq!(bus.boards[0].status(), Status(0x11));
 }
 
-/// D-T4: boards get their numbers in the order of the wire.
+/// D-T4: boards get their numbers in the order of the chain.
 #[test]
 fn d_t4_numbers_follow_the_wire() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -63,7 +63,7 @@ fn d_t4_numbers_follow_the_wire() {
     assert_eq!(numbers, [Some(1), Some(2), None, None, None]);
 }
 
-/// D-T5, D-24: a repeated request is acknowledged again and changes nothing.
+/// D-T5, D-24: a repeated request is acknowledged again and has no other effect.
 #[test]
 fn d_t5_init_again() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -95,7 +95,7 @@ fn d_t7_mirror_bits_stay() {
         bus.send(text);
         assert_eq!(bus.status(1), 0x1B, "{text}");
     }
-    // They cannot be written while the loop runs either.
+    // The state bits cannot be written while the loop runs, either.
     let mut bus = Bus::running();
     for text in ["1C1#2000", "1C1#1010", "1C1#0010"] {
         bus.send(text);
@@ -103,7 +103,7 @@ fn d_t7_mirror_bits_stay() {
     }
 }
 
-/// D-T8, D-20, D-23: the status byte through all states.
+/// D-T8, D-20, D-23: the status byte is correct in every state.
 #[test]
 fn d_t8_status_walk() {
     let mut bus = Bus::one();
@@ -121,7 +121,7 @@ fn d_t8_status_walk() {
     assert_eq!(walk, [0x11, 0x1B, 0x1F, 0x8B, 0xAB, 0x8B, 0x1B, 0x11]);
 }
 
-/// D-T9, D-30: start with and without an application.
+/// D-T9, D-30: a board starts its application, or reports an error if it has no application.
 #[test]
 fn d_t9_start() {
     let mut bus = Bus::initialised();
@@ -137,8 +137,8 @@ fn d_t9_start() {
     assert_eq!(bus.status(1), 0x1B);
 }
 
-/// D-T10, D-36, D-12: the board sends the dimensions, and then one string for each signal. A frame with data is not a
-/// request.
+/// D-T10, D-36, D-12: the board sends the dimensions, and then one string for each signal. A frame with data is not
+/// treated as a request.
 #[test]
 fn d_t10_io_description() {
     let mut bus = Bus::started();
@@ -153,7 +153,7 @@ fn d_t10_io_description() {
             "581#020004000300 581#0200 581#55436F4D32206865 581#61642070616E 581#0100 581#706F735F736F6C6C"
         )
     );
-    // Counted independently of the board's code: a header of 2 bytes precedes each string.
+    // The test counts the packages independently of the board's code. A header of 2 bytes precedes each string.
     let mut strings = 0;
     let mut rest = received[1..].iter();
     while let Some(header) = rest.next() {
@@ -167,7 +167,7 @@ fn d_t10_io_description() {
     assert_eq!(bus.ask("581#00", 100), []);
 }
 
-/// D-T11, D-15: seven initial inputs in three packages.
+/// D-T11, D-15: a board sends seven initial inputs in three packages.
 #[test]
 fn d_t11_initial_inputs() {
     for endian in [Endian::Little, Endian::Big] {
@@ -186,7 +186,7 @@ fn d_t11_initial_inputs() {
     }
 }
 
-/// D-T12, D-34: the PC sends inputs with numbers beyond the last input.
+/// D-T12, D-34: a board ignores inputs with numbers beyond the last input.
 #[test]
 fn d_t12_inputs_beyond_the_dimension() {
     let mut bus = Bus::started();
@@ -237,7 +237,7 @@ fn d_t13_pc_lost() {
     assert!(bus.take().iter().any(|frame| frame.id() == 0x381));
 }
 
-/// D-T14, D-50: one missing heartbeat has no effect, three stop the board.
+/// D-T14, D-50: one missing heartbeat has no effect, and three missing heartbeats stop the board.
 #[test]
 fn d_t14_alive_for_a_minute() {
     let mut bus = Bus::started();
@@ -263,7 +263,7 @@ fn d_t15_bad_flags() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-T16, D-25: the hold-off of the autostart.
+/// D-T16, D-25: the application starts automatically only after the hold-off time.
 #[test]
 fn d_t16_autostart_can_be_held_off() {
     let chain = |steps: &[(&str, u64)]| {
@@ -283,9 +283,10 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(chain(&[("680#", 290), ("041#", 1)]), (0x5D, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#4000", 1)]), (0x19, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#0404", 1)]), (0x5D, frames("0C1#01")));
-    // The application starts once for each number: the same number again does not start it.
+    // The application starts only once for each number that the board gets: it does not start again if the board
+    // gets this number again.
     assert_eq!(chain(&[("680#", 600), ("1C1#8000", 10), ("281#", 10)]).0, 0x59);
-    // The application does not start before its time. A board without an application sends error 11.
+    // The application does not start before the hold-off time has passed. A board without an application sends error 11.
     let mut bus = Bus::one();
     bus.boards[0].store.autostart = true;
     bus.send("281#");
@@ -300,7 +301,7 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(bus.boards[0].status(), Status(0x59));
 }
 
-/// D-T20, D-24, D-06: a second request arrives while the acknowledgement still waits.
+/// D-T20, D-24, D-06: a second request arrives before the acknowledgement has been sent.
 #[test]
 fn d_t20_init_while_the_acknowledgement_waits() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());

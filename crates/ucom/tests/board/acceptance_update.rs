@@ -1,10 +1,10 @@
-//! The acceptance table for boards, D-T17 to D-T19: updates by raw frames.
+//! The acceptance table for boards, D-T17 to D-T19: updates of a board with raw frames.
 
 use ucom::{Frame, Profile, Status};
 
 use super::bus::{Bus, blocks, frames, header, image, sorted};
 
-/// D-T17, D-40, D-42: a complete update by raw frames, with the golden header.
+/// D-T17, D-40, D-42: a complete update with raw frames and the golden header.
 #[test]
 fn d_t17_update() {
     let mut bus = Bus::initialised();
@@ -26,7 +26,7 @@ fn d_t17_update() {
     assert_eq!(bus.ask("301#", 50)[0], frames("501#")[0]);
 }
 
-/// D-T18, D-43, D-41: the board reports each mistake once and is then silent.
+/// D-T18, D-43, D-41: the board reports each error of the PC once and then ignores program data.
 #[test]
 fn d_t18_mistakes_in_a_transfer() {
     let image = image();
@@ -134,7 +134,7 @@ fn d_t18_mistakes_in_a_transfer() {
         let before = bus.errors.len();
         mistake(&mut bus);
         bus.run(5);
-        // Forty frames that the PC had already sent.
+        // Forty frames that the PC sent before it received the error.
         for _ in 0..40 {
             bus.send("2C1#FFFFFFFFFFFFFFFF");
         }

@@ -1,4 +1,4 @@
-//! Times and rates of a running board, beyond the acceptance table.
+//! Tests of the times and rates of a running board that the acceptance table does not contain.
 
 use ucom::profile::CiLatch;
 use ucom::{Frame, FromBoard, Profile, Status, StringAssembler};
@@ -43,7 +43,7 @@ fn d05_shared_identifiers() {
     assert!(delays.len() >= 6, "{delays:?}");
 }
 
-/// D-33: all outputs are sent every 10 ms, in ascending order, as one snapshot.
+/// D-33: a board sends one snapshot of all outputs every 10 ms, in ascending order.
 #[test]
 fn d33_outputs() {
     let mut bus = Bus::running();
@@ -63,7 +63,7 @@ fn d33_outputs() {
     }
 }
 
-/// D-33: if the bus cannot carry the outputs, they are left out. The queue stays bounded.
+/// D-33: if the bus is too busy for the outputs, the board skips them. The queue stays bounded.
 #[test]
 fn d33_outputs_on_a_blocked_bus() {
     let mut bus = Bus::running();
@@ -174,8 +174,8 @@ fn d34_error_rate() {
     assert_eq!(bus.boards[0].counters().errors_dropped, 90);
 }
 
-/// D-14: a request that arrives during its own answer is answered after that answer. Packages of different strings
-/// are not mixed.
+/// D-14: if a request is repeated while it is being answered, the second answer follows after the first one.
+/// Packages of different strings are not mixed.
 #[test]
 fn d14_requests_during_their_answers() {
     let mut bus = Bus::started();
@@ -192,7 +192,7 @@ fn d14_requests_during_their_answers() {
     assert_eq!(bus.take(), [one.clone(), one].concat());
 }
 
-/// D-34, D-35: the control loop is called at its period while it runs, and at no other time.
+/// D-34, D-35: the control loop is called periodically while it runs, and is not called while it does not run.
 #[test]
 fn d35_control_cycles() {
     let mut bus = Bus::started();
@@ -207,7 +207,7 @@ fn d35_control_cycles() {
     assert_eq!(bus.boards[0].application.steps, steps);
 }
 
-/// The CAN controller causes errors 6 and 8.
+/// Events of the CAN controller cause errors 6 and 8.
 #[test]
 fn controller_troubles_are_reported() {
     let mut bus = Bus::initialised();
@@ -222,7 +222,7 @@ fn controller_troubles_are_reported() {
     assert_eq!(bus.take(), frames("0C1#01 081#06"), "INITACK is sent again");
 }
 
-/// `sent` and `not_sent` have an effect only for the frame that is in the CAN controller.
+/// `sent` and `not_sent` have an effect only if they name the frame that is in the CAN controller.
 #[test]
 fn other_frames_than_the_one_on_its_way_are_ignored() {
     let mut bus = Bus::initialised();
@@ -238,13 +238,13 @@ fn other_frames_than_the_one_on_its_way_are_ignored() {
     board.sent(now, &acknowledge);
     assert_eq!(board.poll(now), Some("081#07".parse().unwrap()), "and no DSP_ERROR 6 before it");
     assert_eq!(board.counters().not_sent, 0);
-    // The frame has been sent now, and is not sent a second time.
+    // The frame has been sent, and the board does not send it a second time.
     board.sent(now, &acknowledge);
     board.not_sent(now, &acknowledge);
     assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
 }
 
-/// D-38: while a program is not up yet, the board does not read its texts and does not drop them.
+/// D-38: while a program is starting, the board neither reads nor drops the texts of the program.
 #[test]
 fn d38_texts_of_a_program_that_is_not_up() {
     let mut bus = Bus::initialised();
@@ -259,8 +259,8 @@ fn d38_texts_of_a_program_that_is_not_up() {
     assert_eq!(bus.boards[0].counters().texts_dropped, 1, "up, and nobody wants it");
 }
 
-/// D-37: a change of the flag enables outputs. If the program has made its outputs safe, they stay safe when the PC
-/// repeats its flags.
+/// D-37: a change of the flag `active` enables the outputs. If the program has made its outputs safe, they stay
+/// safe when the PC repeats its flags.
 #[test]
 fn d37_repeated_flags_enable_nothing() {
     let mut bus = Bus::started();
@@ -274,12 +274,12 @@ fn d37_repeated_flags_enable_nothing() {
     assert!(bus.boards[0].application.active, "0 and 1 again");
 }
 
-/// Contract of [`ucom::node::Application`]: a program that was not started, or has been stopped, is not stopped again.
+/// Contract of [`ucom::node::Application`]: `stop` is called only for a program that runs.
 #[test]
 fn a_program_is_stopped_once() {
     for text in ["000#", "041#", "1C1#0800", "1C1#0404"] {
         let mut bus = Bus::initialised();
-        // Only a stop would change the flag.
+        // Only a stop would change the flag `running`.
         bus.boards[0].application.running = true;
         bus.send(text);
         assert!(bus.boards[0].application.running, "{text}");

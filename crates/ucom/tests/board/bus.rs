@@ -12,17 +12,18 @@ pub(super) const MS: u64 = 1000;
 pub(super) struct Bus {
     pub boards: Vec<Board>,
     pub now: u64,
-    /// Frames from the boards since the last `take`, with their times.
+    /// Frames that the boards have sent since the last `take`, with their times.
     pub received: Vec<(u64, Frame)>,
-    /// Every DSP_ERROR so far.
+    /// All DSP_ERROR frames since the start.
     pub errors: Vec<Frame>,
-    /// Frames that the bus does not send yet; their boards wait for `sent`.
+    /// Condition for frames that the bus delays; the boards of these frames wait for `sent`.
     pub hold: fn(&Frame) -> bool,
     pub held: Vec<(usize, Frame)>,
-    /// Number of the frame to the boards that is lost, counted from 0.
+    /// Index (from 0) of the frame from the PC to the boards that is lost.
     pub lose_to_boards: Option<usize>,
     pub frames_to_boards: usize,
-    /// Number of the frame from the boards that is lost, counted from 0. The board gets `sent` for it.
+    /// Index (from 0) of the frame from the boards that is lost. The board is told by `sent` that the lost frame was
+    /// sent.
     pub lose_from_boards: Option<usize>,
     pub frames_from_boards: usize,
 }
@@ -45,7 +46,7 @@ pub(super) fn application() -> MemoryApplication {
 pub(super) const GOLDEN: Record = Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 };
 
 impl Bus {
-    /// Boards with these flash numbers, programmed, powered up at time 0 and ready to listen.
+    /// Creates boards with these flash numbers that are programmed, powered up at time 0 and ready to listen.
     pub(super) fn new(flash_numbers: &[u16], profile: Profile) -> Self {
         let mut boards = Vec::new();
         for (flash_number, pins) in flash_numbers.iter().zip(WirePins::chain(flash_numbers.len())) {
@@ -76,14 +77,14 @@ impl Bus {
         Self::new(&[0x21], Profile::default())
     }
 
-    /// Returns a bus with a board that has number 1 and its pin on; `received` is empty.
+    /// Returns a bus with a board that has number 1 and an active outgoing pin; `received` is empty.
     pub(super) fn initialised() -> Self {
         let mut bus = Self::one();
         bus.number(1);
         bus
     }
 
-    /// Returns a bus with a board whose application is up.
+    /// Returns a bus with a board whose application has started.
     pub(super) fn started() -> Self {
         let mut bus = Self::initialised();
         bus.send("301#");
@@ -110,7 +111,7 @@ impl Bus {
         assert_eq!(self.take(), frames(&format!("{:03X}#{number:02X}", 0x0C0 + u16::from(number))));
     }
 
-    /// Puts a frame of the PC on the bus now.
+    /// Sends a frame of the PC immediately.
     pub(super) fn send(&mut self, text: &str) {
         self.send_frame(&text.parse().unwrap_or_else(|e| panic!("{text}: {e}")));
     }
@@ -135,12 +136,13 @@ impl Bus {
 
     pub(super) fn run_us(&mut self, us: u64) {
         let end = self.now + us;
-        // Number of steps in a row without a frame. Its limit below is far above the number of reasons to wake up.
+        // Number of consecutive steps without a frame. The limit below is much larger than the number of wake-ups
+        // that can be due at one time.
         let mut quiet = 0;
         loop {
             let now = self.now;
-            // Arbitration: every board offers a frame. The frame with the lowest identifier is sent first, and the
-            // others wait.
+            // Arbitration of the bus: every board offers a frame. The frame with the lowest identifier is sent
+            // first, and the other frames wait.
             let mut offers: Vec<(u16, usize, Frame)> = Vec::new();
             for (i, board) in self.boards.iter_mut().enumerate() {
                 if let Some(frame) = board.poll(now) {
@@ -184,7 +186,7 @@ impl Bus {
         self.check();
     }
 
-    /// Sends the held frames now.
+    /// Sends the delayed frames now.
     pub(super) fn release(&mut self) {
         self.hold = |_| false;
         for (i, frame) in std::mem::take(&mut self.held) {
@@ -206,7 +208,7 @@ impl Bus {
         std::mem::take(&mut self.received).into_iter().map(|(_, frame)| frame).collect()
     }
 
-    /// Sends a frame, waits, and returns the frames received since then.
+    /// Sends a frame, waits, and returns the frames received after it.
     pub(super) fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
         self.received.clear();
         self.send(text);

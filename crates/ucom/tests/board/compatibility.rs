@@ -11,7 +11,7 @@ fn with(change: impl FnOnce(&mut Profile)) -> Profile {
     profile
 }
 
-/// D-07: the other report modes.
+/// D-07: boards report in the modes that are not the default.
 #[test]
 fn d07_report_modes() {
     let mut bus = Bus::new(&[0x21], with(|p| p.report_mode = ReportMode::All4));
@@ -21,8 +21,8 @@ fn d07_report_modes() {
     assert_eq!(bus.ask("240#", 100), frames("401#21 400#42"));
 }
 
-/// Section 5.3: two boards get the same number if a board raises its pin by itself and the PC repeats PC_INIT without
-/// a check.
+/// Section 5.3: two boards get the same number if a board activates its pin without a command and the PC repeats
+/// PC_INIT without a check.
 #[test]
 fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     let numbers = |auto: bool, blind: bool| {
@@ -60,7 +60,7 @@ fn d23_xreset_forgets_the_number() {
     assert_eq!(bus.status(1), 0x5D);
 }
 
-/// D-10, D-13: the other byte order and the other way to count strings.
+/// D-10, D-13: boards with the other byte order and with the other way to count packages of strings.
 #[test]
 fn d10_d13_words_and_counts() {
     let profile = with(|p| {
@@ -73,7 +73,7 @@ fn d10_d13_words_and_counts() {
     assert_eq!(bus.ask("201#", 20), frames(expected));
 }
 
-/// D-15: the last package has no surplus words.
+/// D-15: with `pd_short_last`, the last package contains no unused words.
 #[test]
 fn d15_short_last_package() {
     let mut bus = Bus::new(&[0x21], with(|p| p.pd_short_last = true));
@@ -83,7 +83,8 @@ fn d15_short_last_package() {
     assert_eq!(bus.ask("5C1#", 20), frames("6C1#000000000000"));
 }
 
-/// D-04: numbers from 0 with 31 as the broadcast number, and a profile without a broadcast number.
+/// D-04: a profile whose numbers begin at 0 and whose broadcast number is 31, and a profile without a broadcast
+/// number.
 #[test]
 fn d04_other_addresses() {
     let profile = with(|p| {
@@ -128,7 +129,7 @@ fn d50_unicast_heartbeat() {
     assert!(!runs(AliveMode::Broadcast, "682#"));
 }
 
-/// D-12: a board that requires exact lengths.
+/// D-12: with `dlc.strict`, a board requires exact lengths.
 #[test]
 fn d12_strict_lengths() {
     let mut bus = Bus::new(&[0x21], with(|p| p.dlc_strict = true));
@@ -138,7 +139,7 @@ fn d12_strict_lengths() {
     assert_eq!(bus.ask("201#0000000000000000", 20).len(), 4);
 }
 
-/// D-02: foreign frames are counted and otherwise ignored.
+/// D-02: a board counts frames of other protocols and ignores them.
 #[test]
 fn d02_foreign_frames() {
     let mut bus = Bus::initialised();
@@ -164,7 +165,7 @@ fn d02_foreign_frames() {
     assert_eq!(bus.take(), []);
 }
 
-/// D-04: a board ignores the frames that boards send, for any number, and does not count them.
+/// D-04: a board ignores frames of other boards with any number, and does not count them.
 #[test]
 fn d04_boards_do_not_listen_to_boards() {
     let mut bus = Bus::initialised();

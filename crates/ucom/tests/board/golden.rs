@@ -4,7 +4,7 @@ use ucom::Profile;
 
 use super::bus::{Bus, MS, frames};
 
-/// A reset and the init of a chain of three boards.
+/// A reset and the numbering of a chain of three boards.
 #[test]
 fn golden_chain_of_three() {
     let mut bus = Bus::new(&[0x21, 0x42, 0x63], Profile::default());

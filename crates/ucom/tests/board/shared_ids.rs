@@ -1,5 +1,5 @@
-//! Identifiers that the PC and a board share (D-05), and answers of several frames whose text changes while they are
-//! sent.
+//! Identifiers that the PC and a board share (D-05), and answers of several frames whose text changes during the
+//! transmission.
 
 use proptest::prelude::*;
 use ucom::Profile;
@@ -32,7 +32,8 @@ fn acts() -> impl Strategy<Value = Vec<Act>> {
 }
 
 proptest! {
-    /// D-05: on a shared identifier a board begins to send no earlier than 2 ms after the PC's last frame there.
+    /// D-05: on a shared identifier a board begins to send no earlier than 2 ms after the PC's last frame with this
+    /// identifier.
     #[test]
     fn d05_never_within_2_ms_of_a_request(acts in acts()) {
         let mut bus = Bus::started();
@@ -44,15 +45,15 @@ proptest! {
                 Act::Send(text) => {
                     bus.send(text);
                     let id = u16::from_str_radix(&text[..3], 16).unwrap();
-                    // MCA_PC_START is entered under its own identifier, which only the PC uses. Its answer is
-                    // MCA_ADMIN_DATA.
+                    // MCA_PC_START is recorded with its own identifier, which only the PC uses. The answer to
+                    // MCA_PC_START is MCA_ADMIN_DATA.
                     asked.push((bus.now, id));
                 }
             }
         }
         bus.run(50);
         for (at, frame) in &bus.received {
-            // A dump begins with the dimensions. The remainder of a dump that is being sent follows at once (D-14).
+            // A dump begins with the dimensions. The remaining frames of a dump in progress follow at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());
@@ -63,7 +64,8 @@ proptest! {
     }
 }
 
-/// D-14: if its text becomes shorter meanwhile, an answer ends. Requests that arrived after it are then answered.
+/// D-14: if the text of an answer becomes shorter during the transmission, the answer ends. The board then answers
+/// later requests.
 #[test]
 fn d14_an_answer_ends_when_its_text_changes() {
     let long = "a description of more than one package, so that it can end early".to_owned();
@@ -76,7 +78,7 @@ fn d14_an_answer_ends_when_its_text_changes() {
                 bus.boards[0].store.description = long.clone().into_bytes();
                 bus.boards[0].application.texts.application = long.clone().into_bytes();
                 bus.send(request);
-                // After `after` frames of the answer have left, the text changes.
+                // The text changes after `after` frames of the answer have been sent.
                 while bus.received.iter().filter(|(_, f)| f.id() == id).count() < after {
                     bus.run_us(50);
                 }
@@ -101,8 +103,9 @@ fn d14_an_answer_ends_when_its_text_changes() {
     }
 }
 
-/// D-06, D-12: a board without a number reports no wrong lengths, even if it is strict, and does not answer.
-/// Otherwise all such boards would send the report at once with the same identifier.
+/// D-06, D-12: a board without a number does not report wrong lengths, even with `dlc.strict`, and does not
+/// answer. Otherwise all boards without a number would send the report at the same time with the same
+/// identifier.
 #[test]
 fn d06_d12_no_error_without_a_number() {
     let profile = Profile { dlc_strict: true, ..Profile::default() };

@@ -16,7 +16,7 @@ const STATES: [Phase; 7] = [
     Phase::Running,
 ];
 
-/// Returns board 1 (flash number 0x21) in a state, with nothing waiting on the bus.
+/// Returns board 1 (flash number 0x21) in a state, with no frame waiting on the bus.
 fn in_state(phase: Phase) -> Bus {
     let mut bus = match phase {
         Phase::Uninitialised => Bus::one(),
@@ -51,12 +51,13 @@ struct Seen {
 
 fn event(phase: Phase, text: &str) -> Seen {
     let mut bus = in_state(phase);
-    // In S6 the board sends the outputs every 10 ms; these are not answers.
+    // In S6 the board sends the outputs every 10 ms; output frames are not answers.
     let sent = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
     Seen { phase: bus.boards[0].phase(), sent }
 }
 
-/// Checks a row of the table. For each state, `expected` gives the state after the event and the frames sent.
+/// Checks a row of the table. For each state, `expected` returns the state after the event and the frames that the
+/// board sends.
 fn row(text: &str, expected: impl Fn(Phase) -> (Phase, &'static str)) {
     for phase in STATES {
         let seen = event(phase, text);
@@ -145,7 +146,7 @@ fn d22_set_status_prog_in_every_state() {
         Programming | Aborted => (Idle, ""),
         other => (other, ""),
     });
-    // PROG 0→1 ends the silence that follows an aborted transfer.
+    // After an aborted transfer, the board ignores program data until PROG changes from 0 to 1.
     let mut bus = in_state(Aborted);
     bus.send("1C1#0400");
     bus.send("1C1#0404");
@@ -173,7 +174,7 @@ fn d22_set_status_init_in_every_state() {
         assert_eq!(bus.boards[0].status(), Status(0x11), "{phase:?}");
         assert!(!bus.boards[0].application.active);
     }
-    // The change 0→1 gives the board no number.
+    // The change 0→1 of the bit INIT does not give the board a number.
     row("1C1#0808", |phase| (phase, ""));
 }
 
@@ -187,7 +188,7 @@ fn d43_pc_prog_in_every_state() {
     row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
 }
 
-/// D-12, D-06: a frame that is too short is reported, unless the board would ignore this message in any case.
+/// D-12, D-06: a frame that is too short is reported, unless the board ignores messages of this kind.
 #[test]
 fn d12_short_frames_in_every_state() {
     row("1C1#02", |phase| (phase, if phase == Uninitialised { "" } else { "081#07" }));
@@ -201,7 +202,7 @@ fn d12_short_frames_in_every_state() {
     }
 }
 
-/// D-12: with `dlc.strict` surplus data are reported as well.
+/// D-12: with `dlc.strict`, the board also reports surplus data.
 #[test]
 fn d12_long_frames_when_lengths_are_strict() {
     for (text, idle, ready) in [
@@ -252,7 +253,7 @@ fn d37_admin_in_every_state() {
         Ready | Running => (Running, "601#01010000"),
         other => (other, ""),
     });
-    // The flag `active` needs `run`; the other flags do not.
+    // The flag `active` can be set only with `run`; the other flags do not need `run`.
     row("600#00010101", |phase| match phase {
         Ready | Running => (Ready, "601#00000101"),
         other => (other, ""),
@@ -270,7 +271,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
             let taken = application.latched_ci[1] == 7 || application.par[1] == 7;
             assert_eq!(taken, matches!(phase, Ready | Running), "{text} in {phase:?}");
         }
-        // By broadcast they have no effect.
+        // Inputs and parameters that are sent by broadcast have no effect.
         let mut bus = in_state(phase);
         bus.send("340#010007000000");
         bus.send("3C0#010007000000");
@@ -307,7 +308,7 @@ fn d26_spontaneous_report() {
     }
 }
 
-/// D-21: only PC_SETSTATUS changes the pin. The pin is also switched off when the board loses its number.
+/// D-21: only PC_SETSTATUS changes the pin. The pin also becomes inactive when the board loses its number.
 #[test]
 fn d21_pin_of_the_next_board() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());
@@ -322,7 +323,7 @@ fn d21_pin_of_the_next_board() {
     assert!(!out(&bus));
 }
 
-/// D-42, D-43: between the cycles and after a cancelled transfer the board is in a state of the table.
+/// D-42, D-43: between the cycles and after a cancelled transfer the board is in one of the states of the table.
 #[test]
 fn d43_cancel_and_again() {
     let mut bus = in_state(Programming);
@@ -342,8 +343,8 @@ fn d43_cancel_and_again() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, 0x4B3F);
 }
 
-/// D-24: an acknowledgement is in the CAN controller when the board's number is removed. If the controller gives it up,
-/// it is not offered again, and the board can sleep.
+/// D-24: the board's number is removed while the acknowledgement is in the CAN controller. If the controller fails to
+/// send the acknowledgement, the board does not offer it again and can sleep.
 #[test]
 fn d24_no_acknowledge_without_a_number() {
     let mut bus = in_state(Idle);

@@ -1,5 +1,5 @@
-//! Exact times of one board: nothing happens a microsecond too early, and the board requests a wake-up for the exact
-//! time.
+//! Tests of the exact times of one board. The board does not act a microsecond too early, and it requests a wake-up
+//! for the exact time.
 
 use ucom::Frame;
 use ucom::node::{Phase, Store};
@@ -15,7 +15,7 @@ fn board(mut bus: Bus) -> (Board, u64) {
     (bus.boards.remove(0), bus.now)
 }
 
-/// Confirms offered frames at once and returns them.
+/// Confirms each offered frame at once, and returns all offered frames.
 fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     let mut left = Vec::new();
     while let Some(frame) = board.poll(now) {
@@ -26,7 +26,7 @@ fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     left
 }
 
-/// D-07: a board accepts frames when its boot has ended, and not earlier.
+/// D-07: a board does not accept frames before its boot is complete.
 #[test]
 fn d07_boot_time() {
     for after in ["power-up", "PC_RESET"] {
@@ -67,7 +67,7 @@ fn boot_waits_for_the_flash() {
     assert_eq!(board.next_deadline(), u64::MAX, "nothing to do");
 }
 
-/// D-43: frames of a block may be up to 200 ms apart, and not a microsecond more.
+/// D-43: the time between two frames of a block may be exactly 200 ms, but not a microsecond more.
 #[test]
 fn d43_pause_inside_a_block() {
     let (mut board, now) = board(Bus::initialised());
@@ -102,7 +102,7 @@ fn d42_block_time() {
     assert_eq!(board.next_deadline(), u64::MAX);
 }
 
-/// D-25: the application starts 500 ms after INITACK has left.
+/// D-25: the application starts 500 ms after INITACK has been sent.
 #[test]
 fn d25_hold_off() {
     let (mut board, now) = board(Bus::one());
@@ -125,7 +125,8 @@ fn d25_hold_off() {
     assert_eq!((flush(&mut board, start), board.phase()), (vec![], Phase::Idle));
 }
 
-/// D-33, D-35, D-50, D-51: the periodic actions of a running board, and its stop when the PC's heartbeat is missing.
+/// D-33, D-35, D-50, D-51: times of the periodic actions of a running board, and of its stop when the PC's heartbeat
+/// is missing.
 #[test]
 fn d33_d35_d50_d51_beats() {
     let (mut board, start) = board(Bus::started());
@@ -136,21 +137,21 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(board.next_deadline(), alive + 1000 * MS);
     let now = alive;
     board.receive(now, &frame("541#"));
-    // The answer to the start comes 2 ms later, after the first control cycle.
+    // The board answers the start command 2 ms later, after the first control cycle.
     assert_eq!(board.next_deadline(), now + MS);
     assert_eq!((flush(&mut board, now + MS - 1), board.application.steps), (vec![], 0));
     assert_eq!((flush(&mut board, now + MS), board.application.steps), (vec![], 1));
     assert_eq!(flush(&mut board, now + 2 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 2 * MS), frames("601#01000000"));
     assert_eq!(board.application.steps, 2);
-    // Missed cycles are left out; the later ones keep their times.
+    // Missed cycles are skipped; later cycles run at their planned times.
     assert_eq!((flush(&mut board, now + 7 * MS + 300), board.application.steps), (vec![], 3));
     assert_eq!(board.next_deadline(), now + 8 * MS);
     assert_eq!(flush(&mut board, now + 10 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 10 * MS).len(), 2, "all outputs");
     assert_eq!(flush(&mut board, now + 20 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 20 * MS).len(), 2);
-    // No frame from the PC arrives.
+    // During the following time, no frame arrives from the PC.
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
     board.poll(now + 1500 * MS);
@@ -169,8 +170,8 @@ fn d50_heartbeat_of_the_pc() {
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// If a frame becomes due while another is in the CAN controller, it is offered as soon as the other has been sent:
-/// the board does not sleep.
+/// If a frame becomes due while another is in the CAN controller, the board offers it as soon as the other frame
+/// has been sent, without sleeping.
 #[test]
 fn what_waits_goes_when_the_frame_before_has_left() {
     let programming = || {
@@ -218,7 +219,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
         assert!(board.next_deadline() <= now, "{what}: {} at {now}", board.next_deadline());
         assert_eq!(board.poll(now), Some(frame(expected)), "{what}");
     }
-    // The acknowledgement itself waits, and the frame before it is an error.
+    // The acknowledgement is the waiting frame, and the frame before it is an error.
     let mut bus = Bus::initialised();
     bus.hold = |_| true;
     bus.send("1C1#00");
@@ -227,7 +228,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     let (mut waiting, now) = board(bus);
     waiting.sent(now, &frame("081#07"));
     assert_eq!((waiting.next_deadline(), waiting.poll(now)), (0, Some(acknowledge)));
-    // The two answers of a transfer.
+    // The test also covers the two answers of a transfer.
     let (whole, last) = last_block();
     let first = super::bus::blocks(&[1; 64], &ucom::Profile::default())[0];
     for (mut bus, data, expected) in [(programming(), first, "181#"), (whole, last, "101#")] {
@@ -240,7 +241,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     }
 }
 
-/// D-36: after the last package of a dump the board has nothing to do, whatever the number of inputs.
+/// D-36: after the last package of a dump, no action of the board is due, for any number of inputs.
 #[test]
 fn d36_a_dump_ends_with_its_last_package() {
     for (dimension, packages) in [(0, 0), (1, 1), (2, 1), (3, 1), (4, 2), (6, 2), (7, 3)] {
@@ -265,13 +266,15 @@ fn d36_a_dump_ends_with_its_last_package() {
     }
 }
 
-/// D-14: the packages of an answer follow one another without a pause. After the last package nothing is due at once.
+/// D-14: the packages of an answer follow one another without a pause. After the last package, no action of the board
+/// is due at once.
 #[test]
 fn d14_packages_follow_back_to_back() {
     type Case = (&'static str, fn() -> Bus, &'static str, u16, usize);
     let cases: [Case; 5] = [
         ("info", Bus::initialised, "201#", 0x141, 4),
-        // The dimensions, a name of two packages and nine names of one package, each with its header.
+        // The answer consists of the dimensions, a name of two packages and nine names of one package; each name has
+        // a header.
         ("description", Bus::started, "581#", 0x581, 1 + 3 + 2 * 9),
         ("inputs", Bus::started, "5C1#", 0x6C1, 1),
         ("outputs", Bus::running, "", 0x381, 2),
@@ -308,8 +311,8 @@ fn d14_packages_follow_back_to_back() {
     }
 }
 
-/// D-42, D-44: the steps after the last block of an update. Each step is short. The flash is polled every 500 µs, and
-/// the read-back continues without a pause, 1024 bytes at a time.
+/// D-42, D-44: each step that follows the last block of an update is short. The flash is polled every 500 µs. The
+/// image is read back in steps of 1024 bytes without a pause.
 #[test]
 fn d44_steps_after_the_last_block() {
     let mut bus = Bus::initialised();
@@ -343,7 +346,7 @@ fn d44_steps_after_the_last_block() {
 /// state 0 is replaced by 1.
 #[test]
 fn d05_random_delays() {
-    // The published sequence from state 1.
+    // The published sequence of random numbers that begins at state 1.
     let expected = [270_369, 67_634_689, 2_647_435_461u32, 307_599_695, 2_398_689_233];
     let mixed = 0x21u32.wrapping_mul(0x9E37_79B9);
     for seed in [mixed ^ 1, mixed] {

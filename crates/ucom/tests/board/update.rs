@@ -1,5 +1,5 @@
-//! Updates with faults: power loss at each flash operation, a loss of each single frame, and flash errors. Also other
-//! plans.
+//! Updates with faults: power loss during each flash operation, loss of each single frame, and flash errors. Also
+//! other plans.
 
 use ucom::node::Phase;
 use ucom::profile::{Endian, HeaderForm, Plan};
@@ -7,12 +7,12 @@ use ucom::{Checksum, Memory, Profile, Status};
 
 use super::bus::{Bus, GOLDEN, blocks, frames, header, image};
 
-/// Returns 200 bytes: four data blocks, the last one short.
+/// Returns an image of 200 bytes, which fills three data blocks and a part of the fourth.
 pub(super) fn small() -> Vec<u8> {
     (0..200u32).map(|i| (i * i % 251) as u8).collect()
 }
 
-/// Sends all blocks and waits for an answer after each one, whatever the answer is. Returns `true` if FINISHED came.
+/// Sends all blocks and waits for any answer after each block. Returns `true` if the board has sent PROGFINISHED.
 pub(super) fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.send("041#");
     bus.run(1);
@@ -27,7 +27,7 @@ pub(super) fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     finished
 }
 
-/// Checks that the record of a valid application belongs to a complete image: the old one or the new one.
+/// Checks that the record of a valid application belongs to a complete image, either the old or the new image.
 pub(super) fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     let board = &bus.boards[0];
     let stored = board.flash.bytes(Memory::Program);
@@ -38,7 +38,7 @@ pub(super) fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     }
 }
 
-/// D-45, D-46: the power fails in the middle of a flash operation, for each operation in turn.
+/// D-45, D-46: the power fails during a flash operation; the test repeats this for each operation.
 #[test]
 fn d45_power_loss_at_every_flash_operation() {
     let image = small();
@@ -46,7 +46,7 @@ fn d45_power_loss_at_every_flash_operation() {
     let mut whole = Bus::initialised();
     assert!(update(&mut whole, &all));
     let operations = whole.boards[0].flash.operations;
-    // The record is cleared, the area erased, four blocks and the record written.
+    // The seven operations clear the record, erase the area, write four blocks and write the record.
     assert_eq!(operations, 7);
     for cut in 0..operations {
         let mut bus = Bus::initialised();
@@ -69,7 +69,7 @@ fn d45_power_loss_at_every_flash_operation() {
     }
 }
 
-/// D-46: power loss in cycle 1 changes nothing.
+/// D-46: a power loss in cycle 1 does not change the flash.
 #[test]
 fn d46_power_loss_in_the_first_cycle() {
     let all = blocks(&small(), &Profile::default());
@@ -87,7 +87,7 @@ fn d46_power_loss_in_the_first_cycle() {
     }
 }
 
-/// D-43, D-44: each single frame of an update is lost once, in both directions.
+/// D-43, D-44: the test repeats an update and loses another single frame each time, in both directions.
 #[test]
 fn d43_every_frame_lost_once() {
     let image = small();
@@ -100,7 +100,7 @@ fn d43_every_frame_lost_once() {
     for lost in first..whole.frames_to_boards {
         let mut bus = Bus::initialised();
         bus.lose_to_boards = Some(lost);
-        // Without PC_XRESET the board accepts no block. Without a data frame the checks fail.
+        // If PC_XRESET is lost, the board does not accept a block. If a data frame is lost, the checks fail.
         assert!(!update(&mut bus, &all), "lost {}", lost - first);
         bus.run(1000);
         assert_no_half_image(&bus, &image, &format!("lost {}", lost - first));
@@ -119,7 +119,7 @@ fn d43_every_frame_lost_once() {
     }
 }
 
-/// The flash fails: error 3, and the application that is valid afterwards.
+/// If a flash operation fails, the board sends error 3. The test also checks which application is valid afterwards.
 #[test]
 fn d45_failing_flash() {
     let all = blocks(&small(), &Profile::default());
@@ -135,7 +135,7 @@ fn d45_failing_flash() {
     }
 }
 
-/// D-43: the block buffer is in use until READY has left the controller.
+/// D-43: the block buffer is in use until the CAN controller has sent READY.
 #[test]
 fn d43_frame_before_ready_has_left() {
     let mut bus = Bus::initialised();
@@ -161,7 +161,8 @@ fn d44_flash_is_read_back() {
     }
 }
 
-/// D-42: READY after the header of cycle 2 waits for the erase. Meanwhile the board answers other requests.
+/// D-42: after the header of cycle 2, the board sends READY when the erase is complete. During the erase, the board
+/// answers other requests.
 #[test]
 fn d42_long_erase_blocks_nothing() {
     let all = blocks(&small(), &Profile::default());
@@ -179,7 +180,7 @@ fn d42_long_erase_blocks_nothing() {
     }
     bus.run(1000);
     assert_eq!(bus.take(), frames("181#"));
-    // The board is reset in the middle of an erase. It accepts frames when the flash is done.
+    // The board is reset during an erase. After the reset, the board accepts frames when the erase is complete.
     let mut bus = Bus::initialised();
     bus.boards[0].flash.erase_us = 8_000_000;
     bus.send("041#");
@@ -192,7 +193,7 @@ fn d42_long_erase_blocks_nothing() {
     assert!(!bus.boards[0].has_application());
 }
 
-/// D-40: the plan exloader-app writes RAM first. The flash does not change until cycle 2.
+/// D-40: the plan exloader-app first writes the exloader to RAM. The flash does not change until cycle 2.
 #[test]
 fn d40_exloader_then_application() {
     let profile = Profile { prog_plan: Plan::ExloaderApp, ..Profile::default() };
@@ -223,7 +224,8 @@ pub(super) fn data(image: &[u8]) -> Vec<[u8; 64]> {
     (0..).map_while(|i| ucom::data_block(image, i)).collect()
 }
 
-/// D-40: the plan pmem-xmem writes two memories for one application, which is valid when both are written.
+/// D-40: the plan pmem-xmem writes two memories for one application. The application is valid when both memories are
+/// written.
 #[test]
 fn d40_program_then_data_memory() {
     let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };
@@ -278,7 +280,7 @@ fn d41_no_header() {
     assert_no_half_image(&bus, &image, "");
     let id = ucom::checksum(Checksum::Crc16, Endian::Little, &image);
     assert_eq!(bus.boards[0].record().unwrap().program_id, id);
-    // A difference between the two cycles is detected.
+    // The board detects a difference between the images of the two cycles.
     bus.send("041#");
     let mut other = image.clone();
     other[3] ^= 1;
@@ -288,7 +290,7 @@ fn d41_no_header() {
     assert_eq!(bus.errors, frames("081#01"));
 }
 
-/// D-44, D-10: a complete update with each of the other checksums and with the other byte order.
+/// D-44, D-10: a complete update with each checksum and byte order that is not the default.
 #[test]
 fn d44_update_in_other_profiles() {
     for (checksum, endian) in [
@@ -309,7 +311,7 @@ fn d44_update_in_other_profiles() {
     }
 }
 
-/// D-40: the plan raw accepts two different files, as their headers require; the first is only checked.
+/// D-40: the plan raw accepts two different files, as their headers require. The first file is only checked.
 #[test]
 fn d40_raw_takes_two_files() {
     let profile = Profile { prog_plan: Plan::Raw, ..Profile::default() };
@@ -327,8 +329,8 @@ fn d40_raw_takes_two_files() {
     assert_no_half_image(&bus, &two, "");
 }
 
-/// D-43: the checksum detects reordered frames of a block. CAN adapters with several mailboxes may send frames in
-/// another order.
+/// D-43: the checksum detects reordered frames of a block. CAN adapters with several mailboxes may change the
+/// order of frames.
 #[test]
 fn d43_reordered_frames_are_refused() {
     let image = small();

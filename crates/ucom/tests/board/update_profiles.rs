@@ -24,7 +24,7 @@ fn headerless_in(flash: MemoryFlash, plan: Plan, headerless_words: u32) -> Bus {
     bus
 }
 
-/// D-40, D-41: without header blocks the plan determines the memories of its cycles, and the image whose Program ID
+/// D-40, D-41: without header blocks the plan determines the memories of its cycles, and which image's Program ID
 /// is recorded.
 #[test]
 fn d41_no_header_in_every_plan() {
@@ -52,8 +52,8 @@ fn d41_no_header_in_every_plan() {
     }
 }
 
-/// D-41: an image without a header has the configured length, limited to the length of the area, and starts at the
-/// start of the area.
+/// D-41: an image without a header has the configured length, limited to the length of the area. Its address is
+/// the start of the area.
 #[test]
 fn d41_no_header_fills_the_area() {
     let image: Vec<u8> = (0..128).collect();
@@ -72,7 +72,7 @@ fn d41_no_header_fills_the_area() {
     }
 }
 
-/// D-44: with the checksum `none` the board takes the number in the header unchanged, and reports it.
+/// D-44: with the checksum `none` the board stores and reports the Program ID in the header unchanged.
 #[test]
 fn d44_program_id_as_the_header_says() {
     let profile = Profile { prog_checksum: Checksum::None, ..Profile::default() };
@@ -91,12 +91,13 @@ fn d44_program_id_as_the_header_says() {
     assert_eq!(bus.info(1).map(|info| info.program_id), Some(0xC0DE));
 }
 
-/// D-43: PROG 1→0 ends a transfer. Only PROG 0→1 ends the silence after an error.
+/// D-43: a transfer ends when PROG changes from 1 to 0. After an error, the board accepts program data again only
+/// when PROG changes from 0 to 1.
 #[test]
 fn d43_silence_lasts_until_programming_is_enabled_again() {
     let mut bus = Bus::initialised();
     bus.send("041#");
-    // This block is not a header.
+    // The block is not a valid header.
     assert_eq!(bus.block(&[0; 64], 5), frames("081#05"));
     bus.send("1C1#0400");
     assert_eq!(bus.ask("2C1#0011223344556677", 5), [], "silent although PROG is 0");
@@ -138,7 +139,7 @@ fn d41_headers_of_the_first_cycle() {
     }
 }
 
-/// D-40, D-41: headers of the second cycle, after a valid first cycle.
+/// D-40, D-41: headers that a board accepts or refuses in the second cycle, after a valid first cycle.
 #[test]
 fn d41_headers_of_the_second_cycle() {
     let (program, data, ram) = (0, 1, 0x10);
@@ -169,7 +170,7 @@ fn d41_headers_of_the_second_cycle() {
     }
 }
 
-/// A board that has accepted the first block, and whose READY has not been sent yet; and the blocks.
+/// Returns a board that has accepted the first block but has not sent READY yet, and the blocks of the update.
 fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     let all = blocks(&small(), &Profile::default());
     let mut bus = Bus::initialised();
@@ -186,7 +187,7 @@ fn receive_at_once(bus: &mut Bus, block: &[u8; 64]) {
     }
 }
 
-/// D-43: if the CAN controller gives up READY, the block buffer is free and the PC may send again.
+/// D-43: if the CAN controller fails to send READY, the block buffer is free and the PC may send a block again.
 #[test]
 fn d43_ready_that_was_given_up() {
     let (mut bus, all) = ready_held();
@@ -200,8 +201,8 @@ fn d43_ready_that_was_given_up() {
     assert_eq!(bus.block(&all[2], 10), frames("181#"));
 }
 
-/// D-43: the READY of a cancelled transfer is sent while the first block of the next transfer is processed. The board
-/// still accepts that block.
+/// D-43: if the READY of a cancelled transfer is sent while the board processes the first block of the next transfer,
+/// the board still accepts that block.
 #[test]
 fn d43_ready_of_the_transfer_before() {
     let (mut bus, all) = ready_held();
@@ -223,7 +224,7 @@ fn d42_block_time_without_header() {
     assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
 }
 
-/// D-23, D-42: a READY that still waits when its transfer is cancelled is not sent, because the PC would assign it to
+/// D-23, D-42: if a transfer is cancelled, a READY that still waits is not sent. The PC would assign this READY to
 /// the next transfer.
 #[test]
 fn d42_no_ready_of_a_transfer_that_is_no_more() {

@@ -1,7 +1,8 @@
-//! Measurements of a board's program, counted on the emulated chip: instructions, interrupt latencies, stack.
+//! Measurements of a board's program on the emulated chip: instruction counts, interrupt latencies and stack use.
 //!
-//! `cargo run --release --example figures -- ELF [--cycles]` prints the same lines on every machine. `--cycles` adds an
-//! estimate for one control step, from llvm-mca's model of the Cortex-M7, which depends on the version of LLVM.
+//! `cargo run --release --example figures -- ELF [--cycles]` prints identical lines on every computer. `--cycles` adds
+//! an estimate for one control step, from llvm-mca's model of the Cortex-M7. The estimate depends on the version of
+//! LLVM.
 #[path = "figures/cycles.rs"]
 mod cycles;
 #[path = "../tests/rig/mod.rs"]
@@ -84,7 +85,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let observers = &machine.chip().observers;
     println!("  with a host at {} Bd on each line, the arm moving:", version.baud);
     handlers(observers)?;
-    // The tick is delayed only while interrupts are masked.
+    // Only code that masks interrupts can delay the tick.
     let late = mask * 1_000_000_000 / u64::from(version.core_hz);
     println!("    interrupts are masked for at most {mask} instructions = {late} ns");
     if late > LATENCY_MAX {
@@ -105,7 +106,8 @@ fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
     Ok((top, 0x2000_0000))
 }
 
-/// Prints for each handler its instructions (without handlers that interrupt it), its latency and its stack.
+/// Prints the instruction count, the latency and the stack use of each handler. Instructions of handlers that
+/// interrupt it are not counted.
 fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     for (name, number) in HANDLERS {
         let (count, latency) = (observers.handlers[number], observers.latencies[number]);

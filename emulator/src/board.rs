@@ -33,13 +33,13 @@ pub struct BoardConfig {
     pub sim: SimConfig,
     /// `true` if no other node is on the joint bus.
     pub no_bus: bool,
-    /// Rate of the hosts' serial lines, bit/s.
+    /// Bit rate of both hosts' serial lines, bit/s.
     pub baud: u32,
-    /// Safety input and safety output.
+    /// Pins of the safety input and the safety output.
     pub safety_pins: (Pin, Pin),
     /// Seed of the initial contents of RAM.
     pub seed: u64,
-    /// Previous contents of flash bank 2; the program's own part overwrites them.
+    /// Initial contents of flash bank 2; the program's data in bank 2 overwrite them.
     pub bank2: Bank2,
 }
 
@@ -56,7 +56,7 @@ impl Default for BoardConfig {
     }
 }
 
-/// The plant as nodes of the bus.
+/// The plant (arm, drives and gripper) as nodes of the joint bus.
 struct Nodes {
     plant: Rc<RefCell<Plant>>,
     answers: Vec<jtc_sim::ReadyAnswer>,
@@ -108,7 +108,7 @@ impl Board {
         Self { machine, plant, faults: Vec::new(), safety: config.safety_pins, ms: 0 }
     }
 
-    /// Returns the milliseconds since power-on.
+    /// Returns the time since power-on, ms.
     pub fn now_ms(&self) -> u64 {
         self.ms
     }
@@ -133,8 +133,8 @@ impl Board {
         self.plant.borrow()
     }
 
-    /// Begins a fault of a node, of the arm, of the safety input or of the bus. Faults (`FaultKind`) of the simulator's
-    /// own serial line and tick have no effect here.
+    /// Starts a simulated fault of a node, the arm, the safety input or the bus. Faults (`FaultKind`) of the
+    /// simulator's own serial line and tick have no effect here.
     pub fn inject(&mut self, kind: FaultKind) {
         self.plant.borrow_mut().begin(kind);
         self.faults.push(kind);
@@ -190,14 +190,14 @@ impl Board {
         self.machine.uc.get_data().usarts[Self::index(port)].baud()
     }
 
-    /// Sends bytes from the host, after bytes that are already waiting.
+    /// Sends bytes from the host after the bytes that already wait for transmission.
     pub fn write(&mut self, port: Port, bytes: &[u8]) {
         let chip = self.machine.chip();
         let now = chip.now();
         chip.usarts[Self::index(port)].host_write(now, bytes);
     }
 
-    /// Returns the number of host bytes that have not been transmitted on the line yet.
+    /// Returns the number of host bytes that still wait for transmission on the serial line.
     pub fn pending(&self, port: Port) -> usize {
         self.machine.uc.get_data().usarts[Self::index(port)].host_pending()
     }

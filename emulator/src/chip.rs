@@ -1,4 +1,4 @@
-//! Everything around the core: the peripherals' address map, clocks and interrupt lines, and virtual time.
+//! The chip around the core: address map, clocks and interrupt lines of the peripherals, and virtual time.
 mod access;
 mod map;
 
@@ -31,7 +31,7 @@ const USART_LINES: [usize; 2] = [38, 39];
 /// Interrupt lines of FDCAN1.
 const FDCAN_LINES: [usize; 2] = [19, 21];
 
-/// Number of accesses to a register without a model.
+/// Accesses to a register that the emulator does not model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Access {
     /// Reads.
@@ -44,7 +44,7 @@ pub struct Access {
     pub value: u32,
 }
 
-/// State of the core that the hook before every instruction accesses.
+/// State of the core that is used by the hook that runs before every instruction.
 #[derive(Default)]
 pub struct Core {
     /// Instructions executed.
@@ -59,7 +59,7 @@ pub struct Core {
     pub it_block: Range<u32>,
     /// `true` if a stop was requested.
     pub stopping: bool,
-    /// `true` after a change that the main loop must handle before the next instruction.
+    /// `true` if the main loop must handle a change before the next instruction.
     pub attention: bool,
     /// `true` if a pending exception is blocked only by masks.
     pub masked: bool,
@@ -67,7 +67,7 @@ pub struct Core {
     pub check_sp: bool,
     /// Event register.
     pub event: bool,
-    /// Number of an exception that the core raised itself.
+    /// Number of an exception that an instruction raised.
     pub raised: Option<u32>,
     /// Address of an access that failed.
     pub fault_address: u32,
@@ -81,7 +81,7 @@ pub struct Core {
 pub struct Chip {
     /// Core.
     pub core: Core,
-    /// Classes of the instructions in memory.
+    /// Class of each instruction in memory.
     pub code: Code,
     /// Interrupts.
     pub nvic: Nvic,
@@ -108,7 +108,7 @@ pub struct Chip {
     /// Observers.
     pub observers: Observers,
     plain: Plain,
-    /// Registers without a model, by address.
+    /// Accesses to registers that the emulator does not model, by address.
     pub unknown: BTreeMap<u32, Access>,
     /// Accesses to peripherals whose clock is off.
     pub unclocked: BTreeMap<u32, Access>,
@@ -202,7 +202,7 @@ impl Chip {
         }
     }
 
-    /// Sets everything except memory to the state after a reset with these reset flags.
+    /// Resets everything except memory, with these reset flags.
     pub fn reset(&mut self, flags: u32) {
         let now = self.now();
         self.rcc.reset(flags);
@@ -243,7 +243,7 @@ impl Chip {
         }
     }
 
-    /// Executes all events up to now, and sets the interrupt lines accordingly.
+    /// Executes all events that are due, and updates the interrupt lines.
     pub fn advance(&mut self, memory: &mut dyn Memory) {
         let now = self.now();
         for timer in &mut self.timers {

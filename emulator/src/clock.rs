@@ -1,16 +1,16 @@
-//! Virtual time. With its resolution, the period of every clock on the board is a whole number.
+//! Virtual time. In its unit, the grain, the period of every clock on the board is a whole number.
 
-/// Point or duration in virtual time, in grains: 1 s = [`SECOND`] grains.
+/// Point in virtual time or duration, in grains; 1 s = [`SECOND`] grains.
 pub type Time = u64;
 
-/// Grains per second: the least common multiple of 64, 85, 400 and 480 MHz, so that core clock, CAN bits and timer
-/// ticks do not drift against each other through rounding.
+/// Grains per second: the least common multiple of 64, 85, 400 and 480 MHz, so that rounding does not cause drift
+/// between core clock, CAN bits and timer ticks.
 pub const SECOND: Time = 81_600_000_000;
 /// Grains per millisecond.
 pub const MILLISECOND: Time = SECOND / 1_000;
 /// Grains per microsecond.
 pub const MICROSECOND: Time = SECOND / 1_000_000;
-/// Time that is never reached.
+/// Time value for events that never occur.
 pub const NEVER: Time = Time::MAX;
 
 /// Returns the period of a clock, rounded to the nearest grain.
@@ -18,17 +18,17 @@ pub fn period(hz: u64) -> Time {
     (SECOND + hz / 2).checked_div(hz).unwrap_or(NEVER)
 }
 
-/// Converts to whole microseconds.
+/// Converts a time to whole microseconds.
 pub fn to_us(time: Time) -> u64 {
     time / MICROSECOND
 }
 
-/// Converts to nanoseconds, rounded down.
+/// Converts a time to nanoseconds, rounded down.
 pub fn to_ns(time: Time) -> u64 {
     (u128::from(time) * 1_000_000_000 / u128::from(SECOND)) as u64
 }
 
-/// Converts from nanoseconds, rounded down to the grain.
+/// Converts nanoseconds to a time, rounded down to the grain.
 pub fn from_ns(ns: u64) -> Time {
     (u128::from(ns) * u128::from(SECOND) / 1_000_000_000) as u64
 }

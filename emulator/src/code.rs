@@ -1,26 +1,26 @@
 //! Properties of an instruction that the machine must know before executing it, stored per address.
 //!
 //! Unicorn executes `SEV` without effect, does not report changes of the stack pointer, and skips the instructions of
-//! an IT block whose condition is false. These few instructions are therefore recognised by their first half-words when
-//! an address is executed for the first time.
+//! an IT block whose condition is false. When an address is executed for the first time, the machine therefore
+//! recognises these instructions by their first half-word.
 
 /// The address has not been checked yet.
 pub const UNKNOWN: u16 = 0;
 /// An instruction without special handling.
 pub const PLAIN: u16 = 1;
-/// Sets the event register.
+/// Instruction that sets the event register.
 pub const SEV: u16 = 2;
-/// May lower the stack pointer.
+/// Instruction that may lower the stack pointer.
 pub const LOWERS_SP: u16 = 4;
-/// An observer waits for this address.
+/// An observer watches this address.
 pub const WATCHED: u16 = 8;
-/// Begins an IT block. All instructions of the block are counted with it, because the core fetches and issues them all,
-/// regardless of the condition.
+/// Instruction that begins an IT block. All instructions of the block are counted with the first one, because the core
+/// fetches and issues every instruction regardless of its condition.
 pub const IT: u16 = 16;
 /// Instruction inside an IT block.
 pub const MEMBER: u16 = 32;
-/// Bit positions in the class of an IT instruction: number of instructions in the block, and number of their
-/// half-words.
+/// Bit positions of two numbers in the class of an IT instruction: the instructions in the block, and the
+/// half-words of these instructions.
 const MEMBERS: u32 = 8;
 const HALF_WORDS: u32 = 12;
 
@@ -59,7 +59,8 @@ impl Code {
         self.itcm.get_mut(address as usize / 2)
     }
 
-    /// Stores a class. Keeps the marks for observers and for instructions inside an IT block.
+    /// Stores the class of an address. Does not change the marks for observers and for instructions inside an IT
+    /// block.
     pub fn learn(&mut self, address: u32, class: u16) {
         if let Some(place) = self.place(address) {
             *place = class | *place & (WATCHED | MEMBER);
@@ -119,8 +120,8 @@ pub fn classify(first: u16, second: u16) -> u16 {
     }
 }
 
-/// Returns the size of the IT block that an instruction of this class begins: number of instructions, and length in
-/// bytes.
+/// Returns the number of instructions and the length in bytes of the IT block that an instruction of this class
+/// begins.
 pub fn block(class: u16) -> (u32, u32) {
     (u32::from(class >> MEMBERS) & 7, 2 * (u32::from(class >> HALF_WORDS) & 15))
 }
@@ -130,14 +131,14 @@ pub fn begins_block(members: u32, bytes: u32) -> u16 {
     IT | ((members << MEMBERS) | ((bytes / 2) << HALF_WORDS)) as u16
 }
 
-/// Returns the number of instructions in the IT block that an instruction with this first half-word begins; 0 if it
-/// does not begin one.
+/// Returns the number of instructions in the IT block that an instruction with this first half-word begins, or 0 if
+/// no IT block begins.
 pub fn it_block(first: u16) -> u32 {
     // The lowest set bit of the mask ends the block. If no bit is set, the instruction is a hint.
     if first & 0xFF00 == 0xBF00 && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 }
 }
 
-/// Returns the length in bytes of an instruction from its first half-word.
+/// Returns the length (in bytes) of the instruction with this first half-word.
 pub fn length(first: u16) -> u32 {
     if first >= 0xE800 { 4 } else { 2 }
 }

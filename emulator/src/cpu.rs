@@ -1,8 +1,9 @@
 //! The Cortex-M7 core. Unicorn executes the instructions; the loop in this module provides time, exceptions and sleep.
 //!
-//! Every instruction takes one cycle of the core clock. A hook before each instruction counts it and stops the run
-//! exactly when the next event is due. An IT block is counted at its beginning with all its instructions, because the
-//! hardware also takes time for instructions that the condition skips. An IT block is never interrupted.
+//! Every instruction takes one cycle of the core clock. A hook runs before each instruction. The hook counts the
+//! instruction and stops the execution exactly when the next event is due. All instructions of an IT block are
+//! counted at its beginning, because the hardware also takes time for instructions whose condition is false. An IT
+//! block is never interrupted.
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, uc_error};
 use unicorn_engine::{ArmCpuModel, RegisterARM, Unicorn};
 
@@ -30,8 +31,8 @@ mod raised {
 const EXC_RETURN: u32 = 0xFFFF_FFE0;
 
 impl Machine {
-    /// Creates a board with this firmware in its flash, and switches the power on. `seed` determines the initial
-    /// contents of RAM.
+    /// Creates a machine with this firmware in its flash, and switches the power on. `seed` determines the
+    /// initial contents of RAM.
     ///
     /// # Panics
     /// If Unicorn refuses its configuration, which no input can cause.
@@ -61,7 +62,7 @@ impl Machine {
         machine
     }
 
-    /// Runs until a point in virtual time.
+    /// Runs the machine until a point in virtual time.
     pub fn run_until(&mut self, end: Time) {
         while self.now() < end {
             self.slice(end);
@@ -69,7 +70,7 @@ impl Machine {
         self.catch_up();
     }
 
-    /// Resets the machine by the reset pin or by SYSRESETREQ. RAM and reset flags are kept.
+    /// Resets the machine by the reset pin or by SYSRESETREQ. RAM and the existing reset flags do not change.
     pub fn reset(&mut self, cause: ResetCause) {
         let flags = match cause {
             ResetCause::PowerOn => flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU,
@@ -104,7 +105,7 @@ impl Machine {
         self.remap();
     }
 
-    /// Runs up to the next event, or to `end` if that is earlier.
+    /// Runs the machine up to the next event, or up to `end` if `end` is earlier.
     fn slice(&mut self, end: Time) {
         self.catch_up();
         let chip = self.uc.get_data_mut();
@@ -196,7 +197,7 @@ impl Machine {
             None => {}
         }
         match result {
-            // WFI ends a run without an error.
+            // After WFI, Unicorn stops without an error.
             Ok(()) => self.sleep = Sleep::Interrupt,
             Err(uc_error::INSN_INVALID) => self.hint_or_undefined(last),
             Err(uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT) if pc >= EXC_RETURN & !1 => {
@@ -257,11 +258,12 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
     assert!(code.is_ok() && raised.is_ok() && invalid, "Unicorn takes hooks");
 }
 
-/// Handles an instruction that needs special treatment, before it runs.
+/// Handles an instruction that needs special treatment, before the instruction is executed.
 fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
     let chip = uc.get_data_mut();
     if chip.core.it_block.contains(&address) {
-        // The instruction was counted at the beginning of its IT block, and the run must not stop within the block.
+        // The instruction was counted at the beginning of its IT block, and the execution must not stop within the
+        // block.
         chip.core.pc = address;
         return;
     }
@@ -276,7 +278,7 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
         let core = &mut uc.get_data_mut().core;
         core.stopping = true;
         core.look_at = 0;
-        // The previous instruction is complete. A run may only be stopped here.
+        // The previous instruction is complete. The execution may be stopped only at this point.
         let _ = uc.emu_stop();
         return;
     }
@@ -305,7 +307,7 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
     core.pc = address;
 }
 
-/// Returns the class of the instruction at an address, and stores it.
+/// Finds, stores and returns the class of the instruction at an address.
 fn class(uc: &mut Unicorn<'_, Chip>, address: u32) -> u16 {
     let known = uc.get_data().code.class(address);
     if known & !(WATCHED | MEMBER) != UNKNOWN {

@@ -1,7 +1,7 @@
-//! DMA1, DMA2 and DMAMUX1 (RM0399 chapters 15 to 18): single transfers between a peripheral and memory, circular or
-//! not, with half-transfer and transfer-complete flags.
+//! DMA1, DMA2 and DMAMUX1 (RM0399 chapters 15 to 18): single transfers between a peripheral and memory, in circular
+//! or normal mode, with half-transfer and transfer-complete flags.
 
-/// Number of streams of both controllers: DMA1 0..8, DMA2 8..16.
+/// Number of streams of both controllers. Streams 0..8 belong to DMA1, streams 8..16 to DMA2.
 pub const STREAMS: usize = 16;
 
 const EN: u32 = 1;
@@ -29,7 +29,7 @@ pub trait Memory {
 #[derive(Clone, Copy, Default)]
 struct Stream {
     cr: u32,
-    /// NDTR as written, and the number of transfers left.
+    /// Value written to NDTR, and number of remaining transfers.
     total: u32,
     left: u32,
     par: u32,
@@ -129,7 +129,7 @@ impl Dma {
                 match (offset - 0x10) % 0x18 {
                     0x00 => {
                         if enabled && value & EN == 0 {
-                            // Switching off a running stream sets this flag.
+                            // When a running stream is switched off, the transfer-complete flag is set.
                             stream.flags |= TCIF;
                         }
                         stream.cr = value;
@@ -172,7 +172,7 @@ impl Dma {
         self.streams.iter().position(|s| s.cr & EN != 0 && s.request & 0x7F == request)
     }
 
-    /// Returns the number of transfers until the stream raises an enabled interrupt.
+    /// Returns the number of transfers until the next interrupt of the stream that is enabled.
     pub fn until_interrupt(&self, stream: usize) -> Option<u32> {
         let s = &self.streams[stream];
         let half = (s.cr & 8 != 0).then(|| s.left.checked_sub(s.total / 2)).flatten().filter(|&n| n > 0);
@@ -219,7 +219,7 @@ impl Dma {
     }
 }
 
-/// Bit positions of four streams' flags in a status register.
+/// Bit positions of the flags of four streams in a status register.
 const SHIFTS: [u32; 4] = [0, 6, 16, 22];
 
 #[cfg(test)]

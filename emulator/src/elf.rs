@@ -21,7 +21,7 @@ pub enum ElfError {
     Ambiguous {
         /// Requested text.
         name: String,
-        /// Names of the symbols that contain it.
+        /// Names of the symbols that contain the text.
         found: Vec<String>,
     },
 }
@@ -51,7 +51,7 @@ impl From<object::Error> for ElfError {
 /// A symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Symbol {
-    /// Address; for a function, without the Thumb bit.
+    /// Address of the symbol; the address of a function is without the Thumb bit.
     pub address: u32,
     /// Size in bytes.
     pub size: u32,
@@ -62,7 +62,7 @@ pub struct Symbol {
 /// The parts of the file that are loaded into memory.
 #[derive(Clone, Debug, Default)]
 pub struct Elf {
-    /// Load addresses and contents.
+    /// Load address and contents of each segment.
     pub segments: Vec<(u32, Vec<u8>)>,
     symbols: BTreeMap<String, Symbol>,
 }
@@ -95,7 +95,7 @@ impl Elf {
         Ok(elf)
     }
 
-    /// Creates a firmware that consists of these bytes at an address.
+    /// Creates a firmware that contains only these bytes at an address.
     pub fn from_image(address: u32, bytes: Vec<u8>) -> Self {
         Self { segments: vec![(address, bytes)], symbols: BTreeMap::new() }
     }

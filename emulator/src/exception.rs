@@ -1,5 +1,5 @@
-//! Entry to and return from exceptions (ARMv7-M B1.5.6 to B1.5.8). The frame always includes the floating-point
-//! registers; it is the larger of the two frames of the hardware.
+//! Entry to and return from exceptions (ARMv7-M B1.5.6 to B1.5.8). The hardware has two stack frames; this
+//! model always uses the larger frame, which includes the floating-point registers.
 use unicorn_engine::RegisterARM::{self, *};
 
 use crate::machine::Machine;
@@ -12,7 +12,8 @@ const WORDS: usize = 26;
 /// Position of FPSCR in the frame.
 const FPSCR_AT: usize = 24;
 
-/// Return values: to a handler, and to a thread with an extended frame on the main stack.
+/// Exception return values for a return to a handler, and for a return to a thread with an extended frame on the main
+/// stack.
 const TO_HANDLER: u32 = 0xFFFF_FFE1;
 const TO_THREAD: u32 = 0xFFFF_FFE9;
 
@@ -60,7 +61,7 @@ pub fn enter(machine: &mut Machine, exception: usize) {
     }
 }
 
-/// Handles the jump of a handler to an exception return value.
+/// Handles the return from an exception, when a handler jumps to an exception return value.
 pub fn leave(machine: &mut Machine, to: u32) {
     let chip = machine.chip();
     let (now, instructions) = (chip.now(), chip.core.instructions);

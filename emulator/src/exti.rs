@@ -1,5 +1,5 @@
-//! Extended interrupt and event controller, for pins only (RM0399, EXTI and SYSCFG_EXTICR1..4). The edges of a pin set
-//! pending bits, which stay set until a 1 is written to them.
+//! Extended interrupt and event controller (RM0399, EXTI and SYSCFG_EXTICR1..4), modelled only for pins. The edges of
+//! a pin set pending bits. A pending bit remains set until a 1 is written to it.
 
 /// Number of lines that pins can use.
 const LINES: usize = 16;

@@ -55,7 +55,7 @@ mod lec {
 
 /// Duration of the recovery sequence after bus-off: 129 times 11 recessive bits.
 const RECOVERY: Time = 129 * 11 * NOMINAL_BIT;
-/// Duration of the recessive bits that a node must see after INIT before it participates.
+/// Duration of the recessive bits that a node must detect after INIT before it participates in bus traffic.
 const INTEGRATION: Time = 11 * NOMINAL_BIT;
 
 /// A receive FIFO.
@@ -127,7 +127,7 @@ pub struct Fdcan {
     txbtie: u32,
     txbcie: u32,
     plain: crate::plain::Plain,
-    /// Time from which the controller participates; `NEVER` in INIT.
+    /// Time from which the controller participates in bus traffic; `NEVER` in INIT.
     online: Time,
     /// End of the recovery sequence after bus-off.
     recovers: Time,
@@ -179,7 +179,8 @@ impl Default for Fdcan {
 }
 
 impl Fdcan {
-    /// Sets the registers to their values after reset. The bus continues, and the message RAM keeps its contents.
+    /// Sets the registers to their values after reset. The reset does not affect the bus or the contents of the
+    /// message RAM.
     pub fn reset(&mut self) {
         let old = core::mem::take(self);
         self.ram = old.ram;
@@ -231,7 +232,8 @@ impl Fdcan {
         self.psr & 0x80 != 0
     }
 
-    /// Returns the time from which the controller sends and receives: `online`, or `NEVER` in INIT, clock stop or bus-off.
+    /// Returns the time from which the controller sends and receives. The time is `online`, or `NEVER` in INIT, clock
+    /// stop or bus-off.
     fn takes_part(&self) -> Time {
         if self.bus_off() || self.cccr & (cccr::INIT | cccr::CSR) != 0 { NEVER } else { self.online }
     }

@@ -1,6 +1,6 @@
-//! Bank 2 of the embedded flash (RM0399 chapter 4). Erasing and programming take time, a read during an operation
-//! stalls the core, and a loss of power during an operation leaves undefined contents. Bank 1 contains the program and
-//! stays locked.
+//! Bank 2 of the embedded flash (RM0399 chapter 4). Erasing and programming take time, and a read during an operation
+//! stalls the core. After a loss of power during an operation, the contents are undefined. Bank 1 contains the program
+//! and stays locked.
 mod bank;
 
 use crate::clock::{MICROSECOND, SECOND, Time};
@@ -10,7 +10,7 @@ pub use bank::{BANK2, BANK2_SIZE, Bank2, WORD};
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// Register offsets of bank 1. The offsets of bank 2 are higher by [`SECOND_BANK`].
+/// Register offsets of bank 1. The register offsets of bank 2 are larger by [`SECOND_BANK`].
 mod reg {
     pub const KEYR: u32 = 0x04;
     pub const CR: u32 = 0x0C;
@@ -26,7 +26,7 @@ mod cr {
     pub const SER: u32 = 1 << 2;
     pub const START: u32 = 1 << 7;
     pub const EOPIE: u32 = 1 << 16;
-    /// Value after a reset: locked, 64 bits at once.
+    /// Value after a reset: the bank is locked, and 64 bits are programmed at once.
     pub const RESET: u32 = 0x31;
 }
 
@@ -92,24 +92,24 @@ pub struct Flash {
     pub operations: Vec<Operation>,
     /// Reads and writes that waited for an operation: time, and duration for which the core was stalled.
     pub stalls: Vec<(Time, Time)>,
-    /// Number of accesses to the bank while it was configured as memory that the core may cache or prefetch.
+    /// Number of accesses to the bank while the protection unit allowed the core to cache or prefetch it.
     pub ahead: u32,
-    /// Number of words that were programmed again without being erased first.
+    /// Number of words that were programmed a second time without an erase operation.
     pub overwrites: u32,
     /// Longest time during an operation in which the protection unit permitted reads of the bank.
     pub longest_open: Time,
-    /// Bits of SR that the next operation sets at its end.
+    /// Error bits of SR that the next operation sets when it ends.
     pub fail_next: u32,
     /// `true` if the program has unlocked bank 1.
     pub bank1_unlocked: bool,
-    /// Number of resets, used as the seed of the contents after an interrupted operation.
+    /// Number of resets, used as the seed for the random contents after an interrupted operation.
     torn: u64,
     cr: u32,
     sr: u32,
     /// Number of keys written. After more than two, unlocking is refused until a reset.
     keys: usize,
     running: Option<Operation>,
-    /// Word that is being written: its index, its bytes, and a mask of the bytes written so far.
+    /// Word that is being written, as its index, its bytes, and a mask of the bytes written so far.
     buffer: Option<(usize, [u8; WORD], u32)>,
     open_since: Option<Time>,
 }

@@ -1,4 +1,4 @@
-//! Pins (RM0399 chapter 12) that can be driven from outside, with a record of every change that the firmware makes.
+//! Pins (RM0399 chapter 12) that external signals can drive, with a record of every change that the firmware makes.
 use crate::clock::Time;
 
 /// A pin: port letter and number.
@@ -47,8 +47,8 @@ impl Port {
         self.moder >> (2 * pin) & 3 == 1
     }
 
-    /// Returns the levels on the pins. For each pin this is the port's output, else the outside level, else the pull
-    /// resistor's level.
+    /// Returns the levels on the pins. The level of a pin is the output level of the port, if any; otherwise the
+    /// external level, if any; otherwise the level of the pull resistor.
     fn idr(&self) -> u32 {
         (0..16).fold(0, |word, pin| {
             let outside = u32::from(self.outside) >> pin & 1;
@@ -81,7 +81,7 @@ impl Default for Gpio {
 }
 
 impl Gpio {
-    /// Resets all ports, so that all pins are inputs again. Levels driven from outside stay.
+    /// Resets all ports, so that all pins are inputs again. Levels driven from outside do not change.
     pub fn reset(&mut self, now: Time) {
         for index in 0..PORTS {
             let before = self.ports[index].outputs();
@@ -125,7 +125,7 @@ impl Gpio {
             0x08 => port.ospeedr = value,
             0x0C => port.pupdr = value,
             0x14 => port.odr = value & 0xFFFF,
-            // Set has priority over reset.
+            // If both bits are set, set has priority over reset.
             0x18 => port.odr = port.odr & !(value >> 16) | value & 0xFFFF,
             0x1C => port.lckr = value,
             0x20 | 0x24 => port.afr[(offset as usize - 0x20) / 4] = value,

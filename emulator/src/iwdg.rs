@@ -1,4 +1,4 @@
-//! Independent watchdog 1 (RM0399 chapter 47), which counts LSI periods down and resets the machine at zero.
+//! Independent watchdog 1 (RM0399 chapter 47), which counts down with the LSI clock and resets the machine at zero.
 use crate::clock::{NEVER, SECOND, Time};
 
 const LSI_HZ: u64 = 32_000;
@@ -11,7 +11,7 @@ pub struct Iwdg {
     window: u32,
     unlocked: bool,
     bites: Time,
-    /// Shortest time left before a reset when the firmware fed the watchdog.
+    /// Shortest time that remained until a reset when the firmware fed the watchdog.
     pub least_left: Time,
 }
 
@@ -62,7 +62,7 @@ impl Iwdg {
         }
     }
 
-    /// Returns the time between feeding and the reset.
+    /// Returns the watchdog timeout.
     pub fn timeout(&self) -> Time {
         let divider = 4 << self.prescaler.min(6);
         (u64::from(self.reload) + 1) * divider * SECOND / LSI_HZ

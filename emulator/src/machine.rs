@@ -1,4 +1,4 @@
-//! Access to the machine from outside: registers, memory, faults. The module `cpu` runs it.
+//! External access to the machine: registers, memory, faults. The module `cpu` runs the machine.
 use unicorn_engine::{RegisterARM, Unicorn};
 
 use crate::chip::Chip;
@@ -23,7 +23,7 @@ pub(crate) enum Sleep {
     Interrupt,
     /// Sleeping in WFE.
     Event,
-    /// In lock-up, until a reset.
+    /// The core is in lock-up until a reset.
     Lockup,
 }
 
@@ -62,7 +62,7 @@ impl Machine {
         self.register(RegisterARM::PC)
     }
 
-    /// Returns `true` if the core is in lock-up after a fault within a fault.
+    /// Returns `true` if the core is in lock-up because a fault occurred in a fault handler.
     pub fn locked_up(&self) -> bool {
         self.sleep == Sleep::Lockup
     }
@@ -74,11 +74,11 @@ impl Machine {
     }
 
     pub(crate) fn set(&mut self, register: RegisterARM, value: u32) {
-        // Every register in the code exists on this core, so writing cannot fail.
+        // Every register that this code uses exists on the core, so a write cannot fail.
         let _ = self.uc.reg_write(register, u64::from(value));
     }
 
-    /// Returns a word of memory; `None` at an unmapped address.
+    /// Returns the word of memory at an address; `None` if the address is not mapped.
     pub fn word(&self, address: u32) -> Option<u32> {
         if in_bank2(address) {
             let bytes = self.memory(address, 4)?;
@@ -89,7 +89,7 @@ impl Machine {
         Some(u32::from_le_bytes(bytes))
     }
 
-    /// Returns bytes of memory; `None` at an unmapped address.
+    /// Returns the bytes of memory at an address; `None` if the address is not mapped.
     pub fn memory(&self, address: u32, length: usize) -> Option<Vec<u8>> {
         if in_bank2(address) {
             let fits = address as usize + length <= (BANK2 + BANK2_SIZE) as usize;
@@ -110,7 +110,7 @@ impl Machine {
         }
         let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
         if written && self.chip().code.forget(address, bytes.len() as u32) {
-            // Otherwise Unicorn would continue to run its translation of the old code.
+            // Without this step, Unicorn would continue to execute its translation of the old code.
             self.chip().core.it_block = 0..0;
             let _ = self.uc.ctl_flush_tb();
         }

@@ -27,10 +27,10 @@ pub const FLASH: u32 = 0x0800_0000;
 const FLASH_SIZE: u64 = 0x10_0000;
 const SYSTEM: u64 = 0x1FF0_0000;
 const SYSTEM_SIZE: u64 = 0x2_0000;
-/// Peripherals of all domains.
+/// Address range of the peripherals of all domains.
 const PERIPHERALS: u64 = 0x4000_0000;
 const PERIPHERALS_SIZE: u64 = 0x2000_0000;
-/// Private peripherals of the core.
+/// Address range of the private peripherals of the core.
 const PRIVATE: u64 = 0xE000_0000;
 const PRIVATE_SIZE: u64 = 0x10_0000;
 
@@ -61,9 +61,9 @@ pub const FORBIDDEN: [(u64, u64); 11] = [
     (0xFFFF_FFE0, 0xFFFF_FFFF),
 ];
 
-/// Returns the access rights of data memory. Code is expected only in ITCM and flash: after every store to memory that
-/// may contain code, Unicorn searches for translated code, which makes stores slow. The first jump to other memory
-/// calls [`allow_code`].
+/// Returns the access rights of data memory. Code is expected only in ITCM and flash. After every store to memory that
+/// may contain code, Unicorn searches for translated code, which makes the store slow. The first jump to another
+/// memory calls [`allow_code`].
 fn data() -> Prot {
     Prot::READ | Prot::WRITE
 }
@@ -108,7 +108,7 @@ pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
     }
 }
 
-/// Maps flash bank 2. The core accesses it through the flash interface.
+/// Maps flash bank 2. The core accesses bank 2 through the flash interface.
 fn map_bank2(uc: &mut Unicorn<'static, Chip>) {
     let faults_masked = |uc: &Unicorn<'_, Chip>| {
         let mask = uc.reg_read(RegisterARM::FAULTMASK).unwrap_or(0) & 1 == 1;

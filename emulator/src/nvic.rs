@@ -22,7 +22,7 @@ pub mod exception {
     pub const SYS_TICK: usize = 15;
 }
 
-/// Priority of code outside exceptions. Lower values are more urgent.
+/// Priority of code outside exceptions. A lower value means a higher priority.
 const THREAD: i32 = 256;
 
 /// Mask registers of the core.
@@ -32,7 +32,7 @@ pub struct Masks {
     pub primask: bool,
     /// FAULTMASK.FM.
     pub faultmask: bool,
-    /// BASEPRI; 0 masks nothing.
+    /// BASEPRI; the value 0 does not mask any exception.
     pub basepri: u8,
 }
 
@@ -49,7 +49,8 @@ pub struct Nvic {
     waiting: Vec<usize>,
     /// AIRCR.PRIGROUP.
     pub prigroup: u32,
-    /// `true` if an interrupt became pending since this flag was cleared. The flag wakes WFE if SCR.SEVONPEND is set.
+    /// `true` if an interrupt has become pending since this flag was cleared. The flag ends WFE if SCR.SEVONPEND is
+    /// set.
     pub pended: bool,
 }
 
@@ -124,7 +125,7 @@ impl Nvic {
         self.enabled[exception]
     }
 
-    /// Enables or disables an exception.
+    /// Enables (`true`) or disables (`false`) an exception.
     pub fn enable(&mut self, exception: usize, enabled: bool) {
         self.enabled[exception] = enabled;
         self.update(exception);
@@ -150,7 +151,7 @@ impl Nvic {
         !self.waiting.is_empty()
     }
 
-    /// Returns the priority for preemption, without the lower bits that PRIGROUP cuts off.
+    /// Returns the priority for preemption, without the lower bits that PRIGROUP excludes.
     fn group(&self, priority: i32) -> i32 {
         if priority < 0 { priority } else { priority >> (self.prigroup + 1) << (self.prigroup + 1) }
     }
@@ -188,7 +189,7 @@ impl Nvic {
         limit
     }
 
-    /// Returns the exception that must be entered now, if any.
+    /// Returns the exception that the core must enter now, if any.
     pub fn next(&self, masks: Masks) -> Option<usize> {
         let exception = self.most_urgent()?;
         let running = self.running_priority();

@@ -1,9 +1,9 @@
-//! Measurements while the firmware runs: instruction counts of functions and handlers, interrupt latencies, stack
-//! pointers, resets, faults.
+//! Measurements of the running firmware: instruction counts of functions and handlers, interrupt latencies, stack
+//! pointers, resets and faults.
 use crate::clock::Time;
 use crate::nvic::EXCEPTIONS;
 
-/// Instruction count of a function or a handler, without exceptions that interrupted it.
+/// Instruction counts of a function or a handler, not including exceptions that interrupted it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
     /// Number of calls that have returned.
@@ -28,7 +28,8 @@ impl Count {
     }
 }
 
-/// Time between an exception becoming pending and the first instruction of its handler.
+/// Interrupt latency: time from the moment at which an exception becomes pending to the first instruction of its
+/// handler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
     /// Number of entries.
@@ -44,7 +45,7 @@ pub struct Latency {
 /// Cause of a reset of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
-    /// Power was switched on.
+    /// The power was switched on.
     PowerOn,
     /// The reset pin.
     Pin,
@@ -89,7 +90,7 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Address of the instruction.
     pub pc: u32,
-    /// Address of the access.
+    /// Address of the failed access.
     pub address: u32,
     /// `true` if the fault occurred in HardFault or NMI, so that the core is in lock-up until a reset.
     pub lockup: bool,
@@ -122,14 +123,14 @@ pub struct Observers {
     probes: Vec<Probe>,
     calls: Vec<Call>,
     running: Vec<Running>,
-    /// Counts by exception number.
+    /// Instruction counts of the handlers, by exception number.
     pub handlers: Vec<Count>,
     /// Latencies by exception number.
     pub latencies: Vec<Latency>,
-    /// Lowest stack pointer while exception n was running; entry 0 is for code outside exceptions.
+    /// Lowest stack pointer while exception n was running; entry 0 is for code outside of exceptions.
     pub lowest_sp: Vec<u32>,
-    /// Largest stack use of exception n in one run, bytes, including the frames of exceptions that interrupted it.
-    /// Entry 0 is not used.
+    /// Largest stack use (bytes) of one execution of exception n, including the frames of exceptions that
+    /// interrupted it. Entry 0 is not used.
     pub deepest: Vec<u32>,
     /// Resets, oldest first.
     pub resets: Vec<Reset>,
@@ -160,7 +161,7 @@ impl Observers {
         self.probes.len() - 1
     }
 
-    /// Returns the counts of a counter.
+    /// Returns the instruction counts of a counter.
     pub fn probe(&self, probe: usize) -> Count {
         self.probes[probe].count
     }
@@ -176,8 +177,8 @@ impl Observers {
         self.deepest.fill(0);
     }
 
-    /// Handles a watched instruction. If a function begins there, returns the return address, which must be watched
-    /// next.
+    /// Handles a watched instruction. If a counted function begins at this instruction, returns its return address,
+    /// which must be watched next.
     pub fn at(&mut self, pc: u32, sp: u32, lr: u32, instructions: u64) -> Option<u32> {
         let depth = self.running.len();
         while let Some(i) = self.calls.iter().rposition(|c| c.back == pc && c.sp == sp && c.depth == depth) {
@@ -199,7 +200,7 @@ impl Observers {
         self.probes[call.probe].count.add(instructions - call.start - call.excluded);
     }
 
-    /// Records that an exception begins to run.
+    /// Records the entry into an exception.
     pub fn enter(&mut self, exception: usize, since: Time, now: Time, instructions: u64) {
         let latency = &mut self.latencies[exception];
         latency.entries += 1;
@@ -211,7 +212,7 @@ impl Observers {
         self.running.push(Running { exception, start: instructions, excluded: 0, base: None });
     }
 
-    /// Records that the innermost exception returns.
+    /// Records the return from the innermost exception.
     pub fn leave(&mut self, instructions: u64) {
         let depth = self.running.len();
         // A counted function that is itself a handler ends with the exception.

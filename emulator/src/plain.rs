@@ -1,7 +1,7 @@
 //! Registers that behave as plain memory.
 use std::collections::BTreeMap;
 
-/// Words by address. A word that was never written reads as 0.
+/// Words by address. The value of a word that was never written is 0.
 #[derive(Clone, Debug, Default)]
 pub struct Plain {
     words: BTreeMap<u32, u32>,

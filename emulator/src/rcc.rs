@@ -1,5 +1,5 @@
-//! Reset and clock control (RM0399 chapter 9): the clock tree, enable and reset bits, reset flags. Also contains the
-//! few bits of PWR on which clocks depend.
+//! Reset and clock control (RM0399 chapter 9): the clock tree, enable and reset bits, reset flags. This module also
+//! contains the bits of PWR on which clocks depend.
 use crate::plain::Plain;
 
 const HSI_HZ: u64 = 64_000_000;
@@ -27,7 +27,7 @@ mod reg {
     pub const AHB4ENR: u32 = 0xE0;
     pub const APB1LENR: u32 = 0xE8;
     pub const APB1HENR: u32 = 0xEC;
-    /// Address range of core 1's register copies, and their offset from the common registers.
+    /// Address range of the register copies of core 1, and the offset between a copy and the common register.
     pub const C1: core::ops::Range<u32> = 0x130..0x190;
     pub const C1_OFFSET: u32 = 0x60;
 }
@@ -46,7 +46,7 @@ pub mod flag {
     pub const PIN: u32 = 1 << 22;
     /// Power-on.
     pub const POR: u32 = 1 << 23;
-    /// Software reset by core 1.
+    /// Core 1 requested a software reset.
     pub const SFT: u32 = 1 << 24;
     /// Independent watchdog 1.
     pub const IWDG1: u32 = 1 << 26;
@@ -61,7 +61,7 @@ pub mod flag {
 pub enum Gate {
     /// DMA1, DMA2 (index from 0).
     Dma(u32),
-    /// GPIOA.. (index from 0).
+    /// GPIOA and the other ports (index from 0).
     Gpio(u32),
     /// TIM2..TIM7 by number.
     Timer(u32),
@@ -87,7 +87,7 @@ impl Gate {
     }
 }
 
-/// Frequencies in Hz that the registers set; 0 for a clock that is off.
+/// Clock frequencies that the registers configure, Hz; 0 for a clock that is off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clocks {
     /// Core.
@@ -116,7 +116,7 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// Creates the state after power-on, with a clock at OSC_IN.
+    /// Creates the module in its state after power-on, with a clock at OSC_IN.
     pub fn new(hse_hz: u64) -> Self {
         let rsr = flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU;
         let mut rcc =
@@ -139,7 +139,7 @@ impl Rcc {
         self.update();
     }
 
-    /// Resets the system, and adds the flags of the cause to the flags already set.
+    /// Resets the system, and sets the flags of the reset cause in addition to the existing flags.
     pub fn reset(&mut self, flags: u32) {
         self.plain = Plain::default();
         self.rsr |= flags;
@@ -167,8 +167,8 @@ impl Rcc {
         let offset = if reg::C1.contains(&offset) { offset - reg::C1_OFFSET } else { offset };
         let value = self.plain.read(offset);
         match offset {
-            // Each oscillator is ready as soon as it is on (HSI, CSI, HSI48, HSE, PLL1..3). HSIDIV and the domains are
-            // always ready.
+            // Each oscillator is ready as soon as it is on (HSI, CSI, HSI48, HSE, PLL1..3). The ready flags of HSIDIV
+            // and of the domains are always set.
             reg::CR => {
                 let ready = (value & 1) << 2
                     | (value >> 7 & 1) << 8
@@ -203,7 +203,7 @@ impl Rcc {
     }
 
     fn note_resets(&mut self, offset: u32, rising: u32) {
-        // The reset registers are in the same order as the enable registers.
+        // The reset registers and the enable registers have the same order.
         let enable = match offset {
             0x80 => reg::AHB1ENR,
             0x88 => reg::AHB4ENR,

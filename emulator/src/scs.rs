@@ -33,7 +33,7 @@ pub struct SysTick {
 pub struct Scs {
     /// Address of the vector table.
     pub vtor: u32,
-    /// SCR: bit 4 SEVONPEND, bit 1 SLEEPONEXIT.
+    /// Register SCR with bit 4 (SEVONPEND) and bit 1 (SLEEPONEXIT).
     pub scr: u32,
     /// CPACR.
     pub cpacr: u32,
@@ -55,7 +55,7 @@ pub struct Scs {
     plain: Plain,
 }
 
-/// Decision of the protection unit on an access.
+/// Access rights that the protection unit grants for an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
     /// `true` if the access is permitted.
@@ -64,7 +64,7 @@ pub struct Protection {
     pub ahead: bool,
 }
 
-/// Time of an access, in several units.
+/// Time of an access, in cycles and in instructions, and the running exception.
 #[derive(Clone, Copy)]
 pub struct Moment {
     /// Virtual time.
@@ -183,13 +183,13 @@ impl Scs {
         }
     }
 
-    /// Returns the MPU regions as (RBAR, RASR); those with RASR bit 0 are enabled.
+    /// Returns the MPU regions as (RBAR, RASR). A region is enabled if bit 0 of RASR is set.
     pub fn mpu_regions(&self) -> &[(u32, u32); 16] {
         &self.mpu
     }
 
-    /// Returns the decision of the protection unit on a load or store by the program (ARMv7-M B3.5). `faults_masked`
-    /// means that FAULTMASK is set, or that HardFault or NMI is running.
+    /// Returns the access rights that the protection unit grants for a load or store by the program (ARMv7-M B3.5).
+    /// `faults_masked` means that FAULTMASK is set, or that HardFault or NMI is running.
     pub fn protection(&self, address: u32, faults_masked: bool) -> Protection {
         const DEFAULT: Protection = Protection { allowed: true, ahead: true };
         let ctrl = self.plain.read(MPU_CTRL);
@@ -207,7 +207,7 @@ impl Scs {
             return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
         };
         let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
-        // Strongly ordered memory and device memory. Read-only memory is not distinguished here.
+        // The region is strongly ordered memory or device memory. This code does not distinguish read-only memory.
         let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
         Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
     }

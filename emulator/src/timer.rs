@@ -23,7 +23,7 @@ pub struct Timer {
     arr: u32,
     arr_active: u32,
     ccr: [u32; 4],
-    /// Counter value at time `at`. While the timer runs, it counts from this value.
+    /// Counter value at time `at`. While the timer runs, it counts up from this value.
     count: u32,
     at: Time,
     /// Length of a clock period.
@@ -59,7 +59,7 @@ impl Timer {
         }
     }
 
-    /// Sets the kernel clock. The timer must have been advanced to `now` before.
+    /// Sets the kernel clock. The caller must advance the timer to `now` before this call.
     pub fn set_clock(&mut self, hz: u64, now: Time) {
         let clock = period(hz);
         if clock != self.clock {
@@ -76,7 +76,7 @@ impl Timer {
         self.cr1 & CEN != 0 && self.clock != NEVER
     }
 
-    /// Returns the counter value. All events before `now` must have been executed.
+    /// Returns the counter value. The caller must execute all events before `now` first.
     fn value(&self, now: Time) -> u32 {
         if !self.runs() {
             return self.count;
@@ -84,7 +84,7 @@ impl Timer {
         self.count + (now.saturating_sub(self.at) / self.tick()) as u32
     }
 
-    /// Makes `count` and `at` current without losing the elapsed part of a timer tick.
+    /// Updates `count` and `at` without losing the elapsed part of a timer tick.
     fn settle(&mut self, now: Time) {
         if self.runs() {
             let ticks = now.saturating_sub(self.at) / self.tick();
@@ -98,14 +98,14 @@ impl Timer {
     /// Returns the number of timer ticks from `count` until the counter overflows to 0.
     fn to_overflow(&self) -> u64 {
         if self.count > self.arr_active {
-            // ARR was set to a value below the counter, so the counter first runs through its whole range.
+            // ARR is less than the counter, so the counter first continues to the end of its range.
             let top = if self.wide { 1u64 << 32 } else { 1 << 16 };
             return top - u64::from(self.count);
         }
         u64::from(self.arr_active - self.count) + 1
     }
 
-    /// Returns the number of timer ticks until the flag of a compare channel is next set, if that happens before the
+    /// Returns the number of timer ticks until the next match of a compare channel, if the match occurs before the
     /// overflow.
     fn to_match(&self, channel: usize) -> Option<u64> {
         let compare = self.ccr[channel];
@@ -125,14 +125,14 @@ impl Timer {
         if !self.runs() {
             return NEVER;
         }
-        // Flags without an interrupt cause no stop; they are computed when a register is read.
+        // Flags without an enabled interrupt do not need an event, because they are computed when a register is read.
         let mut ticks = NEVER;
         if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
             ticks = self.to_overflow();
         }
         if !self.basic {
             for c in (0..4).filter(|c| self.dier >> (c + 1) & 1 == 1) {
-                // A match after the overflow is found when the overflow is executed.
+                // A match after the overflow is detected when the overflow is executed.
                 ticks = ticks.min(self.to_match(c).unwrap_or_else(|| self.to_overflow()));
             }
         }

@@ -1,5 +1,5 @@
 //! USART2 and USART3 (RM0399 chapter 51): asynchronous 8N1 with FIFOs, DMA requests, idle line and receiver timeout.
-//! Every byte takes its real time on the line.
+//! The transmission of each byte takes as long as on the real line.
 mod bits;
 mod next;
 mod registers;
@@ -16,10 +16,10 @@ const DMAT: u32 = 0x80;
 const FIFO: usize = 16;
 /// Number of bytes examined in advance to find the next event.
 const LOOK_AHEAD: usize = 64;
-/// Largest difference between the rates at which bytes still arrive intact, in thousandths.
+/// Largest difference between the two rates, in thousandths, at which bytes are still received correctly.
 const TOLERANCE: u64 = 40;
 
-/// A byte and the time at which its stop bit ended.
+/// A transmitted byte and the end time of its stop bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WireByte {
     /// End of the stop bit.
@@ -44,10 +44,10 @@ pub struct Usart {
     bit: Time,
     rx_fifo: VecDeque<u8>,
     last_rdr: u8,
-    /// Bytes on the line to the device.
+    /// Bytes that are being transmitted to the device.
     rx_wire: VecDeque<WireByte>,
     rx_wire_free: Time,
-    /// End of the last byte received. The idle flag is derived from it.
+    /// End of the last byte received. The idle flag is derived from this time.
     idle_from: Option<Time>,
     timeout_from: Option<Time>,
     tx_fifo: VecDeque<u8>,
@@ -59,7 +59,7 @@ pub struct Usart {
     pub missed: u64,
     /// Number of overruns.
     pub overruns: u64,
-    /// Number of bytes sent at a rate that the other end cannot read.
+    /// Number of bytes that the receiver cannot read because of their rate.
     pub garbled: u64,
     /// Number of bytes received.
     pub received: u64,
@@ -102,7 +102,7 @@ impl Usart {
         }
     }
 
-    /// Sets the registers to their values after reset. Bytes on the line continue.
+    /// Sets the registers to their values after reset. The transmission of bytes on the line continues.
     pub fn reset(&mut self) {
         let old = core::mem::replace(self, Self::new(if self.rx_request == 43 { 2 } else { 3 }));
         self.rx_wire = old.rx_wire;
@@ -158,7 +158,7 @@ impl Usart {
         own.abs_diff(host) * 1000 <= host * TOLERANCE
     }
 
-    /// Sends bytes from the host. The first byte starts at `now` or later.
+    /// Sends bytes from the host. The transmission of the first byte starts at `now` or later.
     pub fn host_write(&mut self, now: Time, bytes: &[u8]) {
         let length = 10 * SECOND / u64::from(self.host_baud.max(1));
         for &byte in bytes {
@@ -168,7 +168,7 @@ impl Usart {
         }
     }
 
-    /// Returns the number of host bytes that have not been transmitted on the line yet.
+    /// Returns the number of host bytes that still wait for transmission.
     pub fn host_pending(&self) -> usize {
         self.rx_wire.len()
     }
@@ -185,14 +185,14 @@ impl Usart {
             self.idle(next.end.saturating_sub(self.frame()));
             self.receive(next, dma, memory);
         }
-        // The start bit of a byte now on the line ends the silence.
+        // The silence ends with the start bit of the byte that is being transmitted.
         let until = self.rx_wire.front().map_or(now, |b| now.min(b.end.saturating_sub(self.frame())));
         self.idle(until);
         self.drain_fifo(dma, memory);
         self.send(now, dma, memory);
     }
 
-    /// Handles silence of the line until `until`.
+    /// Handles a silent line until the time `until`.
     fn idle(&mut self, until: Time) {
         if let Some(from) = self.idle_from
             && until >= from.saturating_add(self.frame())
@@ -252,7 +252,7 @@ impl Usart {
             return;
         }
         let depth = if self.cr1 & cr1::FIFOEN != 0 { FIFO } else { 1 };
-        // The next byte can start at the end of the previous one, or now if that is later.
+        // The next byte can start when the previous byte has ended, but not earlier than now.
         loop {
             while self.cr3 & DMAT != 0
                 && self.tx_fifo.len() < depth

@@ -1,9 +1,9 @@
-//! Observers that find functions by the names of the firmware's symbols, and access to the firmware's log.
+//! Observers that find functions by their symbol names, and access to the log of the firmware.
 use crate::elf::ElfError;
 use crate::machine::Machine;
 use crate::observe::Count;
 
-/// Handle of a counter for a function's instructions.
+/// Handle of a counter that counts the instructions of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counter(usize);
 
@@ -11,8 +11,8 @@ pub struct Counter(usize);
 const RTT_CHANNEL: u32 = 24;
 
 impl Machine {
-    /// Counts the instructions of a function from now on. `name` is its full name, or a part that no other symbol
-    /// contains. A function that the compiler has inlined has no symbol.
+    /// Counts the instructions of a function from now on. `name` is the full name of the function, or a part that
+    /// no other symbol name contains. A function that the compiler has inlined has no symbol.
     pub fn count(&mut self, name: &str) -> Result<Counter, ElfError> {
         let entry = self.elf().symbol(name)?.address;
         let chip = self.chip();
@@ -20,13 +20,13 @@ impl Machine {
         Ok(Counter(chip.observers.add_probe(entry)))
     }
 
-    /// Returns the counts of a counter.
+    /// Returns the instruction counts of a counter.
     pub fn counted(&self, counter: Counter) -> Count {
         self.uc.get_data().observers.probe(counter.0)
     }
 
     /// Returns the bytes, encoded by defmt, that the firmware has written into RTT's first channel since the last call.
-    /// Reads them in the same way as a debug probe.
+    /// Reads the log in the same way as a debug probe.
     pub fn defmt(&mut self) -> Vec<u8> {
         let Ok(block) = self.elf().symbol("_SEGGER_RTT") else { return Vec::new() };
         let at = block.address + RTT_CHANNEL;

@@ -1,5 +1,5 @@
-//! Cycles of one control step, and of the flight recorder after it. llvm-mca's model of the core estimates them from
-//! the sequence of executed instructions.
+//! Cycles of one control step, and of the flight recorder after the step. llvm-mca's model of the core estimates
+//! them from the sequence of executed instructions.
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::Write;
@@ -87,8 +87,8 @@ fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     Ok(lines)
 }
 
-/// Returns the executed instructions in order, as input for an assembler, without jumps. The machine runs an IT block
-/// in one step; all its instructions are included, because the hardware fetches them all.
+/// Returns the executed instructions in order and without jumps, as input for an assembler. The machine runs an IT
+/// block in one step; all its instructions are included, because the hardware fetches them all.
 fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for at in trace {
@@ -119,7 +119,7 @@ fn without_target(code: &str) -> String {
         let register = operands.split(',').next().unwrap_or_default();
         return format!("{name} {register}, #4");
     }
-    // The model lacks the comparison with zero. The comparison of two registers takes the same time.
+    // The model does not know the comparison with zero. A comparison of two registers takes equally long.
     if let Some(register) = operands.strip_suffix(", #0").filter(|_| name.starts_with("vcmp")) {
         return format!("{name} {register}, {}", register.trim());
     }
@@ -130,7 +130,7 @@ fn without_target(code: &str) -> String {
     }
 }
 
-/// Returns an instruction of an IT block without its condition.
+/// Removes the condition from an instruction of an IT block.
 fn unconditional(code: &str) -> String {
     const CONDITIONS: [&str; 14] =
         ["eq", "ne", "hs", "lo", "mi", "pl", "vs", "vc", "hi", "ls", "ge", "lt", "gt", "le"];
@@ -158,7 +158,7 @@ fn simulate(assembly: &str) -> Result<u64, Box<dyn Error>> {
     }
 }
 
-/// Finds an LLVM program by its plain name or by its name with a version.
+/// Finds an LLVM program by its name with or without a version number.
 fn tool(name: &str) -> Result<Command, Box<dyn Error>> {
     let versions = (14..=22).rev().map(|version| format!("{name}-{version}"));
     for program in std::iter::once(name.to_owned()).chain(versions) {

@@ -1,4 +1,4 @@
-//! The measured session: it reaches every state, with continuous traffic on both lines.
+//! The measured session, which reaches every state with continuous traffic on both lines.
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -12,7 +12,7 @@ use crate::rig::Rig;
 
 /// Port of the host that sends commands.
 const HOST: Port = Port::Usart2;
-/// Exception of the tick.
+/// Exception number of the tick.
 const TIM7: usize = FIRST_LINE + 55;
 /// Port of the host that only generates traffic.
 const OTHER: Port = Port::Usart3;
@@ -40,7 +40,7 @@ impl Steps {
     }
 }
 
-/// Time longer than any ramp of the path time, ms.
+/// Number of ms that is longer than any ramp of the path time.
 const RAMP: u32 = 250;
 
 /// A rig that counts the instructions of control steps.
@@ -53,10 +53,10 @@ pub struct Session {
     recorded: Steps,
     steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
-    /// Steps along the path at full speed, without other work.
+    /// Instruction counts of steps along the path at full speed, without other work.
     on_path: Steps,
-    /// Point of the last step, and number of consecutive steps in which the path time advanced by exactly one
-    /// millisecond per tick.
+    /// Index of the point of the last step, and number of consecutive steps in which the path time advanced
+    /// by exactly one millisecond per tick.
     point: u32,
     steady: u32,
     traffic: Vec<Vec<u8>>,
@@ -123,8 +123,8 @@ impl Session {
         self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
     }
 
-    /// Pushes a joint while the arm is taught. The controller brings the arm to rest in the middle of its motion,
-    /// without a command (J-25).
+    /// Pushes a joint during Teaching. The controller brings the arm to rest in the middle of its motion, without
+    /// a command (J-25).
     fn lead_too_fast(&mut self) {
         let push = FaultKind::Push { joint: Joint::ALL[3], torque: 100.0 };
         self.rig.board.inject(push);
@@ -174,7 +174,8 @@ impl Session {
             self.calls = count.calls;
             self.recorded.add(self.rig.board.machine.counted(self.recorder).last);
             let (state, point) = (self.rig.flight.state, self.rig.flight.point);
-            // Events served together are counted under the last of them; the default value means no event.
+            // If a tick handles several events, the step is counted for the last event; the default value means no
+            // event.
             let event = self.rig.flight.events.last().copied().unwrap_or_default();
             self.steady = if point == self.point + 1 { self.steady + 1 } else { 0 };
             self.point = point;
@@ -206,14 +207,16 @@ impl Session {
         panic!("{what}: not within {ms} ms, {:?}", self.rig.state());
     }
 
-    /// Returns the steps without a host event: the name of the state, and `true` if a status was sent.
+    /// Returns the instruction counts of steps without a host event, with the name of the state and `true` if a
+    /// status was sent.
     pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
         self.steps
             .iter()
             .map(|((state, status), steps)| (Code::<ControllerState>::new(*state).name(), *status, *steps))
     }
 
-    /// Returns the steps along the path at full speed, without a status and without a host event.
+    /// Returns the instruction counts of steps along the path at full speed, without a status and without a host
+    /// event.
     pub fn on_path(&self) -> Steps {
         self.on_path
     }
@@ -223,7 +226,7 @@ impl Session {
         self.recorded
     }
 
-    /// Returns the steps that handle a host event: the name of the event, and the state.
+    /// Returns the instruction counts of steps that handle a host event, with the names of the event and the state.
     pub fn serving(&self) -> impl Iterator<Item = (String, &'static str, Steps)> {
         self.serving.iter().map(|((frame_type, state), steps)| {
             let name = FrameType::from_byte(*frame_type).map_or("no frame".to_owned(), |t| t.to_string());
@@ -243,7 +246,7 @@ impl Session {
                 let before = machine.instructions();
                 machine.run_until(machine.now() + cycle);
                 if machine.instructions() == before {
-                    // While the core sleeps, the exception that wakes it may be checked slightly late.
+                    // While the core sleeps, the check for the exception that wakes the core may be slightly late.
                     machine.run_until(machine.now() + 100 * cycle);
                 }
                 let tick = machine.chip().core.contexts.contains(&TIM7);

@@ -1,4 +1,5 @@
-//! Loads and stores of the core: finds the peripheral register of each access, and makes the checks that must follow.
+//! Loads and stores of the core. Finds the peripheral register of each access, and makes the necessary checks after
+//! the access.
 use std::collections::BTreeMap;
 
 use super::map::{
@@ -20,7 +21,7 @@ impl Chip {
         on
     }
 
-    /// Loads for the core. An access smaller than a word gets its part of the word.
+    /// Loads a value for the core. For an access that is smaller than a word, returns the accessed part of the word.
     pub fn load(&mut self, address: u32, size: usize, memory: &mut dyn Memory) -> u32 {
         let word = self.read_word(address & !3, memory);
         let value = word >> (8 * (address & 3));
@@ -75,7 +76,7 @@ impl Chip {
         }
     }
 
-    /// Stores for the core.
+    /// Stores a value for the core.
     pub fn store(&mut self, address: u32, size: usize, value: u32, memory: &mut dyn Memory) {
         let now = self.now();
         let shift = 8 * (address & 3);
@@ -174,8 +175,8 @@ impl Chip {
         !self.scs.protection(BANK2 + BANK2_SIZE - 1, false).allowed
     }
 
-    /// Checks an access of the core to bank 2; returns `false` if it is refused. While the bank is busy, the core
-    /// waits.
+    /// Checks an access of the core to bank 2; returns `false` if the access is refused. While the bank is busy,
+    /// the core waits.
     fn reach_bank2(&mut self, address: u32, faults_masked: bool) -> bool {
         let protection = self.scs.protection(address, faults_masked);
         if !protection.allowed {
@@ -200,7 +201,7 @@ impl Chip {
         self.changed();
     }
 
-    /// Loads from bank 2 for the core.
+    /// Loads a value from bank 2 for the core.
     pub fn load_bank2(&mut self, address: u32, size: usize, faults_masked: bool) -> u32 {
         if !self.reach_bank2(address, faults_masked) {
             return 0;
@@ -212,7 +213,7 @@ impl Chip {
         value
     }
 
-    /// Stores to bank 2 for the core.
+    /// Stores a value to bank 2 for the core.
     pub fn store_bank2(&mut self, address: u32, size: usize, value: u32, faults_masked: bool) {
         if self.reach_bank2(address, faults_masked) {
             let (now, closed) = (self.now(), self.bank2_closed());
@@ -221,8 +222,8 @@ impl Chip {
         }
     }
 
-    /// Must be called after an access that may have changed interrupt lines or events. The loop checks them before the
-    /// next instruction.
+    /// Must be called after an access that may have changed interrupt lines or events. The main loop checks lines and
+    /// events before the next instruction.
     fn changed(&mut self) {
         self.update_lines();
         self.core.attention = true;

@@ -69,12 +69,13 @@ pub fn is_plain(address: u32) -> bool {
 pub fn ready_bits(address: u32, plain: &Plain) -> u32 {
     let vos = plain.read(PWR + 0x18) & 0xC000;
     match address {
-        // CSR1: ACTVOSRDY and the scale in use; CR3: SDEXTRDY; D3CR: VOSRDY; CCCSR: ready.
+        // The registers are CSR1 (ACTVOSRDY and the active voltage scale), CR3 (SDEXTRDY), D3CR (VOSRDY) and CCCSR
+        // (ready bit).
         0x5802_4804 => 1 << 13 | vos,
         0x5802_480C => 1 << 16,
         0x5802_4818 => 1 << 13,
         0x5800_0420 => 1 << 8,
-        // A semaphore that is locked by reading it belongs to core 1.
+        // A semaphore that is locked by a read belongs to core 1.
         0x5802_6480..0x5802_6500 => 0x8000_0300,
         _ => 0,
     }

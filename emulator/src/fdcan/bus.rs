@@ -1,5 +1,5 @@
-//! The bus line between the controller and the other nodes of the joint bus: arbitration, frame times, acknowledgement,
-//! errors.
+//! The bus line between the controller and the other nodes of the joint bus, with arbitration, frame times,
+//! acknowledgement and errors.
 use std::collections::VecDeque;
 
 use can_link::CanFrame;
@@ -8,7 +8,7 @@ use crate::clock::{MICROSECOND, NEVER, Time, from_ns};
 
 /// Bit times of the bus.
 pub const NOMINAL_BIT: Time = MICROSECOND;
-/// Duration of error flag, its echo, delimiter and intermission.
+/// Total duration of an error flag, its echo, the delimiter and the intermission.
 pub const ERROR_FRAME: Time = 20 * NOMINAL_BIT;
 /// Largest number of entries in the log.
 const LOG: usize = 100_000;
@@ -42,7 +42,7 @@ pub struct BusEntry {
     pub end: Time,
     /// The frame.
     pub frame: CanFrame,
-    /// `true` if the controller sent it.
+    /// `true` if the controller sent the frame.
     pub from_controller: bool,
     /// Outcome of the frame.
     pub outcome: Outcome,
@@ -51,9 +51,9 @@ pub struct BusEntry {
 /// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireFault {
-    /// Number of following frames that are destroyed.
+    /// Number of next frames that an error destroys.
     pub destroy_next: u32,
-    /// `true` if all frames are destroyed.
+    /// `true` if errors destroy all frames.
     pub destroy_all: bool,
     /// `true` if the controller's bus line is cut.
     pub cut: bool,
@@ -75,7 +75,7 @@ pub struct Transmission {
 /// The bus line.
 #[derive(Default)]
 pub struct Wire {
-    /// The other nodes. Without them no frame is acknowledged.
+    /// The other nodes. Without other nodes, no frame is acknowledged.
     pub peers: Option<Box<dyn CanPeers>>,
     queue: Vec<Queued>,
     on_wire: Option<Transmission>,
@@ -87,12 +87,12 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Queues a frame that another node sends as soon as possible, but not before `ready`.
+    /// Queues a frame of another node, which is sent as soon as possible after `ready`.
     pub fn put(&mut self, ready: Time, frame: CanFrame) {
         self.queue.push(Queued { ready, frame });
     }
 
-    /// Returns the number of waiting frames of other nodes.
+    /// Returns the number of frames of other nodes that wait for the bus.
     pub fn waiting(&self) -> usize {
         self.queue.len()
     }
@@ -107,14 +107,14 @@ impl Wire {
         self.log.clear();
     }
 
-    /// Removes the frame that the controller is sending, because the controller stops in the middle of it.
+    /// Removes the frame that the controller is sending, because the controller stops during the transmission.
     pub fn drop_controller(&mut self) {
         if self.on_wire.as_ref().is_some_and(|t| t.buffer.is_some()) {
             self.on_wire = None;
         }
     }
 
-    /// Returns the time of the next change on the bus line that needs no action of the controller.
+    /// Returns the time of the next change on the bus line that occurs without an action of the controller.
     pub fn next_change(&self) -> Time {
         match &self.on_wire {
             Some(t) => t.entry.end,
@@ -122,7 +122,7 @@ impl Wire {
         }
     }
 
-    /// Returns the frame that ended by `now`.
+    /// Returns the frame that has ended at or before `now`.
     pub fn finished(&mut self, now: Time) -> Option<Transmission> {
         let done = self.on_wire.take_if(|t| t.entry.end <= now)?;
         self.free = done.entry.end;
@@ -200,7 +200,8 @@ impl Wire {
     }
 }
 
-/// Returns the rank in arbitration. An 11-bit identifier wins against a 29-bit one with the same first bits.
+/// Returns the rank of an identifier in arbitration. An 11-bit identifier wins against a 29-bit identifier with equal
+/// first bits.
 pub fn rank(frame: &CanFrame) -> u32 {
     let id = frame.id();
     if id.is_extended() { id.value() << 1 | 1 } else { id.value() << 19 }
@@ -216,7 +217,7 @@ pub fn frame_time(frame: &CanFrame) -> Time {
     {
         return from_ns(u64::from(jtc_bus::duration_ns(&joint)));
     }
-    // Frames that do not occur on the joint bus. For them one stuff bit per ten bits is assumed.
+    // The joint bus does not carry frames of this kind. For these frames, one stuff bit per ten bits is assumed.
     let id_bits = if frame.is_extended() { 38 } else { 19 };
     let data_bits = 8 * frame.data().len() as u64;
     let bits = if !frame.is_fd() {

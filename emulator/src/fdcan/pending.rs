@@ -9,13 +9,13 @@ pub(super) struct Pending {
     /// TXBTO and TXBCF.
     pub sent: u32,
     pub cancelled: u32,
-    /// Buffers to be cancelled when the frame now on the bus has ended.
+    /// Buffers whose transmission is cancelled when the current frame on the bus has ended.
     pub cancel: u32,
     /// Time at which the transmission of each buffer was requested.
     pub times: [Time; 32],
-    /// Get index of the FIFO.
+    /// Index of the FIFO element that is sent next.
     pub get: u32,
-    /// Put index of the FIFO.
+    /// Index of the FIFO element that is written next.
     pub put: u32,
 }
 

@@ -22,10 +22,10 @@ pub const ELEMENT_SIZES: [u32; 8] = [8, 12, 16, 20, 24, 32, 48, 64];
 /// Payload bytes for each length code.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
-/// Destination of a frame after the filters.
+/// Destination that the filters select for a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// FIFO 0 or 1, with the index of the matching filter if there was one.
+    /// FIFO 0 or 1, with the index of the filter that matched, if any.
     Fifo(usize, Option<u32>),
     /// Dedicated receive buffer.
     Buffer(u32, u32),
@@ -72,7 +72,7 @@ impl MessageRam {
         unmatched(gfc >> 4)
     }
 
-    /// Like [`standard`](Self::standard), for 29-bit identifiers; registers XIDFC, XIDAM and GFC.
+    /// Like [`standard`](Self::standard), for 29-bit identifiers (registers XIDFC, XIDAM and GFC).
     pub fn extended(&self, id: u32, xidfc: u32, xidam: u32, gfc: u32, busy: impl Fn(u32) -> bool) -> Target {
         let start = xidfc & 0xFFFC;
         for index in 0..(xidfc >> 16 & 0x7F) {
@@ -149,7 +149,7 @@ fn matches(kind: u32, id: u32, first: u32, second: u32) -> bool {
 }
 
 /// Returns the target of a filter's action. Returns `None` if the action is only a priority event, which this model
-/// does not generate; the search then continues as if the filter had not matched.
+/// does not generate. The search then continues with the next filter.
 fn of_action(action: u32, index: u32) -> Option<Target> {
     match action {
         1 | 5 => Some(Target::Fifo(0, Some(index))),

@@ -1,4 +1,4 @@
-//! Destination of a received frame: filters, dedicated buffers, FIFOs.
+//! Selection of the destination of a received frame (filters, dedicated buffers, FIFOs).
 use can_link::CanFrame;
 
 use super::ram::{ELEMENT_SIZES, Target};

@@ -22,7 +22,7 @@ impl Fdcan {
                     (_, true, Some(_)) => 3,
                 };
                 let value = self.psr & !0x18 | activity << 3;
-                // Reading sets the last error codes to "unchanged" and clears the receive flags.
+                // A read of the register sets the last error codes to "unchanged" and clears the receive flags.
                 self.psr = self.psr & !0x7807 | lec::UNCHANGED;
                 self.psr = self.psr & !0x700 | lec::UNCHANGED << 8;
                 value
@@ -147,7 +147,7 @@ impl Fifo {
         if size == 0 || self.fill == 0 {
             return;
         }
-        // All elements up to this one become free.
+        // All FIFO elements up to the acknowledged element become free.
         let freed = (index + size - self.get) % size + 1;
         self.fill = self.fill.saturating_sub(freed);
         self.get = (index + 1) % size;

@@ -1,4 +1,4 @@
-//! Transmission: requests, order, success, failure and cancellation.
+//! Transmission of frames: requests, order, success, failure and cancellation.
 use can_link::CanFrame;
 
 use super::bus::{Outcome, rank};
@@ -22,8 +22,8 @@ impl Fdcan {
         self.ram.load(start, room, self.cccr & cccr::FDOE != 0, self.cccr & cccr::BRSE != 0)
     }
 
-    /// Returns the buffer to be sent next: the one with the lowest identifier. Only the oldest entry of a FIFO is
-    /// considered.
+    /// Returns the transmit buffer to be sent next, which is the buffer with the lowest identifier. Only the
+    /// oldest entry of a FIFO is considered.
     pub(super) fn next_buffer(&self) -> Option<u32> {
         let dedicated = self.dedicated();
         let queue = self.txbc >> 30 & 1 == 1;
@@ -95,8 +95,8 @@ impl Fdcan {
         match outcome {
             Outcome::NoAcknowledge => {
                 self.last_error(lec::ACK);
-                // An error-passive node does not increase its counter without an acknowledgement, because it may be
-                // alone on the bus.
+                // If a frame is not acknowledged, an error-passive node does not increase its error counter,
+                // because no other node may be connected.
                 if self.tec < 128 {
                     self.tec += 8;
                 }

@@ -1,4 +1,4 @@
-//! The contents of the bank, and the effect of a power loss during an operation on them.
+//! The contents of flash bank 2, and how a power loss during an operation changes these contents.
 use std::fmt;
 
 use super::OperationKind;
@@ -15,15 +15,15 @@ const SECTOR_WORDS: usize = 128 * 1024 / WORD;
 /// State of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
-    /// All ones: the word can be programmed.
+    /// All bits of the word are 1, and the word can be programmed.
     Erased,
     /// The word cannot be programmed.
     Programmed,
-    /// Reading it is an error.
+    /// A read of the word causes an error.
     Unreadable,
 }
 
-/// Contents of the bank, which are kept without power.
+/// Contents of flash bank 2, which survive a loss of power.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Bank2 {
     pub(super) bytes: Vec<[u8; WORD]>,
@@ -65,7 +65,8 @@ impl Bank2 {
         self.bytes.as_flattened()[at..at + length].to_vec()
     }
 
-    /// Overwrites the bytes at an address, regardless of the old contents. The words are programmed afterwards.
+    /// Overwrites the bytes at an address, regardless of the old contents. Afterwards, the state of the words is
+    /// "programmed".
     pub fn put(&mut self, address: u32, bytes: &[u8]) {
         let at = (address - BANK2) as usize;
         self.bytes.as_flattened_mut()[at..at + bytes.len()].copy_from_slice(bytes);
@@ -109,7 +110,7 @@ impl Bank2 {
         (sector * SECTOR_WORDS..(sector + 1) * SECTOR_WORDS).for_each(|n| self.erase(n));
     }
 
-    /// Programs a word. If the word was not erased, it becomes unreadable and the function returns `false`.
+    /// Programs a word. If the word was not erased, the word becomes unreadable and the function returns `false`.
     pub fn program(&mut self, n: usize, bytes: &[u8; WORD]) -> bool {
         let erased = self.cells[n] == Cell::Erased;
         self.bytes[n].iter_mut().zip(bytes).for_each(|(old, new)| *old &= new);

@@ -23,7 +23,7 @@ impl Usart {
             idle.min(timeout)
         };
         let Some(first) = self.rx_wire.front() else {
-            // Either of the two may already have passed. A time in the past would be checked in every cycle.
+            // Each of the two times may be in the past. A time in the past would be checked in every cycle.
             let idle = self.idle_from.filter(|_| idle_on).map_or(NEVER, |from| from.saturating_add(frame));
             let timeout = self.timeout_from.filter(|_| self.cr1 & cr1::RTOIE != 0);
             return idle.min(timeout.map_or(NEVER, |from| from.saturating_add(self.timeout())));

@@ -1,4 +1,4 @@
-//! The registers as the core sees them, and the interrupt line that results from them.
+//! The registers that the core accesses, and the interrupt line that the registers control.
 use super::bits::{cr1, isr};
 use super::{FIFO, Usart};
 use crate::clock::Time;

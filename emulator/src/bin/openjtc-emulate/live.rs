@@ -11,11 +11,11 @@ use crate::frames::{Frames, GAP, Incoming};
 use crate::log::DefmtLog;
 use crate::pty::{Pty, PtyError};
 
-/// Largest number of host bytes that may wait for the line.
+/// Largest number of host bytes that may wait for transmission on the serial line.
 const WAITING_MAX: usize = 4096;
-/// Longest wait for a host to read, if virtual time does not follow the clock.
+/// Longest time to wait until the host reads, if virtual time does not follow the clock.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay that virtual time catches up.
+/// Largest delay after which virtual time still catches up with the clock.
 const CATCH_UP: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(1);
 
@@ -32,7 +32,7 @@ pub enum Speed {
 pub struct Live {
     board: Board,
     port: Port,
-    /// Rate of the host, bit/s; `None`: the rate of the firmware.
+    /// Rate of the host, bit/s; `None` means the rate of the firmware.
     baud: Option<u32>,
     pty: Pty,
     speed: Speed,
@@ -92,7 +92,7 @@ impl Live {
                     continue;
                 }
                 if due > CATCH_UP {
-                    // A longer delay is not caught up. Virtual time continues from here.
+                    // After a longer delay, virtual time does not catch up. Virtual time continues from this moment.
                     (start, start_ms) = (Instant::now(), self.board.now_ms());
                 }
             }
@@ -137,8 +137,8 @@ impl Live {
     }
 
     /// Pauses virtual time briefly while bytes of a frame may still be on their way through the operating system,
-    /// because the board would measure the delay as a gap. Does not wait while host bytes still wait for the line.
-    /// Returns `true` if it waited.
+    /// because the board would measure the delay as a gap. Does not pause while host bytes still wait for
+    /// transmission. Returns `true` after a pause.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
         if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
             return Ok(false);
@@ -193,8 +193,8 @@ impl Live {
         Ok(())
     }
 
-    /// Writes the remaining bytes to the terminal. In real time this never waits, because a host that does not read
-    /// must not delay the arm.
+    /// Writes the remaining bytes to the terminal. In real time the function never waits, because a host that does
+    /// not read must not delay the arm.
     fn write_rest(&mut self) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

@@ -30,7 +30,7 @@ impl DefmtLog {
 
 impl Drop for DefmtLog {
     fn drop(&mut self) {
-        // The decoder exits at the end of its input.
+        // The decoder exits when its input ends.
         drop(self.0.stdin.take());
         let _ = self.0.wait();
     }

@@ -1,9 +1,10 @@
-//! Linker script, build id and baud rate. Rejects builds that would compile but not work on the board.
+//! Sets linker script, build id and baud rate of the firmware. Rejects builds that would compile but not work on the
+//! board.
 use std::path::PathBuf;
 use std::process::Command;
 use std::{env, fs};
 
-/// Default of rule J-01.
+/// Default baud rate according to rule J-01.
 const BAUD_DEFAULT: u32 = 115_200;
 const BAUD_MAX: u32 = 15_000_000;
 
@@ -46,7 +47,8 @@ fn main() {
 }
 
 /// Returns the commit that is built, followed by `+` if files were changed since. The text always has thirteen
-/// characters, so that logging takes the same time in every build and measurements of builds can be compared.
+/// characters. Logging therefore takes the same time in every build, and measurements of builds can be
+/// compared.
 fn build_id() -> String {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok()?;

@@ -1,4 +1,4 @@
-//! Start of a board after power-on: supply, clocks, statuses, the version record, the second core.
+//! Start of a board after power-on: supply, clocks, statuses, version record and second core.
 mod rig;
 
 use jtc_core::ControllerState;
@@ -30,8 +30,8 @@ fn j10_clocks_are_those_of_the_documents() {
     }
 }
 
-/// RM0399 and RM0433: PWR_CR3 has LDOEN in bit 1 and SDEN in bit 2. D3CR.VOS 0b11 is scale 1; SYSCFG_PWRCR.ODEN raises
-/// it to scale 0, which is permitted only with the LDO.
+/// RM0399 and RM0433: PWR_CR3 contains LDOEN in bit 1 and SDEN in bit 2. D3CR.VOS 0b11 is scale 1; SYSCFG_PWRCR.ODEN
+/// raises it to scale 0, which is permitted only with the LDO.
 #[test]
 fn supply_and_voltage_are_those_of_the_board() {
     for board in BOARDS {
@@ -69,8 +69,8 @@ fn j12_tim7_ticks_a_thousand_times_a_second() {
     }
 }
 
-/// Memory that DMA and the core share is not cached, and a null pointer causes a fault. ARMv7-M B3.5.9: RASR contains
-/// XN in bit 28, AP in bits 26..24, TEX S C B in bits 21..16, and the size in bits 5..1.
+/// Memory that DMA and the core share is not cached, and an access through a null pointer causes a fault. ARMv7-M
+/// B3.5.9: RASR contains XN in bit 28, AP in bits 26..24, TEX S C B in bits 21..16, and the size in bits 5..1.
 #[test]
 fn memory_is_protected_and_shared_memory_is_not_cached() {
     for board in BOARDS {
@@ -216,12 +216,12 @@ fn the_second_core_is_parked_where_there_is_one() {
         for vector in &words[1..16] {
             assert_eq!(*vector, BANK2 + 64 + 1, "{board}: every vector leads to the sleep");
         }
-        // WFI, then a branch back to it.
+        // The program is WFI and a branch back to WFI.
         assert_eq!(words[16], 0xE7FD_BF30, "{board}");
     }
 }
 
-/// The firmware writes all memory before it reads it.
+/// The firmware writes each memory location before reading it.
 #[test]
 fn what_memory_holds_at_power_on_does_not_matter() {
     let run = |seed| {

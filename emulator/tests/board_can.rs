@@ -1,4 +1,4 @@
-//! The joint bus as the chip's FDCAN controller sees it: timing, filters, errors, bus-off.
+//! Joint bus and FDCAN controller of the chip: timing, filters, errors and bus-off.
 mod rig;
 
 use std::collections::BTreeSet;
@@ -20,7 +20,8 @@ fn expected() -> BTreeSet<u16> {
     [0x200, 0x210, 0x2F0].into_iter().flat_map(|base| (0..7).map(move |node| base + node)).collect()
 }
 
-/// J-10, with the register names of RM0399. The registers contain each value minus one.
+/// J-10: the configuration of the controller, with the register names of RM0399. The registers contain each value
+/// minus one.
 #[test]
 fn j10_registers_of_the_controller() {
     for board in BOARDS {
@@ -28,12 +29,12 @@ fn j10_registers_of_the_controller() {
         rig.run(20);
         let state = rig.board.machine.chip().fdcan.state();
         assert_eq!(state.rates, (1_000_000, 5_000_000), "{board}");
-        // NSJW 2, NBRP 5, NTSEG1 12, NTSEG2 4; TDC, DBRP 1, DTSEG1 12, DTSEG2 4, DSJW 2.
+        // The values are NSJW 2, NBRP 5, NTSEG1 12, NTSEG2 4, and TDC on, DBRP 1, DTSEG1 12, DTSEG2 4, DSJW 2.
         assert_eq!(state.nbtp, 1 << 25 | 4 << 16 | 11 << 8 | 3, "{board}");
         assert_eq!(state.dbtp, 1 << 23 | 11 << 8 | 3 << 4 | 1, "{board}");
         assert_eq!(state.tdcr, 13 << 8, "{board}: the sample point, 13 of 17, after the loop delay");
-        // TXP, BRSE and FDOE are set. INIT, CCE, DAR (so retransmission is on) and NISO (so ISO format is used) are
-        // not.
+        // TXP, BRSE and FDOE are set. INIT and CCE are not set. DAR is not set (retransmission is on), and NISO is
+        // not set (ISO format).
         assert_eq!(state.cccr, 1 << 14 | 1 << 9 | 1 << 8, "{board}");
         // Remote frames and frames that match no filter are rejected, with 11-bit and 29-bit identifiers.
         let gfc = rig.register(FDCAN1 + 0x80);
@@ -59,7 +60,7 @@ fn j10_filters_are_the_expected_answers() {
     assert_eq!(rig.board.machine.chip().fdcan.ram.outside, 0, "nothing beyond the message RAM");
 }
 
-/// Nodes that acknowledge frames but send none.
+/// Nodes that acknowledge frames but do not send frames.
 struct Mute;
 
 impl CanPeers for Mute {
@@ -117,7 +118,7 @@ fn j10_only_expected_frames_arrive() {
     assert_eq!((fdcan.stored, fdcan.state().lost), (42, 0));
 }
 
-/// Returns the frames that the controller sent in this millisecond: start time and torques.
+/// Returns start time and torques of the frames that the controller sent in this millisecond.
 fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     let good = rig.bus.iter().filter(|e| e.from_controller && e.outcome == Outcome::Good);
     good.filter_map(|e| {
@@ -130,8 +131,8 @@ fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     .collect()
 }
 
-/// J-14, J-12: the error is raised at once, the bus recovers by the rules, and a torque that waited during bus-off is
-/// never sent.
+/// J-14, J-12: the error is raised at once, and the controller leaves bus-off as ISO 11898-1 requires. A torque that
+/// waited during bus-off is never sent.
 #[test]
 fn j14_after_bus_off_no_stale_frame() {
     // A pose in which gravity requires torque.
@@ -167,13 +168,13 @@ fn j14_after_bus_off_no_stale_frame() {
         to_us(first.saturating_sub(healed))
     );
     assert!(first > off + 129 * 11 * MILLISECOND / 1000, "129 times 11 recessive bits are waited for");
-    // The error stays until the host clears it (J-21). Then operation continues.
+    // The error remains until the host clears it (J-21). Then operation continues.
     assert_eq!(rig.state(), ControllerState::Error);
     rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
     rig.wait_for_hold(15_000);
 }
 
-/// Returns the number of ticks with this bus fault until Error, and the word of CAN errors at that time.
+/// Returns the number of ticks from the bus fault to the state Error, and the CAN error word at that time.
 fn ticks_to_error(rig: &mut Rig, kind: FaultKind) -> (u64, u32) {
     let before = rig.ticks;
     rig.inject(kind);

@@ -1,6 +1,6 @@
 //! J-07: with any bytes on the lines and any frames on the joint bus, the program does not hang, no tick is missed, and
-//! no reset occurs. In every tick the outputs are the same as those of a controller on the PC with the same inputs
-//! (`rig`).
+//! no reset occurs. In every tick, the outputs of the board equal the outputs of a controller on the PC with the same
+//! inputs (`rig`).
 mod rig;
 
 use std::path::Path;
@@ -35,12 +35,12 @@ fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     inputs
 }
 
-/// Checks the state at the end: one tick per millisecond, no restart, no fault, and the board still answers.
+/// Checks the state at the end of a test: one tick per millisecond, no restart, no fault, and a board that answers.
 fn unharmed(mut rig: Rig) {
     for port in PORTS {
         rig.wait("the line falls silent", 60_000, |rig| rig.board.pending(port) == 0);
     }
-    // The last bytes may be the beginning of a frame, which a gap ends.
+    // The last bytes may be the beginning of a frame, so a gap is sent to end this frame.
     rig.run(20);
     rig.wait("every record", 60_000, |rig| {
         for host in &mut rig.hosts {
@@ -65,7 +65,7 @@ fn unharmed(mut rig: Rig) {
     assert!(late < 1_000, "{late} ns");
 }
 
-/// J-03, J-04, J-05: the records on the line are the same as those of a parser that gets the whole stream. Two kinds of
+/// J-03, J-04, J-05: the records on the line equal the records of a parser that receives all bytes. Two kinds of
 /// exceptions are counted: noise that was merged with another record, and records that were lost because more than 64
 /// were waiting.
 #[test]
@@ -88,14 +88,14 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
                     Event::Bad(bad) => (bad.frame_type, bad.status, bad.length),
                 });
             }
-            // At this rate the transmission of each record takes a millisecond.
+            // At this bit rate, the transmission of a record takes a millisecond.
             rig.run(80);
         }
         rig.run(10);
         let records = rig.hosts[index(port)].records.iter();
         let records: Vec<_> = records.map(|r| (r.frame_type, r.status, r.length)).collect();
         let lost = rig.telemetry().records_lost as usize - lost_before;
-        // Noise is merged with the record of waiting noise. No other record is merged.
+        // Noise is merged with the record of waiting noise. Records of other kinds are not merged.
         let noise = |record: &&(u8, FrameStatus, u16)| record.0 == 0;
         let count = |all: &[(u8, FrameStatus, u16)]| all.iter().filter(|record| !noise(record)).count();
         assert!(count(&records) + lost >= count(&expected), "{name}: {records:?} instead of {expected:?}");
@@ -111,7 +111,7 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
     unharmed(rig);
 }
 
-/// Valid frames with any body, sent to a controller that could execute them.
+/// Valid frames with random contents are sent to a controller that is able to execute them.
 #[test]
 fn j07_kept_frames_with_any_body() {
     let mut rig = fast();
@@ -125,7 +125,8 @@ fn j07_kept_frames_with_any_body() {
     unharmed(rig);
 }
 
-/// Full load on both lines at once: with the 15 MBd firmware, and with another board's firmware at the default rate.
+/// Both lines are under full load, with the 15 MBd firmware and with the firmware of another board at the default
+/// rate.
 #[test]
 fn j07_random_bytes() {
     for (seed, mut rig, bytes) in [(1, fast(), 150_000), (2, Rig::new(BOARDS[2]), 6_000)] {
@@ -142,7 +143,7 @@ fn j07_random_bytes() {
     }
 }
 
-/// Frames with a valid CRC and any type, length and body.
+/// Frames with a valid CRC have a random type, length and body.
 #[test]
 fn j07_random_frames_of_hosts() {
     let mut rng = fastrand::Rng::with_seed(3);
@@ -157,7 +158,7 @@ fn j07_random_frames_of_hosts() {
     unharmed(rig);
 }
 
-/// J-15: any frames that can occur on a bus, between the frames of the real nodes.
+/// J-15: random frames that can occur on a bus are sent between the frames of the real nodes.
 #[test]
 fn j15_random_frames_on_the_joint_bus() {
     for seed in 4..7 {
@@ -174,7 +175,7 @@ fn j15_random_frames_on_the_joint_bus() {
             }
             rig.step();
         }
-        // Without these frames the bus recovers, and a host can clear the errors.
+        // When the random frames end, the bus recovers, and a host can clear the errors.
         rig.wait("the bus is free", 1_000, |rig| rig.board.machine.chip().fdcan.wire.waiting() < 8);
         rig.run(50);
         rig.ask(Port::Usart2, &jtc_sim::host::clear_all());

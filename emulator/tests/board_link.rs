@@ -1,4 +1,4 @@
-//! Both serial lines: gaps, long frames, the line on which each record is sent, overload.
+//! Tests of both serial lines: gaps, long frames, the line on which each record is sent, and overload.
 mod rig;
 
 use jtc_sim::host;
@@ -21,7 +21,7 @@ fn segment(points: usize) -> Vec<u8> {
     frame
 }
 
-/// Runs until the line of a port has been silent for this time.
+/// Runs the board until the line of a port has been silent for this time.
 fn silence(rig: &mut Rig, port: Port, ms: u64) {
     rig.wait("the line falls silent", 10_000, |rig| rig.board.pending(port) == 0);
     rig.run(ms);
@@ -33,13 +33,14 @@ fn no_losses(rig: &mut Rig) {
     }
 }
 
-/// J-03, J-05: sends the first three bytes of a frame, waits a whole number of ms, then sends the rest.
+/// J-03, J-05: sends the first three bytes of a frame, waits a whole number of ms, and sends the remaining bytes.
 #[test]
 fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        // The rest of the frame is too long for an idle line to wake the program right after the gap.
+        // The second part of the frame is so long that the line does not become idle right after the gap and wake the
+        // program.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
         // The transmission time of the first bytes makes the silence 0.2 ms shorter than the time between the two
@@ -75,7 +76,8 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     }
 }
 
-/// J-01, J-07: the longest possible frames, on both lines at once, without losing a byte or a tick.
+/// J-01, J-07: the board receives the longest possible frames on both lines at the same time without losing a byte or
+/// a tick.
 fn longest_frames(mut rig: Rig) {
     rig.bring_up(A);
     let (accepted, refused) = (segment(1500), segment(1666));
@@ -136,7 +138,7 @@ fn j04_every_port_gets_its_own_records() {
             host.records.clear();
         }
         for (port, frames) in PORTS.into_iter().zip(asked) {
-            // In each round the frames begin at another time within the tick.
+            // In each round, the frames begin at a different time within the tick.
             for (_, frame) in frames.iter().cycle().skip(round).take(frames.len()) {
                 rig.write(port, frame);
             }
@@ -173,7 +175,8 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
     }
 }
 
-/// J-03, J-07: noise of any kind costs one record. No frame after it is lost, with or without a gap.
+/// J-03, J-07: noise of any kind causes exactly one record. Frames after the noise are not lost, with or without a
+/// gap.
 #[test]
 fn j03_noise_costs_no_frame_that_follows() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -206,8 +209,8 @@ fn j03_noise_costs_no_frame_that_follows() {
     no_losses(&mut rig);
 }
 
-/// J-07: a port with continuous traffic does not delay the tick (checked in every millisecond). The other port waits at
-/// most for the records that are ahead of its own.
+/// J-07: a port with continuous traffic does not delay the tick (checked in every millisecond). A record of the other
+/// port waits only for records that were queued before it.
 #[test]
 fn j07_a_flooding_port_does_not_starve_the_other() {
     for (flood, other) in [(A, B), (B, A)] {
@@ -249,7 +252,7 @@ fn j04_a_host_that_pipelines_loses_no_record() {
     no_losses(&mut rig);
 }
 
-/// Returns a board that moves the arm along a path, with the host at port A.
+/// Returns a board that moves the arm along a path, controlled by the host at port A.
 fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     let mut rig = Rig::of(elf, &BoardConfig { baud, ..Default::default() });
     rig.bring_up(A);
@@ -289,7 +292,7 @@ fn j04_a_stop_waits_for_nothing() {
                     break;
                 }
             }
-            // The last byte is transmitted in this millisecond, so the next tick or the one after it finds it.
+            // The last byte is transmitted in this millisecond, so one of the next two ticks finds it.
             let mut ticks = 0;
             while rig.flight.urgent[index(port)].is_empty() {
                 ticks += 1;

@@ -26,7 +26,7 @@ impl Finished {
     }
 }
 
-/// A board on a pseudo-terminal, and the program that communicates with it.
+/// An emulated board on a pseudo-terminal, and the program that communicates with the board.
 struct Live {
     jtc: PathBuf,
     directory: PathBuf,
@@ -66,7 +66,7 @@ impl Live {
         finished(self.command(words).spawn().expect("jtc starts"))
     }
 
-    /// Waits until a status contains the value.
+    /// Waits until a status contains this value.
     #[track_caller]
     fn wait_for(&self, name: &str, value: &str) {
         let begin = Instant::now();
@@ -123,7 +123,7 @@ fn a_session_at_the_command_line() {
     let mut live = Live::start(jtc.into(), &Path::new(&firmware).join("nucleo-h745zi-q.elf"));
     let status = live.jtc(&["status"]).ends(0);
     assert!(status.out.contains(r#""missing_parameters":["friction"#), "{}", status.out);
-    // The emulated board runs exactly this file.
+    // The emulated board runs exactly this firmware file.
     let image =
         |board: &str| Path::new(&firmware).join(format!("{board}.elf")).to_string_lossy().into_owned();
     let verified = live.jtc(&["firmware", "verify", "--image", &image("nucleo-h745zi-q")]).ends(0);
@@ -142,7 +142,7 @@ fn a_session_at_the_command_line() {
     assert!(run.shows("outcome", "finished"), "{}", run.out);
     live.wait_for("trajectory", "Finish");
 
-    // A finished run cannot be resumed.
+    // A finished execution cannot be resumed.
     live.jtc(&["traj", "resume"]).ends(4);
     live.jtc(&["traj", "stop"]).ends(0);
     live.wait_for("trajectory", "Stop");
@@ -163,7 +163,7 @@ fn a_session_at_the_command_line() {
     let doctor = live.jtc(&["doctor"]).ends(0);
     assert!(doctor.out.contains(r#""healthy":true"#), "{}", doctor.out);
 
-    // The board was never reset, and its process ends when it gets a signal.
+    // The board was never reset, and its process ends when it receives a signal.
     interrupt(&live.board);
     assert_eq!(live.board.wait().expect("it ends").code(), Some(0));
     let mut errors = String::new();

@@ -1,4 +1,4 @@
-//! J-56: the flight recorder of the board, in memory that survives a reset.
+//! J-56: tests of the board's flight recorder, whose memory survives a reset.
 mod rig;
 
 use jtc_core::recorder::{BLOCK_BYTES, Block, Log, Outcome, Replay};
@@ -47,7 +47,7 @@ fn replayed(rig: &Rig) -> Vec<Telemetry> {
         .collect()
 }
 
-/// The board writes the same log as the recorder on the PC, down to the last word. A replay on the PC gives the values
+/// The log of the board equals the log of the recorder on the PC in every word. A replay on the PC gives the values
 /// that the board computed, for at least two seconds before the error and 0.3 s after it.
 #[test]
 fn j56_a_replay_on_a_pc_is_what_the_board_did() {
@@ -72,13 +72,14 @@ fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     }
 }
 
-/// A watchdog reset does not interrupt a log, and the next start keeps the log. Its pages are read out, equal the pages
-/// of the shadow controller byte by byte, and can be replayed up to the last tick before the reset.
+/// A watchdog reset does not damage a log, and the log remains available after the next start. The pages of the log
+/// can be read and equal the pages of the shadow controller. The log can be replayed up to the last tick before the
+/// reset.
 #[test]
 fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
     let mut rig = moving();
     let last = rig.telemetry().tick;
-    // TIM7 is masked, so no tick follows.
+    // The interrupt of TIM7 is masked, so no further tick occurs.
     rig.may_hang = true;
     rig.board.machine.write_register(0xE000_E184, 1 << (55 - 32));
     rig.run(30);
@@ -100,7 +101,7 @@ fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
         .collect();
     assert!(ticks.last().is_some_and(|tick| last - tick <= 500), "{ticks:?} {last}");
 
-    // Reads a whole block with frames. Each byte is compared with the answers of the shadow controller.
+    // Reads a complete block with frames. Each byte is compared with the answers of the shadow controller.
     for offset in (0..BLOCK_BYTES).step_by(232) {
         rig.ask(HOST, &fixed::get_log(0, offset as u16));
         rig.run(60);

@@ -1,4 +1,4 @@
-//! Safety functions: safety input, a hanging tick, faults and panics of the program.
+//! Tests of safety functions: safety input, a tick that hangs, and faults and panics of the program.
 mod rig;
 
 use jtc_bus::Request;
@@ -22,7 +22,7 @@ fn holding() -> Rig {
     rig
 }
 
-/// Returns the same board while it moves the arm along a trajectory.
+/// Returns a board like `holding`, while it moves the arm along a trajectory.
 fn moving() -> Rig {
     let mut rig = holding();
     rig.set_off(HOST, 1.0, 500);
@@ -37,8 +37,9 @@ fn torque_of(frame: &can_link::CanFrame) -> Option<[f64; 6]> {
     }
 }
 
-/// J-22, J-12, J-21: Error begins in the first tick that reads 0, and the frame of this tick has zero torque. A broken
-/// wire has the same effect. The error stays until the wire is repaired and the host has cleared it.
+/// J-22, J-12, J-21: the state Error begins in the first tick that reads 0. The frame of this tick contains zero
+/// torque. A broken wire has this effect, too. The error remains until the wire is repaired and the host has cleared
+/// the error.
 #[test]
 fn j22_the_safety_input_acts_in_one_tick() {
     for level in [Some(false), None] {
@@ -49,7 +50,7 @@ fn j22_the_safety_input_acts_in_one_tick() {
             assert!(!rig.flight.safety_input && rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
             let sent: Vec<_> = rig.bus.iter().filter(|e| e.from_controller).map(|e| &e.frame).collect();
             assert_eq!(sent.into_iter().map(torque_of).collect::<Vec<_>>(), [Some([0.0; 6])], "on the bus");
-            // Clearing has no effect while the cause is present.
+            // A request to clear the error has no effect while its cause is present.
             rig.ask(HOST, &frames::clear_all());
             rig.run(50);
             assert_eq!(rig.state(), ControllerState::Error);
@@ -69,7 +70,7 @@ fn j22_the_safety_input_acts_in_one_tick() {
 }
 
 /// Sets the safety input low for `us` µs, beginning `phase` µs after the start of a millisecond. Returns `true` if one
-/// of the next two ticks has detected it.
+/// of the next two ticks has detected the low level.
 fn pulse(rig: &mut Rig, phase: u64, us: u64) -> bool {
     let start = rig.board.now_ms() * 1000 + phase;
     rig.board.machine.run_until(start * MICROSECOND);
@@ -112,9 +113,9 @@ struct End {
     /// Time of the reset.
     reset: Time,
     cause: ResetCause,
-    /// Record that the program left about its end.
+    /// Record that the program wrote about the cause of its end.
     last_words: Vec<u8>,
-    /// Torques in the frames that were sent between these two times.
+    /// Torques in the frames that were sent between `begin` and `reset`.
     torques: Vec<[f64; 6]>,
     /// Level of the safety output before the reset.
     safety: Option<bool>,
@@ -157,8 +158,9 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     panic!("no reset");
 }
 
-/// Checks the state after such an end. From the first status on, the error is present, the torque is zero and the
-/// safety output is at 0, until the host clears the error. No motion continues by itself.
+/// Checks the state after the program has failed and restarted. From the first status on, the error is present,
+/// the torque is zero and the safety output is at 0, until the host clears the error. The arm does not continue
+/// a motion without a command.
 fn latched_until_cleared(mut rig: Rig, cause: u32) {
     rig.wait("the first tick", 10, |rig| rig.ticks > 0);
     assert_eq!(rig.flight.cause, cause);
@@ -202,7 +204,7 @@ fn moved(rig: &Rig, since: &[f64; 6]) -> f64 {
 
 const CONTROL_STEP: &str = "control_step";
 
-/// Overwrites the first instructions of the control step; returns the old ones and their address.
+/// Overwrites the first instructions of the control step; returns the old instructions and their address.
 fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
     let at = rig.board.machine.elf().symbol(CONTROL_STEP).expect("the control step").address;
     let old = rig.board.machine.memory(at, code.len()).expect("flash");
@@ -213,7 +215,7 @@ fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
 /// J-12: if a tick does not end, or does not begin, the watchdog resets the board within 6 ms.
 #[test]
 fn j12_a_tick_that_hangs_resets_the_board() {
-    // `true`: the step is replaced by `b .`; `false`: the interrupt of TIM7 is masked in the NVIC.
+    // If `true`, the step is replaced by `b .`; if `false`, the interrupt of TIM7 is masked in the NVIC.
     for hang in [true, false] {
         let mut rig = holding();
         let pose = rig.board.plant().truth().q;
@@ -245,8 +247,8 @@ fn j24_after_a_hang_no_trajectory_goes_on() {
     latched_until_cleared(rig, 4);
 }
 
-/// Checks the end by a fault or a panic: the safety output goes to 0, one frame with zero torque is sent, then the
-/// board is reset. The cause is kept.
+/// Checks the reaction to a fault or a panic: the safety output becomes 0, one frame with zero torque is sent, and
+/// the board is reset. The cause is recorded.
 fn said_goodbye(end: &End) {
     assert_eq!(end.cause, ResetCause::Software);
     assert_eq!(
@@ -279,7 +281,7 @@ fn j12_a_hard_fault_takes_the_torque_away() {
     }
 }
 
-/// An invalid pointer: the tick loads from an unmapped address.
+/// The tick uses an invalid pointer and loads from an unmapped address.
 #[test]
 fn j12_a_null_pointer_is_a_hard_fault() {
     let mut rig = holding();
@@ -306,7 +308,8 @@ fn branch(from: u32, to: u32) -> [u8; 4] {
 #[test]
 fn j12_a_panic_takes_the_torque_away() {
     let mut rig = holding();
-    // Functions that panic. Each takes a source location as one of its first arguments, if it takes one at all.
+    // Functions that panic. If such a function has a source location as an argument, it is one of the first
+    // arguments.
     const PANICS: [&str; 4] = [
         "core::option::unwrap_failed",
         "core::panicking::panic_bounds_check",
@@ -315,7 +318,7 @@ fn j12_a_panic_takes_the_torque_away() {
     ];
     let elf = rig.board.machine.elf();
     let panic = PANICS.iter().find_map(|name| elf.symbol(name).ok()).expect("a function that panics").address;
-    // Written to free flash: the four arguments, the branch, a `Location`, a name.
+    // The code that sets the four arguments, the branch, a `Location` and a name are written to free flash.
     const STUB: u32 = 0x080F_0000;
     let mut stub = vec![0x03, 0x48, 0x01, 0x46, 0x02, 0x46, 0x03, 0x46];
     stub.extend(branch(STUB + 8, panic));
@@ -337,7 +340,8 @@ fn j12_a_panic_takes_the_torque_away() {
     latched_until_cleared(rig, 6);
 }
 
-/// A reset by the button or the supply is not a failure. The board starts in Init without an error, and moves nothing.
+/// A reset by the button or the supply is not a failure. The board starts in Init without an error, and does not move
+/// the arm.
 #[test]
 fn j24_reset_and_power_on_begin_in_init() {
     for (cause, number) in [(ResetCause::Pin, 2), (ResetCause::PowerOn, 1)] {

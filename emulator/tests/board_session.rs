@@ -1,5 +1,5 @@
-//! Whole sessions with a host and an arm, in virtual time. In every tick a controller on the PC must compute
-//! bit-identical values (`rig`).
+//! Whole sessions with a host and an arm, in virtual time. In every tick, a controller on the PC must
+//! compute values that are bit-identical to the values of the board (`rig`).
 mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -12,7 +12,7 @@ use rig::{BOARDS, Rig, fast_elf};
 const HOST: Port = Port::Usart2;
 const GOAL: [f64; 6] = [0.5, 0.4, -0.5, 0.4, -0.3, 0.6];
 
-/// Returns a motion out and back that takes 4 s, with 1001 points at 4 ms.
+/// Returns a motion to another position and back that takes 4 s, with 1001 points every 4 ms.
 fn motion() -> Vec<RawPoint> {
     let points = frames::there_and_back(&[0.0; 6], &GOAL, 2.0, 1, 4);
     assert_eq!(points.len(), 1001);
@@ -44,7 +44,7 @@ impl Rig {
     }
 }
 
-/// Runs until the trajectory is in this execution state; returns the largest following error.
+/// Runs the board until the trajectory is in this execution state; returns the largest following error.
 #[track_caller]
 fn follow(rig: &mut Rig, until: TrajectoryState, ms: u64) -> f64 {
     let mut worst: f64 = 0.0;
@@ -59,18 +59,19 @@ fn accepted(response: Response) -> bool {
     (response.status, response.data) == (FrameStatus::NoError, DataStatus::NoError)
 }
 
-/// J-20, J-30..J-34, J-25: defaults, upload, execute, pause, resume, stop, execution to the end, teaching.
+/// J-20, J-30..J-34, J-25: a session with defaults, upload, execution, pause, resume, stop, execution to the end and
+/// Teaching.
 #[test]
 fn a_whole_session() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(HOST);
     let limit = Config::default().joints.map(|j| j.position_error_max).into_iter().fold(f64::MAX, f64::min);
-    // J-51: the kind of line on which segment 0 arrives decides if this upload can get all data status values,
-    // including 7 and 8.
+    // J-51: the kind of line on which segment 0 arrives determines if this upload can get all data status
+    // values, including 7 and 8.
     rig.ask(HOST, &fixed::GET_INFO);
     rig.upload(&motion(), 4);
 
-    // J-33: the arm pauses on the path and is at rest after a ramp; resume; stop.
+    // J-33: after Pause, the arm slows down on the path and is at rest after a ramp. Resume and Stop follow.
     assert!(accepted(rig.exec(ExecCommand::Execute)));
     rig.run(1_000);
     assert_eq!(rig.state(), ControllerState::Operate);
@@ -89,14 +90,14 @@ fn a_whole_session() {
     assert!(rig.telemetry().point > held, "it goes on where it was");
     assert!(accepted(rig.exec(ExecCommand::Stop)));
     let stopped = follow(&mut rig, TrajectoryState::Stop, 1_000);
-    // J-34: execution cannot start from a position in the middle of the path. J-51: only a host that has sent GetInfo
-    // recently gets the reason.
+    // J-34: execution cannot start from a position in the middle of the path. J-51: only a host that has recently
+    // sent GetInfo receives the reason.
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::IncorrectValue);
     rig.ask(HOST, &fixed::GET_INFO);
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::StartPositionMismatch);
     assert_eq!(rig.exec(ExecCommand::Pause).data, DataStatus::NotAllowed);
 
-    // J-31: moves home, then executes the whole trajectory.
+    // J-31: the arm moves to the start position and then executes the whole trajectory.
     let here = rig.telemetry().joints.map(|j| j.set_position);
     rig.upload(&frames::there_and_back(&here, &[0.0; 6], 2.0, 1, 10)[..201], 10);
     assert!(accepted(rig.exec(ExecCommand::Execute)));
@@ -113,7 +114,7 @@ fn a_whole_session() {
     // J-25.
     rig.wait("HoldPos behind the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
     rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
-    // Teaching begins when the integral part of the controller has settled after the motion.
+    // Teaching begins when the integral term of the controller has settled after the motion.
     rig.wait("Teaching", 3_000, |rig| rig.state() == ControllerState::Teaching);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);
@@ -124,8 +125,8 @@ fn a_whole_session() {
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
 }
 
-/// The arm lowers a load of 3.3 kg at the last link, which the controller knows. In the position that needs 95 % of the
-/// shoulder's torque limit, the arm gets a Stop.
+/// The arm lowers a load of 3.3 kg at the last link, which the controller knows. The Stop arrives in the position that
+/// needs 95 % of the shoulder's torque limit.
 #[test]
 fn j33_a_loaded_arm_stands_within_half_a_second() {
     const SHOULDER: usize = 1;
@@ -170,8 +171,8 @@ fn j33_a_loaded_arm_stands_within_half_a_second() {
 }
 
 /// J-40: with a host's own parameters, friction tables, exceeded limits and errors, every torque is bit-identical to
-/// the one computed on a PC, and so are the bytes of every frame and status. The rig compares them in each tick; this
-/// test checks that the compared cases occurred.
+/// the torque that a PC computes. The bytes of every frame and status are also identical. The rig compares these
+/// values in each tick; this test checks that all these cases have occurred.
 #[test]
 fn j40_torques_have_the_same_bits_as_on_a_pc() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -191,14 +192,14 @@ fn j40_torques_have_the_same_bits_as_on_a_pc() {
         moved.insert(rig.flight.torque.map(f64::to_bits));
     }
     assert!(moved.len() > 1_000, "{} different torques", moved.len());
-    // A stuck joint yields, and the others stop on their path (J-66).
+    // A stuck joint yields, and the other joints stop on the path (J-66).
     rig.inject(jtc_sim::FaultKind::Friction { joint: jtc_bus::Joint::ALL[1], factor: 30.0 });
     rig.wait("a held stop", 2_000, |rig| rig.state() == ControllerState::HoldPos);
     rig.run(200);
     assert_ne!(rig.status(HOST).joints[1].internal_occurred, 0, "of that joint");
 }
 
-/// The other boards and the other line.
+/// A session works on the other boards and on the other line.
 #[test]
 fn a_short_session_on_every_board() {
     let points = frames::there_and_back(&[0.0; 6], &GOAL.map(|q| q / 4.0), 0.5, 1, 5);
@@ -212,7 +213,7 @@ fn a_short_session_on_every_board() {
     }
 }
 
-/// The firmware for fast lines behaves the same.
+/// The firmware for fast lines behaves like the firmware for the default rate.
 #[test]
 fn a_short_session_at_15_mbd() {
     let points = frames::there_and_back(&[0.0; 6], &GOAL.map(|q| q / 4.0), 0.5, 1, 5);
@@ -223,7 +224,7 @@ fn a_short_session_at_15_mbd() {
     follow(&mut rig, TrajectoryState::Finish, 2_500);
 }
 
-/// Older drives: another velocity scale, one message per interrupt, answers during transitions.
+/// Older drives use another velocity scale, handle one message per interrupt and answer during transitions.
 #[test]
 fn j12_older_drives_are_not_left_behind() {
     let sim = SimConfig {
@@ -237,8 +238,8 @@ fn j12_older_drives_are_not_left_behind() {
     assert_eq!(rig.status(HOST).occurred, 0);
 }
 
-/// J-12: the frames on the bus in each millisecond are one broadcast of the controller, begun within microseconds of
-/// the tick, and its answers.
+/// J-12: in each millisecond, the bus carries one broadcast of the controller and the answers to it. The broadcast
+/// begins within microseconds of the tick.
 #[test]
 fn j12_one_broadcast_a_tick_and_its_answers() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -252,7 +253,8 @@ fn j12_one_broadcast_a_tick_and_its_answers() {
         assert_eq!(own, 1, "ms {ms}");
         entries.extend(rig.bus.iter().cloned());
     }
-    // Grouped by ticks, from one broadcast to the next. Ticks need not begin with the milliseconds of this test.
+    // The frames are grouped by ticks, from one broadcast to the next. Ticks need not begin with the milliseconds of
+    // this test.
     let first = entries.iter().position(|e| e.from_controller).expect("a broadcast");
     let rounds: Vec<_> = entries[first..].chunk_by(|_, next| !next.from_controller).collect();
     let mut starts = Vec::new();

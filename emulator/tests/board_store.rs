@@ -1,6 +1,6 @@
-//! J-54: the stored arm. The test moves the flash contents of an emulated board to the next board, which simulates a
-//! loss of power, and requests a store through the firmware's mailbox, which is accessible only to a test or a
-//! debugger.
+//! J-54: tests of the stored arm. To simulate a loss of power, the test copies the flash contents of an emulated
+//! board to the next board. The test requests a store through the firmware's mailbox, which is accessible only to
+//! a test or a debugger.
 mod rig;
 
 use jtc_wire::{Name, SettingValue, StoreState, fixed, set_settings};
@@ -13,10 +13,10 @@ use rig::{BOARDS, Rig, elf};
 /// Interrupt of the tick.
 const TIM7: usize = FIRST_LINE + 55;
 const IMAGE_MAX: usize = jtc_core::slots::IMAGE_MAX;
-/// Addresses of the slots.
+/// Flash addresses of the slots of the stored arm.
 const SLOTS: [u32; 2] = [BANK2 + 6 * 0x2_0000, BANK2 + 7 * 0x2_0000];
 
-/// The firmware's mailbox: these words in the order of `firmware/src/arm_store.rs`.
+/// The mailbox of the firmware, with its words in the order of `firmware/src/arm_store.rs`.
 #[derive(Debug, PartialEq)]
 struct Mailbox {
     state: u32,
@@ -44,7 +44,7 @@ fn loaded(machine: &Machine) -> Option<(Vec<u8>, u32)> {
     (address != 0).then(|| (machine.memory(address, length as usize).expect("memory"), sequence))
 }
 
-/// Requests a store in the same way as a host's frame does.
+/// Requests a store in the way that a frame of a host does.
 fn ask(machine: &mut Machine, image: &[u8]) {
     let at = machine.elf().symbol("ARM_STORE").expect("the mailbox").address;
     let staging = mailbox(machine).staging;
@@ -84,7 +84,7 @@ fn working(rig: &Rig) -> bool {
     !matches!(mailbox(&rig.board.machine).state, DONE | FAILED)
 }
 
-/// Checks the conditions that must hold after every operation on the flash.
+/// Checks the conditions that must be true after every flash operation.
 #[track_caller]
 fn clean(rig: &mut Rig) {
     let chip = rig.board.machine.chip();
@@ -113,7 +113,7 @@ fn clean(rig: &mut Rig) {
     assert_eq!(wrong, None, "the first sectors are not the store's");
 }
 
-/// J-54: a stored image survives a loss of power, and the image before it stays in flash until the next store.
+/// J-54: a stored image survives a loss of power, and the previous image remains in flash until the next store.
 #[test]
 fn j54_a_stored_image_outlasts_the_power() {
     let mut rig = board(Bank2::default());
@@ -189,8 +189,8 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     clean(&mut rig);
 }
 
-/// J-12: erasing a sector takes at least two seconds. Meanwhile every tick is on time and has the same number of
-/// instructions as without an operation.
+/// J-12: erasing a sector takes at least two seconds. During this time, every tick is on time and executes as
+/// many instructions as without a flash operation.
 #[test]
 fn j12_no_tick_is_late_while_the_flash_works() {
     let run = |ask_for: Option<&[u8]>| {
@@ -215,8 +215,8 @@ fn j12_no_tick_is_late_while_the_flash_works() {
     }
 }
 
-/// J-54: the power fails at every operation of a store: before it, in the middle of it, and after it. The board starts
-/// with either the old or the new image, complete, and can store the next image.
+/// J-54: the power fails at every operation of a store: before it, in the middle of it, and after it. The board then
+/// starts with either the complete old image or the complete new image, and can store the next image.
 #[test]
 fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     let images = [image(200, 1), image(IMAGE_MAX, 2), image(260, 3)];
@@ -240,8 +240,8 @@ fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     }
 }
 
-/// Stores an image on a board with this flash. Returns the flash afterwards, and its contents after a loss of power
-/// before, during and after operations, each with a description.
+/// Stores an image on a board with this flash. Returns the flash after the store. Also returns, each with a
+/// description, the flash contents after a loss of power before, during and after operations.
 fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     let mut rig = board(bank);
     let mut cuts = vec![("before all".to_owned(), rig.board.machine.cut_power(0))];
@@ -254,9 +254,9 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
         let Some(operation) = operations.get(seen).copied() else { continue };
         seen += 1;
         let what = operation.kind;
-        // Most cuts are made during the first operation (erasing) and the last one: a half-erased sector can have many
-        // contents, and the last word, the header, decides if an image is valid. A few of the many data words are
-        // enough.
+        // Most power losses occur during the first operation (erasing) and the last operation. A half-erased sector
+        // can have many different contents, and the last word, the header, determines if an image is valid. Tests of
+        // a few of the many data words are enough.
         let last = 1 + 1 + new.len().div_ceil(WORD);
         let times = match seen {
             1 => 24,
@@ -277,7 +277,8 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     (rig.board.machine.cut_power(0), cuts)
 }
 
-/// For the flash, a reset by the button or the watchdog in the middle of an operation is the same as a loss of power.
+/// For the flash, a reset by the button or the watchdog in the middle of an operation has the same effect as a loss
+/// of power.
 #[test]
 fn j54_a_reset_in_the_middle_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));
@@ -302,8 +303,8 @@ fn start(bank: Bank2) -> Option<Vec<u8>> {
     loaded(&rig.board.machine).map(|(image, _)| image)
 }
 
-/// J-54: an unreadable word anywhere in a slot causes no fault, and its slot is not used as an image. The slot can be
-/// overwritten.
+/// J-54: an unreadable word in a slot does not cause a fault. The firmware does not use the contents of the slot. The
+/// slot can be overwritten.
 #[test]
 fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     let mut rig = board(Bank2::default());
@@ -327,7 +328,8 @@ fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     }
 }
 
-/// If the flash reports an error, the firmware reports it, the previous image stays, and the next attempt may succeed.
+/// If the flash reports an error, the firmware reports the error. The previous image remains, and the next attempt
+/// may succeed.
 #[test]
 fn j54_a_failed_store_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));
@@ -338,8 +340,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
         rig.wait("the operation", 4_000, |rig| {
             let operations = &rig.board.machine.chip().flash.operations;
             let last = operations.last().map(|operation| operation.kind);
-            // An erase operation takes long. Words are written within milliseconds, and the current or the next one
-            // fails.
+            // An erase operation takes long. Words are written within milliseconds, and writing of the current or
+            // the next word fails.
             last.is_some_and(|kind| matches!(kind, OperationKind::Program { .. }) == program)
                 && (program || rig.board.machine.chip().flash.busy_until(0).is_some())
         });
@@ -354,8 +356,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// Failures that the flash does not report: it no longer accepts keys, a word reads back differently, or an erase
-/// operation never ends.
+/// The flash does not report the following failures: it no longer accepts keys, a word reads back differently, or
+/// an erase operation never ends.
 #[test]
 fn j54_a_store_that_cannot_work_ends() {
     let fails = |mut rig: Rig, failure: u32| {

@@ -1,10 +1,10 @@
-//! The stored arm (J-54): an image of bytes that is kept without power, and the operations that a host can request on
-//! it.
+//! The stored arm (J-54): an image of bytes that survives a loss of power, and the operations on the image that a
+//! host can request.
 //!
-//! At the start [`load`] finds the newest complete image and copies it into memory, before the first tick. Later the
-//! tick passes an image to [`begin`] and reads the result with [`progress`]. The loop that serves the links stores the
-//! image, one small step per pass ([`Store::step`]). No code waits for the flash, and no interrupt is delayed by more
-//! than a few instructions.
+//! At the start [`load`] finds the newest complete image and copies it into memory, before the first tick. When a host
+//! requests a store, the tick passes an image to [`begin`] and reads the result with [`progress`]. The loop that
+//! serves the links stores the image, one small step per pass ([`Store::step`]). No code waits for the flash, and no
+//! interrupt is delayed by more than a few instructions.
 //!
 //! `jtc_core::slots` defines the contents of the slots and the order of the steps; [`bank2`] operates the flash itself.
 use core::cell::Cell;
@@ -16,17 +16,17 @@ use jtc_core::slots::{Action, Header, IMAGE_MAX, Slots, Storing, WORD, Word};
 
 use crate::bank2;
 
-/// Memory for one image.
+/// Memory for one image of an arm.
 pub type Buffer = [u8; IMAGE_MAX];
 
-/// The slowest sector takes 4 s to erase, the slowest word 0.5 ms to program (data sheet).
+/// According to the data sheet, a sector takes at most 4 s to erase, and a word at most 0.5 ms to program.
 const ERASE_MAX: Duration = Duration::from_secs(8);
 const PROGRAM_MAX: Duration = Duration::from_millis(50);
 
-/// Mailbox between tick and links. Its layout is fixed so that a debugger can read it: these words in this order.
+/// Mailbox between tick and links. The order of its words is fixed, so that a debugger can read the mailbox.
 #[repr(C)]
 pub struct Mailbox {
-    /// State: [`Mailbox::IDLE`] or one of the other constants.
+    /// State of the store: [`Mailbox::IDLE`] or another constant of this type.
     state: AtomicU32,
     /// Number of bytes of the image to be stored.
     length: AtomicU32,
@@ -36,7 +36,7 @@ pub struct Mailbox {
     failure: AtomicU32,
     /// Address of the buffer with the image to be stored.
     staging: AtomicU32,
-    /// Image found at the start: address (0: none), number of bytes, sequence number.
+    /// Image that was found at the start, as address (0 if none), number of bytes and sequence number.
     loaded: [AtomicU32; 3],
 }
 
@@ -60,12 +60,12 @@ pub static ARM_STORE: Mailbox = Mailbox {
     loaded: [const { AtomicU32::new(0) }; 3],
 };
 
-/// Buffer for an image to be stored. The side that has taken it out owns it.
+/// Buffer for an image to be stored. The side that has taken the buffer out owns the buffer.
 static STAGING: Mutex<Cell<Option<&'static mut Buffer>>> = Mutex::new(Cell::new(None));
-/// Image found at the start.
+/// Image that was found in flash at the start.
 static LOADED: Mutex<Cell<Option<Loaded>>> = Mutex::new(Cell::new(None));
 
-/// The image found at the start.
+/// Image that was found in flash at the start.
 #[derive(Clone, Copy)]
 pub struct Loaded {
     /// Bytes of the image.
@@ -83,10 +83,10 @@ pub enum Refused {
     TooLong,
 }
 
-/// Progress of the last image.
+/// Progress of storing the last image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// No image was passed to [`begin`] since the start.
+    /// No image has been passed to [`begin`] since the start.
     Idle,
     /// The image is being stored.
     Busy,
@@ -109,13 +109,13 @@ pub enum Failure {
     Erase = 2,
     /// The flash reported an error during programming.
     Program = 3,
-    /// The programmed data reads back differently: the sector is worn out.
+    /// The data that were read back differ from the programmed data, because the sector is worn out.
     Verify = 4,
     /// The flash did not become ready in time.
     Timeout = 5,
 }
 
-/// Accepts an image to be stored. Called by the tick; copies the bytes and returns at once.
+/// Accepts an image to be stored. The tick calls this function, which copies the bytes and returns at once.
 pub fn begin(image: &[u8]) -> Result<(), Refused> {
     if matches!(ARM_STORE.state.load(Ordering::Acquire), Mailbox::ASKED | Mailbox::BUSY) {
         return Err(Refused::Busy);
@@ -130,7 +130,7 @@ pub fn begin(image: &[u8]) -> Result<(), Refused> {
     Ok(())
 }
 
-/// Returns the progress of the last image.
+/// Returns the progress of storing the last image.
 pub fn progress() -> Progress {
     match ARM_STORE.state.load(Ordering::Acquire) {
         Mailbox::ASKED | Mailbox::BUSY => Progress::Busy,
@@ -146,12 +146,12 @@ pub fn progress() -> Progress {
     }
 }
 
-/// Returns the image found at the start, which does not change until the next start.
+/// Returns the image that was found at the start. The image does not change until the next start.
 pub fn loaded() -> Option<Loaded> {
     critical_section::with(|cs| LOADED.borrow(cs).get())
 }
 
-/// Reads a slot; returns its header if it is complete.
+/// Reads a slot and returns its header if the image in the slot is complete.
 fn read(slot: usize, buffer: &mut Buffer) -> Option<Header> {
     let first = bank2::read(slot, 0);
     if first == Some([0xFF; WORD]) {
@@ -169,7 +169,7 @@ fn read(slot: usize, buffer: &mut Buffer) -> Option<Header> {
     header
 }
 
-/// Finds the stored image. Must be called once, before the first tick, while the watchdog does not run yet.
+/// Finds the stored image. Must be called once, before the first tick and before the watchdog starts.
 pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
     let [first, second] = buffers;
     let headers = [read(0, first), read(1, second)];
@@ -191,7 +191,7 @@ pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
     Store { slots, job: None }
 }
 
-/// The links' side of the store.
+/// The part of the store that the links execute.
 pub struct Store {
     slots: Slots,
     job: Option<Job>,
@@ -240,7 +240,8 @@ impl Store {
     fn end(&mut self, result: Result<(), Failure>) {
         let Some(Job { image, length, storing, .. }) = self.job.take() else { return };
         let flags = bank2::errors();
-        // A bank that is still busy is left alone, and reads of it stay blocked. The next attempt checks it again.
+        // If the bank is still busy, it is not accessed, and reads of the bank remain blocked. The next attempt
+        // checks the bank again.
         if !bank2::busy() {
             bank2::lock();
         }
@@ -269,7 +270,8 @@ impl Job {
         self.storing.action(self.image.get(..self.length).unwrap_or(&[]))
     }
 
-    /// Checks if the flash has finished, and begins the next action. Returns `true` when the image is stored.
+    /// Checks if the flash has finished its operation, and begins the next action. Returns `true` when the image is
+    /// stored.
     fn step(&mut self) -> Result<bool, Failure> {
         if let Some(begun) = self.begun {
             let limit = if matches!(self.action(), Action::Erase { .. }) { ERASE_MAX } else { PROGRAM_MAX };

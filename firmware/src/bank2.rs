@@ -1,10 +1,10 @@
-//! Flash bank 2, whose last two sectors contain the stored arm (J-54). Erasing and programming never block, and reading
-//! a damaged word causes no fault.
+//! Flash bank 2, whose last two sectors contain the stored arm (J-54). Erasing and programming never block, and a read
+//! of a damaged word does not cause a fault.
 //!
-//! A read of the bank during erasing or programming would halt the processor until the operation ends. That takes up to
-//! two seconds, but the watchdog allows only 4.5 ms. The memory protection unit therefore blocks every access,
-//! including speculative reads and cache line fills ([`memory::bank2`]). Only the few instructions in this module open
-//! the bank, as memory that is neither cached nor prefetched. Code and constants are in bank 1, which stays readable.
+//! A read of the bank during erasing or programming would halt the processor until the operation ends. An operation
+//! takes up to two seconds, but the watchdog allows only 4.5 ms. The memory protection unit therefore blocks every
+//! access, including speculative reads and cache line fills ([`memory::bank2`]). Only this module permits accesses to
+//! the bank, as memory that is neither cached nor prefetched. Code and constants are in bank 1, which remains readable.
 use core::arch::asm;
 
 use cortex_m::peripheral::SCB;
@@ -23,11 +23,11 @@ const PSIZE: u8 = 0b10;
 /// BFHFNMIGN in the register CCR of the core.
 const IGNORE_BUS_FAULTS: u32 = 1 << 8;
 
-/// Errors that the bank reports, bits of FLASH_SR2: write protection, sequence, strobe, inconsistency, operation, read
-/// protection, read security, two wrong bits in a word.
+/// Bits of FLASH_SR2 that report errors: write protection, sequence, strobe, inconsistency, operation, read
+/// protection, read security, and two wrong bits in a word.
 const ERRORS: u32 = 1 << 17 | 1 << 18 | 1 << 19 | 1 << 21 | 1 << 22 | READ_ERRORS;
 const READ_ERRORS: u32 = 1 << 23 | 1 << 24 | 1 << 26;
-/// Flags that are cleared together with the errors: end of operation, corrected error of one bit.
+/// Flags that are cleared together with the errors: end of operation, and corrected one-bit error.
 const REMARKS: u32 = 1 << 16 | 1 << 25;
 
 /// Returns the registers of the bank.
@@ -35,7 +35,7 @@ fn bank() -> Bank {
     pac::FLASH.bank(1)
 }
 
-/// Unlocks the registers. Returns `false` if they stay locked until the next reset.
+/// Unlocks the registers. Returns `false` if the registers remain locked until the next reset.
 pub fn unlock() -> bool {
     if bank().cr().read().lock() {
         KEYS.into_iter().for_each(|key| bank().keyr().write_value(key));
@@ -43,7 +43,7 @@ pub fn unlock() -> bool {
     !bank().cr().read().lock()
 }
 
-/// Ends an operation and locks the registers. No operation can begin before [`unlock`].
+/// Ends an operation and locks the registers. After this call, no operation can begin until [`unlock`] is called.
 pub fn lock() {
     end();
     bank().cr().modify(|w| w.set_lock(true));
@@ -55,12 +55,12 @@ pub fn busy() -> bool {
     sr.bsy() || sr.qw()
 }
 
-/// Ends programming or erasing, so that later writes do not belong to that operation.
+/// Ends programming or erasing, so that later writes do not become part of that operation.
 pub fn end() {
     bank().cr().write(|w| w.set_psize(PSIZE));
 }
 
-/// Returns the errors since the operation began, as bits of FLASH_SR2.
+/// Returns the errors that have occurred since the operation began, as bits of FLASH_SR2.
 pub fn errors() -> u32 {
     bank().sr().read().0 & ERRORS
 }
@@ -102,7 +102,7 @@ pub fn program(slot: usize, word: usize, bytes: &Word) {
     let last = words.len() - 1;
     memory::bank2(true);
     (0..last).for_each(write);
-    // The last word starts programming. Interrupts are masked until the bank is closed again.
+    // The write of the last 32 bits starts programming. Interrupts are masked until the bank is closed again.
     critical_section::with(|_| {
         write(last);
         memory::bank2(false);
@@ -112,7 +112,8 @@ pub fn program(slot: usize, word: usize, bytes: &Word) {
 /// Reads a word; returns `None` if it cannot be read. Must not be called while the bank is busy.
 ///
 /// If programming or erasing a word was interrupted, the word may have more wrong bits than the flash can correct.
-/// Reading it causes a bus fault, which the core ignores here. The flag that the flash sets shows the error instead.
+/// A read of such a word causes a bus fault, which the core ignores here. Instead, this function checks the error
+/// flag of the flash.
 pub fn read(slot: usize, word: usize) -> Option<Word> {
     clear();
     // SAFETY: a register of the core. No other code changes this bit, and the bit has an effect only while faults are

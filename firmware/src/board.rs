@@ -1,4 +1,4 @@
-//! The boards: their pins, safety wires and LEDs.
+//! Pins, safety wires and LEDs of the boards.
 use embassy_stm32::gpio::{AfType, Flex, Output, OutputType, Pin, Pull, Speed};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::{Peri, pac};
@@ -12,7 +12,7 @@ use safety_input::SafetyInput;
 mod nucleo_144;
 pub use nucleo_144::wire;
 
-/// A board with its pins assigned.
+/// A board whose pins are assigned to their functions.
 pub struct Board {
     /// RS422 and USB.
     pub lines: [Line; 2],
@@ -24,16 +24,16 @@ pub struct Board {
 
 /// Safety wires and LEDs.
 pub struct Pins {
-    /// 0 means an error; pulled down, so that a broken wire reads as an error (J-22).
+    /// Safety input: 0 means an error. The pin is pulled down, so that a broken wire reads as an error (J-22).
     pub safety_input: SafetyInput,
-    /// 0 means an error (J-22).
+    /// Safety output: 0 means an error (J-22).
     pub safety_output: Output<'static>,
     /// LED1, LED2, LED3.
     pub leds: [Output<'static>; 3],
 }
 
 impl Pins {
-    /// Creates the pins; `input` and `output` are the pins of the safety wires.
+    /// Configures the pins; `input` and `output` are the pins of the safety wires.
     fn new(
         input: Peri<'static, impl Pin>,
         output: Peri<'static, impl Pin>,
@@ -73,28 +73,28 @@ fn transmit(pin: Peri<'static, impl Pin>, function: u8) {
     core::mem::forget(pin);
 }
 
-/// Like `transmit`, but for an input. Pulled up to the level of an idle line, so that an unconnected input receives
-/// nothing.
+/// Like `transmit`, but for an input. The pin is pulled up to the level of an idle line, so that an unconnected
+/// input does not receive bytes.
 fn receive(pin: Peri<'static, impl Pin>, function: u8) {
     let mut pin = Flex::new(pin);
     pin.set_as_af_unchecked(function, AfType::input(Pull::Up));
     core::mem::forget(pin);
 }
 
-/// Bit of the safety output in port D, which all boards use for it.
+/// Bit of the safety output in port D; all boards use this pin.
 const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } else { 4 };
 
-/// Drives the safety output to 0 as the first action after a reset, even if the clocks do not start: the drives may
-/// still hold the torque that the last program commanded.
+/// Drives the safety output to 0 as the first action after a reset, even if the clocks do not start. The drives may
+/// still apply the torque that the program commanded before the reset.
 pub fn safety_output_low_at_start() {
     pac::RCC.ahb4enr().modify(|w| w.set_gpioden(true));
-    // Reading the register back makes sure that the clock runs.
+    // The read of the register ensures that the clock is running.
     pac::RCC.ahb4enr().read();
     safety_output_low();
     pac::GPIOD.moder().modify(|w| w.set_moder(SAFETY_OUTPUT_BIT, pac::gpio::vals::Moder::OUTPUT));
 }
 
-/// Drives the safety output to 0. Can be called from anywhere and in any state of the program.
+/// Drives the safety output to 0. Can be called from any context and in any state of the program.
 pub fn safety_output_low() {
     pac::GPIOD.bsrr().write(|w| w.set_br(SAFETY_OUTPUT_BIT, true));
 }

@@ -7,18 +7,18 @@ use jtc_bus::timing;
 /// Frequency at OSC_IN, Hz.
 pub const HSE_HZ: u32 = 8_000_000;
 
-/// `true` if Vcore comes from the SMPS, as wired when the board is delivered. The highest voltage scale and the highest
-/// frequency are then not permitted.
+/// `true` if Vcore comes from the SMPS, as wired when the board is delivered. With the SMPS, the highest voltage scale
+/// and the highest frequency are not permitted.
 pub const SMPS: bool = cfg!(feature = "nucleo-h745zi-q");
 
-/// Output of a phase-locked loop.
+/// Settings of an output of a phase-locked loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Pll {
-    /// Divider before the loop.
+    /// Divider before the phase-locked loop.
     pub m: u32,
     /// Multiplier.
     pub n: u32,
-    /// Divider after the loop.
+    /// Divider after the phase-locked loop.
     pub divide: u32,
 }
 
@@ -33,8 +33,8 @@ impl Pll {
         self.vco() / self.divide
     }
 
-    /// Returns `true` if the loop keeps the reference manual's rules for the wide-range oscillator and every division
-    /// is exact.
+    /// Returns `true` if the settings satisfy the reference manual's rules for the wide-range oscillator and every
+    /// division is exact.
     const fn valid(&self) -> bool {
         let reference = HSE_HZ / self.m;
         HSE_HZ.is_multiple_of(self.m)
@@ -57,11 +57,11 @@ pub const SERIAL: Pll = Pll { m: 4, n: 180, divide: 3 };
 
 /// Core, Hz.
 pub const CORE_HZ: u32 = CORE.hz();
-/// Buses and memories: half of the core frequency.
+/// Frequency of buses and memories, which is half of the core frequency.
 pub const AHB_HZ: u32 = CORE_HZ / 2;
-/// Peripherals: half of the bus frequency.
+/// Frequency of the peripherals, which is half of the bus frequency.
 pub const APB_HZ: u32 = AHB_HZ / 2;
-/// Timers run at twice the frequency of their bus.
+/// Frequency of the timers, which is twice the frequency of their bus.
 pub const TIMER_HZ: u32 = 2 * APB_HZ;
 
 /// Ticks of the controller per second.
@@ -73,7 +73,8 @@ pub const TICK_US: u32 = 1_000_000 / TICK_HZ;
 
 const _: () = {
     assert!(CORE.valid() && CAN.valid() && SERIAL.valid());
-    // Highest frequencies for the voltage scale: VOS1 with the SMPS, VOS0 with the LDO.
+    // Highest frequencies that are permitted for the voltage scale, which is VOS1 with the SMPS and VOS0 with the
+    // LDO.
     assert!(CORE_HZ <= if SMPS { 400_000_000 } else { 480_000_000 });
     assert!(APB_HZ <= if SMPS { 100_000_000 } else { 120_000_000 });
     assert!(CAN.hz() == timing::KERNEL_CLOCK_HZ && CAN.hz() <= APB_HZ);
@@ -84,7 +85,7 @@ const _: () = {
     assert!(SERIAL.hz() == 8 * 15_000_000);
 };
 
-/// Settings of a USART for a rate: the divider register, and if a bit is sampled 8 times instead of 16.
+/// Settings of a USART for a baud rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Baud {
     /// Register BRR.
@@ -118,7 +119,7 @@ impl Baud {
 mod tests {
     use super::*;
 
-    /// Computes the rate of the line by the reference manual's formula, Bd.
+    /// Computes the baud rate of the line with the formula of the reference manual.
     fn rate(baud: Baud) -> f64 {
         let clock = f64::from(SERIAL.hz());
         if baud.over8 {
@@ -138,7 +139,7 @@ mod tests {
         {
             let baud = Baud::new(wanted).unwrap_or_else(|| panic!("{wanted} Bd"));
             let error = rate(baud) / f64::from(wanted) - 1.0;
-            // The errors of both ends together may be about 3 %, so each end gets 1 %.
+            // The total error of both ends may be about 3 %, so at most 1 % is permitted for each end.
             assert!(error.abs() < 0.01, "{wanted} Bd: {error}");
         }
         assert_eq!(Baud::new(15_000_000), Some(Baud { brr: 0x10, over8: true }));

@@ -1,4 +1,4 @@
-//! Supply and clocks, with the values of [`openjtc_firmware::clock`]. The order of the steps is the order of the HAL.
+//! Supply and clocks, with the values of [`openjtc_firmware::clock`]. The steps have the same order as in the HAL.
 use embassy_stm32::interrupt::Priority;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk,
@@ -13,7 +13,7 @@ pub const LOW: Priority = Priority::P8;
 
 /// Returns the settings of output P or Q of a phase-locked loop.
 fn pll(from: clock::Pll, p: bool) -> Pll {
-    // The registers contain multiplier and divider minus one.
+    // The registers contain the multiplier minus one and the divider minus one.
     let divide = PllDiv::from_bits((from.divide - 1) as u8);
     Pll {
         source: PllSource::HSE,
@@ -30,7 +30,7 @@ fn pll(from: clock::Pll, p: bool) -> Pll {
 /// Starts supply, clocks and the HAL.
 pub fn init() -> Peripherals {
     let mut config = Config::default();
-    // Without this, the DMA interrupts would have the same priority as the tick.
+    // Without this setting, the DMA interrupts would have the priority of the tick.
     config.dma_interrupt_priority = LOW;
     config.bdma_interrupt_priority = LOW;
     config.mdma_interrupt_priority = LOW;
@@ -58,11 +58,13 @@ pub fn init() -> Peripherals {
         use embassy_stm32::SharedData;
         use embassy_stm32::rcc::SupplyConfig;
 
-        /// Memory in which the HAL passes the clocks to a program on the Cortex-M4. No program reads it.
+        /// Memory in which the HAL passes the clock settings to a program on the Cortex-M4. No program reads this
+        /// memory.
         #[unsafe(link_section = ".sram4")]
         static SHARED: MaybeUninit<SharedData> = MaybeUninit::uninit();
 
-        // Only the first write after power-on has an effect; a wrong one makes the board unreachable (docs/board.md).
+        // Only the first write after power-on has an effect; a wrong value makes the board unreachable
+        // (docs/board.md).
         config.rcc.supply_config = if clock::SMPS { SupplyConfig::DirectSMPS } else { SupplyConfig::LDO };
         embassy_stm32::init_primary(config, &SHARED)
     }

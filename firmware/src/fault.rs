@@ -1,5 +1,6 @@
-//! Handling of a failed program: the safety output goes to 0, the drives get a last frame with zero torque, the cause
-//! is recorded, and the processor is reset. After a reset: reading the data that the last program kept.
+//! Handling of a failed program. The safety output becomes 0, the drives get a last frame with zero torque, the cause
+//! is recorded, and the processor is reset. After a reset, this module also reads the data that the program recorded
+//! before the reset.
 use core::arch::naked_asm;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -12,20 +13,21 @@ use openjtc_firmware::reset::{self, Cause, Failure};
 
 use crate::{board, fdcan};
 
-/// Memory whose contents survive a reset; tightly coupled, so that a write reaches the memory without a cache.
+/// Memory whose contents survive a reset. The memory is tightly coupled, so that a write does not pass through a
+/// cache.
 #[repr(transparent)]
 pub struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
 
 // SAFETY: `boot` creates the only reference. A fault writes through a pointer, and no other code runs after it.
 unsafe impl<T: Send> Sync for Kept<T> {}
 
-/// Record of the last tick; layout in [`openjtc_firmware::flight`].
+/// Record of the last tick, whose layout is defined in [`openjtc_firmware::flight`].
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.FLIGHT")]
 #[used]
 pub static FLIGHT: Kept<Flight> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Record of how the last program ended.
+/// Record of the failure that ended the previous program run.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.LAST_WORDS")]
 #[used]
@@ -37,22 +39,22 @@ pub static LAST_WORDS: Kept<LastWords> = Kept(UnsafeCell::new(MaybeUninit::unini
 #[used]
 pub static BOOTS: Kept<u32> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Place at which the last program ended, in the source code or in the program memory.
+/// Position in the source code or in the program memory at which the previous program run ended.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct LastWords {
     /// [`LastWords::HARD_FAULT`] or [`LastWords::PANIC`]; any other value means no failure.
     magic: u32,
-    /// Panic: line of the source.
+    /// Line of the source code at which the program panicked.
     line: u32,
-    /// Hard fault: program counter and return address, 0 if unknown.
+    /// Program counter and return address of a hard fault, 0 if unknown.
     pc: u32,
     lr: u32,
-    /// Hard fault: registers CFSR and HFSR, and the address of the fault if it has one.
+    /// Registers CFSR and HFSR of a hard fault, and the fault address if it is valid.
     cfsr: u32,
     hfsr: u32,
     address: u32,
-    /// Panic: end of the name of the source file, padded with zeros.
+    /// Name of the source file of a panic, truncated at its beginning and padded with zeros.
     file: [u8; 32],
 }
 
@@ -83,14 +85,14 @@ pub struct Boot {
     pub boots: u32,
     /// `true` if power was off before this start.
     pub lost_power: bool,
-    /// Record of how the last program ended, and its last tick if the flight record was kept.
+    /// Record of the failure that ended the previous program run, and its last tick if the flight record is valid.
     last_words: LastWords,
     last_flight: Option<(u64, u32, u8)>,
-    /// The flight record of this program.
+    /// Flight record that this program run writes.
     pub flight: &'static mut Flight,
 }
 
-/// Reads the data of the last program. Must be called once, as the first call in the program.
+/// Reads the data that the previous program run left. Must be called once, as the first call in the program.
 pub fn boot() -> Boot {
     let rsr = pac::RCC.rsr().read().0;
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
@@ -141,7 +143,7 @@ pub fn log(boot: &Boot) {
     }
 }
 
-/// Puts the machine into a safe state, writes the record, and resets the processor. Interrupts stay disabled.
+/// Brings the arm into a safe state, writes the failure record, and resets the processor. Interrupts stay disabled.
 fn end(words: LastWords) -> ! {
     cortex_m::interrupt::disable();
     board::safety_output_low();
@@ -156,7 +158,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     let mut words = LastWords { magic: LastWords::PANIC, ..LastWords::NONE };
     if let Some(place) = info.location() {
         words.line = place.line();
-        // The end of the file name is the most useful part.
+        // If the file name is too long, its end is kept because it is the most useful part.
         let name = place.file().as_bytes();
         let name = &name[name.len().saturating_sub(words.file.len())..];
         for (to, from) in words.file.iter_mut().zip(name) {
@@ -180,8 +182,8 @@ unsafe fn DefaultHandler(number: i16) {
     end(words)
 }
 
-/// Entry of the hard fault, to which all other faults are escalated. The stack may be the cause of the failure, so a
-/// new stack is started, and the address of the old one is passed in the first argument.
+/// Entry of the hard fault, to which all other faults are escalated. The stack may be the cause of the failure, so
+/// the stack pointer is reset. The address of the old stack is passed in the first argument.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {

@@ -1,8 +1,9 @@
-//! The joint bus: FDCAN1 with dedicated buffers (J-10). Only the tick uses it, and it causes no interrupts.
+//! The joint bus: FDCAN1 with dedicated buffers (J-10). Only the tick uses the joint bus, and the controller does not
+//! cause interrupts.
 //!
-//! At most one frame is sent per tick. There are two transmit buffers; the frame goes into the one that the last frame
-//! did not use. If the next tick finds the last frame still unsent, it cancels that frame. A transmission on the wire
-//! at that moment still completes, but the frame is never sent later. A cancelled frame is reported as unacknowledged.
+//! At most one frame is sent per tick. There are two transmit buffers, which are used alternately. If a frame is
+//! still unsent when the next tick runs, the tick cancels it. A transmission that has already begun is
+//! completed, but the frame is never sent later. A cancelled frame is reported as unacknowledged.
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use embassy_stm32::pac::can::Fdcan as Registers;
@@ -19,7 +20,8 @@ const CAN: Registers = FDCAN1;
 
 /// Number of times that a register is read while waiting for a change that should take a few clock periods.
 const PATIENCE: u32 = 10_000;
-/// Like `PATIENCE`, for waits within a tick, which must be short. The next tick checks again a millisecond later.
+/// Like `PATIENCE`, for waits within a tick, which must be short. The next tick checks the register again a
+/// millisecond later.
 const PATIENCE_IN_TICK: u32 = 100;
 
 /// Frames received since the last tick.
@@ -64,7 +66,7 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Returns counters at zero.
+    /// Creates counters whose values are zero.
     pub const fn new() -> Self {
         Self { transmit: 0, receive: 0, cancelled: 0, bus_off: 0, wrong_format: 0 }
     }
@@ -74,7 +76,7 @@ impl Counters {
 pub struct Fdcan {
     /// Transmit buffer of the last frame.
     last: usize,
-    /// `true` if the last tick put a frame into that buffer.
+    /// `true` if the last tick wrote a frame into the transmit buffer.
     sent: bool,
     recovering: bool,
     counters: Counters,
@@ -91,13 +93,13 @@ impl Fdcan {
             w.set_fdoe(true);
             w.set_bse(true);
             w.set_txp(true);
-            // ISO CAN FD, automatic retransmission.
+            // The bus uses ISO CAN FD with automatic retransmission.
             w.set_niso(false);
             w.set_dar(false);
         });
         set_timing();
 
-        // The memory and its check bits are random after power-on.
+        // The message memory and its check bits are random after power-on.
         for word in 0..ram::BYTES / 4 {
             FDCANRAM.ram(word).write_value(0);
         }
@@ -142,7 +144,7 @@ impl Fdcan {
                 }
             }
         }
-        // Releases the buffers for new frames.
+        // Releases the receive buffers for new frames.
         CAN.ndat1().write_value(Ndat1(new));
         BusState { acknowledged, bus_off: off }
     }
@@ -166,7 +168,7 @@ impl Fdcan {
         self.counters
     }
 
-    /// Returns `true` if the last frame was acknowledged. Cancels it if it is still waiting.
+    /// Returns `true` if the last frame was acknowledged. Cancels the frame if it is still waiting.
     fn finish_last(&mut self) -> bool {
         let sent = core::mem::take(&mut self.sent);
         let bit = 1 << self.last;
@@ -178,17 +180,17 @@ impl Fdcan {
         sent && CAN.txbto().read().0 & bit != 0
     }
 
-    /// Restarts a controller that is bus-off. ISO 11898-1 lets it rejoin after 129 times 11 recessive bits, counted
-    /// from the time at which the program permits it. Returns `true` while it cannot send. Until then no frame is sent,
-    /// and the drives keep their last torque.
+    /// Restarts a controller that is bus-off. According to ISO 11898-1, the controller may send again after 129 times
+    /// 11 recessive bits, counted from the restart. Returns `true` while the controller cannot send. During this time
+    /// no frame is sent, and the drives apply their last commanded torque.
     fn recover(&mut self) -> bool {
         let control = CAN.cccr().read();
-        // INIT: the controller has stopped itself. ASM: the controller could not access its message memory, and now
-        // only listens.
+        // If INIT is set, the controller has stopped itself. If ASM is set, the controller could not access its
+        // message memory, and now only listens.
         if control.init() || control.asm() {
             CAN.cccr().modify(|w| w.set_init(true));
             wait(PATIENCE_IN_TICK, || CAN.cccr().read().init());
-            // Enabling access to the configuration clears all transmit requests.
+            // All transmit requests are cleared when access to the configuration is enabled.
             CAN.cccr().modify(|w| {
                 w.set_cce(true);
                 w.set_asm(false);
@@ -205,7 +207,7 @@ impl Fdcan {
 }
 
 fn set_timing() {
-    // The registers contain each value minus one.
+    // The registers contain these values minus one.
     let BitTiming { prescaler, segment1, segment2, jump_width } = timing::NOMINAL;
     CAN.nbtp().write(|w| {
         w.set_nbrp(prescaler - 1);
@@ -237,12 +239,12 @@ fn leave_init(patience: u32) {
     wait(patience, || !CAN.cccr().read().init());
 }
 
-/// Calls `done` up to `patience` times until it returns `true`; returns `false` if it never did.
+/// Calls `done` up to `patience` times until it returns `true`; returns `false` if `done` never returned `true`.
 fn wait(patience: u32, done: impl Fn() -> bool) -> bool {
     (0..patience).any(|_| done())
 }
 
-/// Returns the frame in receive buffer `n`; `None` if this bus does not use its format.
+/// Returns the frame in receive buffer `n`; `None` if the joint bus does not use the format of the frame.
 fn received(n: usize) -> Option<Frame> {
     let word = |i: usize| FDCANRAM.ram(ram::rx(n) + i).read();
     let (head, about) = (word(0), word(1));
@@ -281,10 +283,10 @@ fn request(n: usize, frame: &Frame) -> bool {
     true
 }
 
-/// Sends zero torque to the drives after a failure of the program, if the bus can still be used. Gives up after about a
+/// Sends zero torque to the drives after a failure of the program, if the bus still works. Stops trying after about a
 /// millisecond. Called from a fault handler, when the state of all other parts is unknown.
 pub fn last_frame() {
-    /// A frame takes 0.1 ms, and up to seven answers may be sent before it.
+    /// A frame takes 0.1 ms, and up to seven answers of drives may be sent before it.
     const LOOKS: u32 = 20_000;
     if !embassy_stm32::pac::RCC.apb1henr().read().fdcanen() || CAN.cccr().read().init() {
         return;

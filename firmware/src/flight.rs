@@ -2,11 +2,11 @@
 //!
 //! The record is in memory that keeps its contents over a reset, under the symbol `FLIGHT`. Every tick writes its
 //! inputs before the controller runs, and its outputs afterwards. A tool that reads the record after every tick can run
-//! the same ticks on a PC, and must get identical bits. For host frames the record contains only type, length and CRC;
-//! their bytes are known only to the host.
+//! the same ticks on a PC, and must get identical bits. For host frames, the record contains only type, length and CRC.
+//! The bytes of the frames are known only to the host.
 //!
-//! All numbers are little-endian, as in the processor's memory. The structures below define the layout; they have no
-//! hidden padding. [`Flight::LAYOUT`] changes if they change.
+//! All numbers are little-endian, as in the processor's memory. The structures below define the layout and have no
+//! hidden padding. [`Flight::LAYOUT`] changes if the layout changes.
 use jtc_bus::{Frame, MAX_LEN};
 use jtc_core::{BusState, HOST_LINES, HostEvent, Inputs, JOINTS, Telemetry};
 use jtc_wire::{EVENTS_MAX, LinkEvent, UrgentCommand, UrgentCommands};
@@ -50,22 +50,24 @@ impl FlightFrame {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightEvent {
-    /// 0: no event, 1: a valid frame, 2: an invalid frame, 3: noise. Bit 6: it arrived on a line without extensions.
-    /// Bit 7: an urgent command has overtaken it.
+    /// Kind of the event: 0 is no event, 1 a valid frame, 2 an invalid frame, 3 noise. Bit 6 is set if the event
+    /// arrived on a line without extensions. Bit 7 is set if the controller received an urgent command after the
+    /// event.
     pub kind: u8,
-    /// Line of the event: 0 RS422, 1 USB.
+    /// Serial line on which the event arrived: 0 is RS422, 1 is USB.
     pub line: u8,
-    /// Type byte, 0 if unknown.
+    /// Type byte of the frame, 0 if unknown.
     pub frame_type: u8,
     /// Frame status that the controller will report.
     pub status: u8,
-    /// Length in bytes, 0 if unknown.
+    /// Length of the frame in bytes, 0 if unknown.
     pub len: u16,
-    /// CRC of a valid frame, else 0.
+    /// CRC of the frame if it is valid, otherwise 0.
     pub crc: u16,
 }
 
-/// Urgent commands of a line: kind (1 Stop, 2 Pause) and number received. The kind received last is at the end.
+/// Urgent commands that arrived on a line: pairs of kind (1 is Stop, 2 is Pause) and count. The kind that was
+/// received last is at the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightUrgent(pub [[u8; 2]; 2]);
@@ -98,25 +100,25 @@ pub struct Flight {
     pub magic: u32,
     /// [`Flight::LAYOUT`].
     pub layout: u16,
-    /// Bytes of this record.
+    /// Size of the record, bytes.
     pub size: u16,
     /// Progress of the tick: one of the `PHASE_` constants.
     pub phase: u32,
-    /// Cause of the start of this program, a [`crate::reset::Cause`].
+    /// Cause of the start of this program, as the code of a [`crate::reset::Cause`].
     pub cause: u32,
-    /// Number of the tick, from 1.
+    /// Number of the tick, counted from 1.
     pub tick: u64,
 
     // Inputs:
-    /// Bit 0: the last tick's frame was acknowledged; bit 1: bus-off.
+    /// State of the joint bus. Bit 0 is set if the last tick's frame was acknowledged, and bit 1 in bus-off.
     pub bus_state: u8,
     /// Level of the safety input.
     pub safety_input: u8,
-    /// 1 if both lines could accept a status.
+    /// Value 1 if both lines could accept a status, otherwise 0.
     pub status_free: u8,
     /// Number of frames in `received`.
     pub received_count: u8,
-    /// Number of received frames with a wrong format since the start (J-15), which are not in `received`.
+    /// Number of frames with a wrong format that arrived since the start (J-15). These frames are not in `received`.
     pub wrong_format: u32,
     /// Stop and Pause commands that arrived on each line.
     pub urgent: [FlightUrgent; HOST_LINES],
@@ -137,7 +139,7 @@ pub struct Flight {
     pub trajectory: u8,
     /// Level of the safety output.
     pub safety_output: u8,
-    /// 1 if a status was sent.
+    /// Value 1 if a status was sent, otherwise 0.
     pub status: u8,
     /// Frame that was sent on the joint bus.
     pub sent: FlightFrame,
@@ -145,9 +147,10 @@ pub struct Flight {
     pub point: u32,
     /// Current error word.
     pub errors: u16,
-    /// Number of host events that the controller has finished.
+    /// Number of host events whose processing the controller has finished.
     pub host_done: u8,
-    /// Line of the response record in the status; 0xFF if the status has no record.
+    /// Number of the serial line for which the status contains a response record; 0xFF if the status contains no
+    /// record.
     pub record_line: u8,
     /// Commanded torques, N·m.
     pub torque: [f64; JOINTS],
@@ -158,15 +161,15 @@ const _: () = assert!(size_of::<Flight>() == 848 && core::mem::offset_of!(Flight
 impl Flight {
     /// First word of a record: "JTCF".
     pub const MAGIC: u32 = u32::from_le_bytes(*b"JTCF");
-    /// Version of the layout.
+    /// Version of the layout of the record.
     pub const LAYOUT: u16 = 3;
-    /// Value of `record_line` for a status without a record.
+    /// Value of `record_line` for a status without a response record.
     pub const NO_LINE: u8 = 0xFF;
     /// No tick has begun yet.
     pub const PHASE_NONE: u32 = 0;
-    /// The inputs belong to tick `tick`, the outputs to the previous tick.
+    /// The inputs belong to tick number `tick`, the outputs to the previous tick.
     pub const PHASE_INPUTS: u32 = 1;
-    /// Inputs and outputs belong to tick `tick`.
+    /// Inputs and outputs belong to tick number `tick`.
     pub const PHASE_COMPLETE: u32 = 2;
 
     /// Creates the record before the first tick.
@@ -249,12 +252,12 @@ impl Flight {
         self.phase = Self::PHASE_COMPLETE;
     }
 
-    /// Returns the bus state of the inputs.
+    /// Returns the bus state in the inputs of the tick.
     pub fn bus_state(&self) -> BusState {
         BusState { acknowledged: self.bus_state & 1 != 0, bus_off: self.bus_state & 2 != 0 }
     }
 
-    /// Returns the received frames of the inputs.
+    /// Returns the received frames in the inputs of the tick.
     pub fn received(&self) -> impl Iterator<Item = Frame> {
         self.received.iter().take(self.received_count.into()).filter_map(FlightFrame::frame)
     }

@@ -1,5 +1,5 @@
-//! Two serial lines share one controller. A response record is sent on the line from which its frame came. The other
-//! line gets the same status without the record (J-04).
+//! Two serial lines share one controller. A response record is sent on the line on which its frame arrived. The
+//! status on the other line does not contain the record (J-04).
 use jtc_wire::{STATUS_LEN, crc16, field::status as field};
 
 /// Serial lines.
@@ -9,7 +9,7 @@ pub const RS422: usize = 0;
 /// The virtual serial port of the ST-LINK.
 pub const USB: usize = 1;
 
-/// Returns the same status without its response record.
+/// Returns a copy of the status without its response record.
 pub fn without_record(status: &[u8; STATUS_LEN]) -> [u8; STATUS_LEN] {
     let mut idle = *status;
     idle[field::RESPONSE_TYPE..field::RESPONSE_LENGTH.end].fill(0);

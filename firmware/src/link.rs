@@ -1,7 +1,7 @@
 //! Converts bytes to frames. Each line has its own parser, whose events go to the tick in batches, through one slot.
 //!
 //! A batch is a copy, so that a parser can accept more bytes while the tick executes a long frame in slices. If bytes
-//! arrive faster than the tick executes frames, they fill first the parser's buffer, then the ring, and finally some
+//! arrive faster than the tick executes frames, the parser's buffer becomes full, then the ring. After that, bytes
 //! are lost. Stop and Pause are not lost, because the tick searches the received bytes for them itself.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -16,41 +16,42 @@ use crate::program;
 use crate::summary::{self, Summary};
 use crate::uart;
 
-/// Inter-byte timeout, µs: a frame ends after this silence (J-03).
+/// Inter-byte timeout, µs. A frame ends if the line is silent for this time (J-03).
 pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
 /// Largest number of bytes passed to a parser at once.
 const CHUNK: usize = 1024;
-/// Largest number of passes over the links before they wait for the next tick.
+/// Largest number of passes of the loop before the links wait for the next tick.
 const ROUNDS: usize = 64;
-/// Largest lag of the links relative to DMA, bytes. DMA overwrites bytes that are older than the length of the ring,
-/// and it continues while the links read.
+/// Largest number of bytes by which the links may lag DMA. DMA overwrites bytes that are older than the length of
+/// the ring, and DMA continues while the links read.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
-/// Number of passes of the links. The tick reads it to detect that the links have stopped.
+/// Number of passes of the links. The tick reads this number to detect that the links have stopped.
 pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
 
 /// Number of bytes received on each line, modulo 2³², at the last tick.
 pub static RECEIVED: [AtomicU32; lines::LINES] = [const { AtomicU32::new(0) }; lines::LINES];
 
-/// A place through which one side passes the slot to the other. The side that holds the only reference may use it.
+/// A cell through which links and tick pass the slot to each other. Only the side that owns the reference may use the
+/// slot.
 type Place = Mutex<Cell<Option<&'static mut EventBatch>>>;
 static FULL: Place = Mutex::new(Cell::new(None));
 static EMPTY: Place = Mutex::new(Cell::new(None));
 
-/// The links' end of the slot, with the batch that they fill.
+/// The links' side of the slot, with the batch that the links fill.
 pub struct SlotIn(Option<&'static mut EventBatch>);
 
-/// The tick's end of the slot, with the batch that it executes.
+/// The tick's side of the slot, with the batch that the tick executes.
 pub struct SlotOut(Option<&'static mut EventBatch>);
 
-/// Creates both ends of the slot, which is empty at first.
+/// Creates both sides of the slot, which is empty at first.
 pub fn slot(memory: &'static mut EventBatch) -> (SlotIn, SlotOut) {
     critical_section::with(|cs| EMPTY.borrow(cs).set(Some(memory)));
     (SlotIn(None), SlotOut(None))
 }
 
 impl SlotIn {
-    /// Adds an event to the batch. Returns `false` if the tick holds the batch, or if the batch is full.
+    /// Adds an event to the batch. Returns `false` if the tick owns the batch, or if the batch is full.
     fn push(&mut self, received: &ReceivedEvent<'_>) -> bool {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| EMPTY.borrow(cs).take());
@@ -58,7 +59,7 @@ impl SlotIn {
         self.0.as_mut().is_some_and(|batch| batch.push(received))
     }
 
-    /// Passes the batch to the tick if it contains an event.
+    /// Passes the batch to the tick if the batch contains an event.
     fn send(&mut self) {
         if let Some(batch) = self.0.take_if(|batch| !batch.is_empty()) {
             critical_section::with(|cs| FULL.borrow(cs).set(Some(batch)));
@@ -91,26 +92,28 @@ pub struct Link {
     line: usize,
     uart: uart::Receiver,
     parser: Receiver<&'static mut [u8]>,
-    /// Number of bytes taken from the line, including lost ones.
+    /// Number of bytes taken from the line, including lost bytes.
     taken: u64,
     /// Number of bytes that were lost.
     lost: u64,
     /// Time at which the ring was last checked, µs.
     looked_us: u64,
-    /// Number of bytes left in the ring at that time.
+    /// Number of bytes that were in the ring at the last check.
     left: usize,
 }
 
 impl Link {
-    /// Creates a link over `line`, whose bytes `uart` receives.
+    /// Creates the link of `line`, whose bytes `uart` receives.
     pub fn new(line: usize, uart: uart::Receiver, buffer: &'static mut [u8; FRAME_MAX]) -> Self {
         let parser = Receiver::new(&mut buffer[..], INTER_BYTE_TIMEOUT_US);
         Self { line, uart, parser, taken: 0, lost: 0, looked_us: 0, left: 0 }
     }
 
-    /// Takes the bytes that have arrived and searches for an event. Returns `true` if there is more to do at once.
+    /// Takes the bytes that have arrived and searches for an event. Returns `true` if the function must be called
+    /// again at once.
     fn receive(&mut self) -> bool {
-        // The clock is read first. Otherwise silence before a byte that arrives in between would be measured too long.
+        // The clock is read before the bytes. Otherwise, if a byte arrives between the two reads, the measured
+        // silence before this byte would be too long.
         let now = Instant::now().as_micros();
         self.catch_up();
         let waiting = self.uart.waiting();
@@ -137,7 +140,7 @@ impl Link {
     fn catch_up(&mut self) {
         let received = RECEIVED[self.line].load(Ordering::Relaxed);
         let behind = received.wrapping_sub(self.taken as u32);
-        // The value is negative if bytes were taken since the last tick.
+        // The difference is negative if bytes were taken since the last tick.
         if behind > BEHIND && behind < 1 << 31 {
             self.lost += u64::from(behind);
             self.taken += u64::from(behind);
@@ -147,8 +150,8 @@ impl Link {
         }
     }
 
-    /// Passes the first of `new` bytes to the parser, with its time of arrival, which decides if there was a gap before
-    /// it. The time is `now` minus the duration of `new` bytes, but not before the last check of the ring.
+    /// Passes the first of `new` bytes to the parser, with its time of arrival, which determines if there was a gap
+    /// before it. The time is `now` minus the duration of `new` bytes, but not before the last check of the ring.
     fn begin(&mut self, now: u64, new: usize) {
         let first = (now.saturating_sub(duration_us(new))).max(self.looked_us);
         let mut byte = [0];
@@ -166,14 +169,15 @@ impl Link {
     }
 }
 
-/// Returns the time of `bytes` on the line, with ten bits per byte.
+/// Returns the transmission time of `bytes`, with ten bits per byte.
 fn duration_us(bytes: usize) -> u64 {
     bytes as u64 * 10_000_000 / u64::from(BAUD)
 }
 
-/// Runs forever: serves both lines, stores arms, and computes the checksum of the program in flash.
+/// Serves both lines, stores arms, and computes the checksum of the program in flash. Never returns.
 pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: Store) -> ! {
-    // Line that is served next, so that a line that fills the slot does not block the other.
+    // Line that is served next. The lines alternate, so that a line that fills the slot does not block the other
+    // line.
     let mut turn = 0;
     let mut report = Report::new();
     let mut program = program::Reader::new();
@@ -203,8 +207,8 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: S
     }
 }
 
-/// Logs changes, at most once a second. Each log line contains only one number, because interrupts are masked while a
-/// line is written, and the tick must begin in time.
+/// Logs changes, at most once a second. Each log line contains only one number. Interrupts are masked while a line is
+/// written, and the tick must begin in time.
 struct Report {
     next: Instant,
     line_errors: [u32; lines::LINES],

@@ -1,10 +1,10 @@
-//! The second core of the H745 always starts at bank 2 of the flash. This is its program, which only sleeps.
+//! The second core of the H745 always starts at bank 2 of the flash. The program of this core only sleeps.
 
-/// Instructions: `wfi`, then a branch back to it.
+/// Instructions of the program: `wfi`, and a branch back to it.
 const SLEEP: u32 = 0xE7FD_BF30;
-/// Address of the instructions, with the bit that selects Thumb.
+/// Address of the first instruction, with the bit that selects Thumb.
 const PROGRAM: u32 = 0x0810_0000 + 16 * 4 + 1;
-/// End of the small SRAM3. The stack would start here, but no exception uses it.
+/// End of the small SRAM3. The stack would start at this address, but no exception uses the stack.
 const STACK: u32 = 0x3004_8000;
 
 /// Vector table (stack, reset, fourteen exceptions) and program.

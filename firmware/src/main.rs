@@ -1,13 +1,13 @@
 //! Firmware of the joint trajectory controller.
 //!
-//! Two parts share the processor. The *tick* ([`tick`]) is an interrupt of the highest priority, a thousand times a
-//! second. The tick owns the controller, the joint bus, the safety wires and the LEDs, and is never delayed by more
-//! than a few instructions. The *links* ([`link`]) run in the remaining time, take bytes from both serial lines and
-//! split them into frames. Frames go from the links to the tick in batches, through one slot; statuses go directly from
-//! the tick to the lines' DMA. A Stop or a Pause does not depend on the links or the slot: the tick searches the bytes
-//! that DMA has received for them. The links also write the stored arm ([`arm_store`]), one step per pass.
+//! Two parts share the processor. The *tick* ([`tick`]) is an interrupt with the highest priority that runs a thousand
+//! times per second. The tick owns the controller, the joint bus, the safety wires and the LEDs, and is never delayed
+//! by more than a few instructions. The *links* ([`link`]) run in the remaining time, take bytes from both serial lines
+//! and split them into frames. The links pass frames to the tick in batches, through one slot. The tick passes statuses
+//! directly to the DMA of the lines. A Stop or a Pause does not depend on the links or the slot: the tick searches the
+//! bytes that DMA has received for them. The links also write the stored arm ([`arm_store`]), one step per pass.
 //!
-//! Everything that does not access hardware is in the library of this package and in `jtc-core`, and is tested on a PC.
+//! All code that does not access hardware is in the library of this package and in `jtc-core`, and is tested on a PC.
 #![no_std]
 #![no_main]
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -40,8 +40,8 @@ mod uart;
 #[used]
 pub static VERSION: Version = Version::this();
 
-/// Time within which a tick must complete, µs; otherwise the watchdog resets the processor. The watchdog has its own
-/// oscillator, with an error of a few per cent.
+/// Time within which a tick must complete, µs. If a tick takes longer, the watchdog resets the processor. The
+/// watchdog has its own oscillator, with an error of a few per cent.
 const WATCHDOG_US: u32 = 4_500;
 
 #[embassy_executor::main]
@@ -65,7 +65,7 @@ async fn main(_spawner: Spawner) {
     let memory::Memory { points, rings, statuses, receive, batch, arms, recorder } =
         memory::take(boot.lost_power);
     let store = arm_store::load(arms);
-    // Reads the recorder's whole memory, which is slow and must therefore happen before the watchdog runs.
+    // Reads the complete memory of the recorder. This read is slow, so it must be done before the watchdog starts.
     let recorder = Recorder::new(recorder, boot.cause.failed());
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;

@@ -1,4 +1,4 @@
-//! Memory: protection, caches, and the large buffers outside the fast memory.
+//! Memory of the firmware: protection, caches, and the large buffers outside the fast memory.
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
@@ -37,12 +37,12 @@ impl<T> Place<T> {
         unsafe { place.assume_init_mut() }
     }
 
-    /// Returns the value as the last program left it. After a loss of power the memory and its check bits are random,
-    /// and the value is returned with all bytes zero.
+    /// Returns the value that the previous program run wrote. After a loss of power, the memory and its check bits
+    /// are random, so all bytes of the value are set to zero.
     ///
     /// # Safety
-    /// Must be called once. Any bytes must be a valid value of `T`, and the linker must keep the place out of the
-    /// initialised sections.
+    /// Must be called once. Any bytes must be a valid value of `T`, and the linker must not put the value into an
+    /// initialised section.
     #[allow(clippy::mut_from_ref, reason = "the only reference, by the contract")]
     unsafe fn keep(&'static self, lost_power: bool) -> &'static mut T {
         if lost_power {
@@ -58,9 +58,9 @@ impl<T> Place<T> {
 /// Number of blocks in each part of the flight recorder's memory.
 const RECORDER_BLOCKS: [usize; 3] = [63, 31, 63];
 
-/// Memory of the flight recorder (J-56): the part of SRAM1 that DMA does not use, SRAM3, and SRAM4. None of it is
-/// cached: data is in memory at the next instruction after a write, and survives any reset. The symbols keep the
-/// compiler from making assumptions about the contents.
+/// Memory of the flight recorder (J-56): the part of SRAM1 that DMA does not use, SRAM3, and SRAM4. This memory
+/// is not cached: written data are in memory before the next instruction and survive any reset. Because of the
+/// symbols, the compiler cannot make assumptions about the contents.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".sram1")]
 #[used]
@@ -77,10 +77,10 @@ static RECORDER_SRAM4: Place<[Block; RECORDER_BLOCKS[2]]> = Place::new();
 /// The trajectory.
 #[unsafe(link_section = ".axisram")]
 static POINTS: Place<[RawPoint; POINTS_MAX]> = Place::new();
-/// The frames that the controller executes.
+/// Memory for the frames that the controller executes.
 #[unsafe(link_section = ".axisram")]
 static BATCH: Place<EventBatch> = Place::new();
-/// The stored arm, and the next arm to be stored.
+/// Memory for the stored arm, and for the next arm to be stored.
 #[unsafe(link_section = ".axisram")]
 static ARMS: Place<[arm_store::Buffer; 2]> = Place::new();
 /// Buffers into which the lines' DMA writes; not cached.
@@ -103,7 +103,7 @@ pub struct Memory {
     pub statuses: [&'static mut [u8; ANSWER_MAX]; 2],
     /// Receive buffers of the lines.
     pub receive: [&'static mut [u8; FRAME_MAX]; 2],
-    /// The slot between links and tick.
+    /// Slot through which links and tick exchange events.
     pub batch: &'static mut EventBatch,
     /// Buffers for the stored arm and for the next arm to be stored.
     pub arms: [&'static mut arm_store::Buffer; 2],
@@ -118,8 +118,8 @@ pub fn take(lost_power: bool) -> Memory {
     // consists of integers.
     let (points, rings, statuses, receive, batch, arms) =
         unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take(), ARMS.take()) };
-    // SAFETY: as above. All of them are in sections that are neither loaded nor cleared, and any bytes are valid
-    // integers.
+    // SAFETY: as above. All of them are in sections that are neither loaded nor cleared, and any bytes are
+    // valid integers.
     let recorder: [&mut [Block]; 3] = unsafe {
         [RECORDER_SRAM1.keep(lost_power), RECORDER_SRAM3.keep(lost_power), RECORDER_SRAM4.keep(lost_power)]
     };
@@ -134,12 +134,12 @@ pub fn take(lost_power: bool) -> Memory {
     }
 }
 
-/// Regions of the protection unit: base, log2 of the size, attributes.
+/// Regions of the protection unit, as base address, log2 of the size, and attributes.
 const REGIONS: [(u32, u32, u32); 7] = [
-    // External memory that does not exist. Without this region the core may read it speculatively and hang. The lowest
-    // three eighths and the highest eighth of the 4 GB are excluded.
+    // Addresses of external memory, which does not exist. Without this region, the core may read these addresses
+    // speculatively and hang. The lowest three eighths and the highest eighth of the 4 GB are excluded.
     (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
-    // The instruction memory at address 0 is not used, so that a null pointer causes a fault.
+    // The instruction memory at address 0 is not used, so that an access through a null pointer causes a fault.
     (0x0000_0000, 16, NO_ACCESS),
     // Memory below the stack, so that a stack overflow causes a fault at the store that overflows.
     (0x1FFC_0000, 18, NO_ACCESS),
@@ -148,7 +148,7 @@ const REGIONS: [(u32, u32, u32); 7] = [
     // Memory that the flight recorder writes.
     (0x3004_0000, 15, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     (0x3800_0000, 16, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
-    // Flash bank 2: a read while it is busy would halt the reader. Only [`bank2`] opens it.
+    // Flash bank 2, because a read while the bank is busy would stall the reader. Only [`bank2`] permits accesses.
     (BANK2, 20, NO_ACCESS),
 ];
 /// Flash bank 2.
@@ -158,18 +158,18 @@ const BANK2_REGION: u32 = 6;
 const NO_ACCESS: u32 = NO_EXECUTE;
 const FULL_ACCESS: u32 = 0b011 << 24;
 const NO_EXECUTE: u32 = 1 << 28;
-/// TEX 1, C 0, B 0, shareable.
+/// The attributes are TEX 1, C 0, B 0 and shareable.
 const NORMAL_UNCACHED: u32 = 1 << 19 | 1 << 18;
 
 /// Enables the memories, their protection and the caches.
 pub fn init() {
-    // The HAL leaves the memories of domain D2 without a clock.
+    // The HAL does not enable the clock of the memories of domain D2.
     pac::RCC.ahb2enr().modify(|w| {
         w.set_sram1en(true);
         w.set_sram2en(true);
         w.set_sram3en(true);
     });
-    // Reading the register back makes sure that the clock runs.
+    // The read of the register ensures that the clock is running.
     pac::RCC.ahb2enr().read();
 
     // SAFETY: only the HAL has used the core's peripherals so far, and it does not use these three.
@@ -190,7 +190,8 @@ fn protect(mpu: &MPU) {
         }
     }
     const ENABLE: u32 = 1 << 0;
-    // HFNMIENA. Without it, bank 2 would be cached memory for the loads in `bank2`, which run with faults masked.
+    // HFNMIENA. Without this setting, bank 2 would be cached memory for the loads in `bank2`, which run with faults
+    // masked.
     const WITH_FAULTS_MASKED: u32 = 1 << 1;
     const DEFAULT_MAP_ELSEWHERE: u32 = 1 << 2;
     // SAFETY: as above. All other addresses keep the processor's default attributes.
@@ -199,8 +200,8 @@ fn protect(mpu: &MPU) {
     cortex_m::asm::isb();
 }
 
-/// Permits loads and stores in flash bank 2, or blocks them. While open, it is strongly ordered memory: not cached, and
-/// never read speculatively. Only the main program may call this.
+/// Permits loads and stores in flash bank 2, or blocks them. While accesses are permitted, the bank is strongly ordered
+/// memory, which is not cached and never read speculatively. Only the main program may call this function.
 pub fn bank2(open: bool) {
     let (_, size, closed) = REGIONS[BANK2_REGION as usize];
     let attributes = if open { FULL_ACCESS | NO_EXECUTE } else { closed };

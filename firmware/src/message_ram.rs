@@ -1,16 +1,17 @@
 //! The CAN controller's message memory: its filters and the position of each buffer (J-10).
 //!
-//! Buffers are dedicated: each of the nodes' 21 possible answers has its own buffer, in the order of the identifiers.
-//! The controller rejects all other frames. A buffer that was not read is not overwritten.
+//! Each of the 21 possible answers of the nodes has a dedicated buffer. The buffers are in the order of the
+//! identifiers. The controller rejects all other frames. A buffer that was not read is not overwritten.
 use jtc_bus::{MAX_LEN, NODES, id};
 
 /// Size of the message memory, bytes.
 pub const BYTES: usize = 10 * 1024;
 /// Number of receive buffers: answers of seven nodes to Move, ChangeFsm and ChangeMode.
 pub const RX: usize = 3 * NODES;
-/// Number of transmit buffers: one for this tick's frame, one for the last tick's frame while it is being cancelled.
+/// Number of transmit buffers. One is for the frame of this tick, and one for the frame of the last tick while it is
+/// being cancelled.
 pub const TX: usize = 2;
-/// Words per buffer: two for the header, the others for the payload.
+/// Number of words per buffer: two words for the header, and the other words for the payload.
 pub const BUFFER_WORDS: usize = 2 + MAX_LEN / 4;
 /// Code of a 24-byte payload in RXESC and TXESC.
 pub const SIZE_CODE: u8 = 4;
@@ -21,14 +22,14 @@ pub const FILTERS: usize = 0;
 pub const RX_BUFFERS: usize = FILTERS + RX;
 /// First word of the transmit buffers.
 pub const TX_BUFFERS: usize = RX_BUFFERS + RX * BUFFER_WORDS;
-/// Number of words used.
+/// Number of words of the message memory that are used.
 pub const END: usize = TX_BUFFERS + TX * BUFFER_WORDS;
 
 const _: () = {
     assert!(END * 4 <= BYTES);
     // The codes 0..4 mean 8, 12, 16, 20 and 24 bytes.
     assert!(MAX_LEN == 8 + 4 * SIZE_CODE as usize);
-    // A single register with new-data flags must cover all receive buffers.
+    // All receive buffers must have their new-data flags in a single register.
     assert!(RX <= 32 && TX <= 32);
 };
 
@@ -52,7 +53,7 @@ pub const fn received_id(n: usize) -> u16 {
     }
 }
 
-/// Returns filter element `n`: frames with exactly that identifier go into receive buffer `n`.
+/// Returns filter element `n`, which accepts only the frames for receive buffer `n`.
 pub const fn filter(n: usize) -> u32 {
     const STORE_INTO_BUFFER: u32 = 0b111 << 27;
     STORE_INTO_BUFFER | (received_id(n) as u32) << 16 | n as u32
@@ -68,7 +69,8 @@ mod tests {
         let received: Vec<u16> = (0..RX).map(received_id).collect();
         assert_eq!(received, expected);
         for n in 0..RX {
-            // By the reference manual: SFEC bits 29..27, SFID1 bits 26..16, buffer in bits 5..0 with bits 10..9 zero.
+            // According to the reference manual, SFEC is in bits 29..27, SFID1 in bits 26..16, and the buffer in bits
+            // 5..0; bits 10..9 are zero.
             assert_eq!(filter(n) >> 27 & 0b111, 0b111);
             assert_eq!(filter(n) >> 16 & 0x7FF, u32::from(expected[n]));
             assert_eq!(filter(n) & 0x7FF, n as u32);

@@ -1,5 +1,5 @@
 //! The program in flash: its length and its CRC-32, computed by reading the flash (J-67). A host that has written the
-//! program to the board compares both with its file.
+//! program to the board compares length and CRC with its file.
 //!
 //! The links read the program, one piece per pass ([`Reader::step`]), so that neither the first tick nor any interrupt
 //! waits for it. The result is available in [`read`] a tenth of a second after the start.
@@ -10,7 +10,7 @@ use jtc_wire::Program;
 
 /// First byte of the flash.
 const FLASH: usize = 0x0800_0000;
-/// Number of bytes per piece; reading one takes about 50 µs.
+/// Number of bytes per piece; the read of a piece takes about 50 µs.
 const PIECE: usize = 2048;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -21,15 +21,15 @@ static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 pub static PROGRAM: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];
 
 unsafe extern "C" {
-    /// Address of the initial values of .data in flash, after everything else in bank 1.
+    /// Address of the initial values of .data in flash, after all other data in bank 1.
     static __sidata: u8;
-    /// First byte of .data, and the byte after its last.
+    /// Addresses of the first byte of .data and of the first byte after .data.
     static __sdata: u8;
     static __edata: u8;
 }
 
-/// Reads the program from the first byte of the flash to the last byte of the program. Skips the few words of the
-/// second core's program in bank 2, which is closed.
+/// Reads the program from the first byte of the flash to the last byte of the program. Does not read the few
+/// words of the second core's program in bank 2, which is not readable.
 pub struct Reader {
     program: &'static [u8],
     at: usize,
@@ -46,7 +46,7 @@ impl Reader {
         Self { program, at: 0, digest: Some(CRC.digest()) }
     }
 
-    /// Reads a piece; does nothing after all pieces are read.
+    /// Reads the next piece, if any.
     pub fn step(&mut self) {
         let Some(digest) = &mut self.digest else { return };
         let rest = self.program.get(self.at..).unwrap_or(&[]);

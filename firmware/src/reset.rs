@@ -1,25 +1,27 @@
-//! Cause of the start of the processor: from the flags of the RCC and from the data that the last program kept.
+//! Cause of the start of the processor, determined from the flags of the RCC and from the data of the previous
+//! program run.
 
 /// Cause of the start of the processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Cause {
-    /// Power came on, or the supply voltage was too low.
+    /// The power was switched on, or the supply voltage was too low.
     PowerOn = 1,
-    /// The reset button or a debugger.
+    /// The reset button was pressed, or a debugger used the reset pin.
     Pin = 2,
     /// A debugger or a program requested the reset.
     Software = 3,
     /// The tick did not complete in time.
     Watchdog = 4,
-    /// A hard fault of the processor.
+    /// A hard fault of the processor occurred.
     HardFault = 5,
     /// The program panicked: it reached a state that should be impossible.
     Panic = 6,
 }
 
 impl Cause {
-    /// Returns `true` if the program failed. The controller then reports the failure until a host clears it.
+    /// Returns `true` if the program failed. In this case the controller reports the failure until a host clears the
+    /// failure.
     pub const fn failed(self) -> bool {
         matches!(self, Self::Watchdog | Self::HardFault | Self::Panic)
     }
@@ -37,7 +39,7 @@ impl Cause {
     }
 }
 
-/// Kind of failure that ended the program; kept over the reset.
+/// Kind of failure that ended the program; survives the reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// Hard fault.
@@ -57,10 +59,10 @@ pub const fn lost_power(rsr: u32) -> bool {
     rsr & (POWER_ON | BROWN_OUT) != 0
 }
 
-/// Determines the cause from the register RCC_RSR and from the data that the last program kept.
+/// Determines the cause from the register RCC_RSR and from the data of the previous program run.
 ///
 /// Every reset pulls the reset pin, so the pin's flag is checked last. `failure` is used only if the program itself
-/// requested the reset, or hung before it could.
+/// requested the reset, or if the watchdog caused the reset before the request.
 pub const fn cause(rsr: u32, failure: Option<Failure>) -> Cause {
     match failure {
         _ if lost_power(rsr) => Cause::PowerOn,
@@ -79,7 +81,7 @@ mod tests {
 
     #[test]
     fn each_cause_is_told_from_the_others() {
-        // Flags as the chip reports them: every cause except a wake-up pulls the pin.
+        // Flags that the chip reports; every cause except a wake-up also sets the flag of the reset pin.
         assert_eq!(cause(POWER_ON | BROWN_OUT | PIN, None), Cause::PowerOn);
         assert_eq!(cause(BROWN_OUT | PIN, None), Cause::PowerOn);
         assert_eq!(cause(PIN, None), Cause::Pin);

@@ -14,7 +14,7 @@ pub struct Summary {
     pub errors: u16,
     /// Error counters of the joint bus.
     pub bus: Counters,
-    /// Number of ticks that were skipped because the previous tick took too long.
+    /// Number of ticks that were skipped because the tick before took too long.
     pub left_out: u32,
 }
 

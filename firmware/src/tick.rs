@@ -1,5 +1,6 @@
-//! The tick: TIM7 at the highest priority, a thousand times a second. The tick owns the controller and everything that
-//! moves or stops the arm. The tick shares with the rest of the program only the slot and a summary for the log.
+//! The tick, which is the interrupt of TIM7 with the highest priority, a thousand times per second. The tick owns the
+//! controller and all hardware that moves or stops the arm. The tick shares with the rest of the program only the
+//! slot and a summary for the log.
 use core::cell::Cell;
 use core::sync::atomic::Ordering;
 
@@ -35,7 +36,7 @@ type Jtc = Controller<&'static mut [RawPoint]>;
 /// The flight recorder; its blocks are in separate memory.
 pub type FlightRecorder = Recorder<&'static mut [Block], 3>;
 
-/// Largest number of bytes that a tick searches on a line: more than arrive in two ticks at 15 MBd.
+/// Largest number of bytes of a line that a tick searches. At 15 MBd, fewer bytes arrive in two ticks.
 const LOOK_MAX: usize = 4096;
 
 /// Number of ticks without activity of the links after which the arm is stopped, because a host could not stop it then.
@@ -44,7 +45,7 @@ const LINKS_SILENT_ERROR: u32 = 100;
 /// resets the processor.
 const LINKS_SILENT_RESET: u32 = 200;
 
-/// Parts that a tick needs.
+/// Parts of the firmware that a tick needs.
 pub struct Parts {
     /// Memory of the trajectory.
     pub points: &'static mut [RawPoint],
@@ -54,7 +55,7 @@ pub struct Parts {
     pub pins: Pins,
     /// Readers that search the received bytes for Stop and Pause.
     pub ahead: [Lookahead; lines::LINES],
-    /// Events of the hosts.
+    /// Slot with the events of the hosts.
     pub slot: SlotOut,
     /// RS422, USB.
     pub lines: [Transmitter; lines::LINES],
@@ -62,7 +63,7 @@ pub struct Parts {
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
     /// The flight recorder, with the records from before this start.
     pub recorder: FlightRecorder,
-    /// Origin of this start.
+    /// Cause and data of this start.
     pub boot: Boot,
 }
 
@@ -95,7 +96,7 @@ struct Links {
 }
 
 impl Links {
-    /// Returns the number of ticks since the links were last active.
+    /// Returns the number of ticks since the last activity of the links.
     fn silent(&mut self) -> u32 {
         let rounds = link::ROUNDS_DONE.load(Ordering::Relaxed);
         self.silent = if rounds == self.rounds { self.silent.saturating_add(1) } else { 0 };
@@ -104,11 +105,11 @@ impl Links {
     }
 }
 
-/// The tick's own data. The interrupt takes it out while it runs.
+/// The tick's own data. The interrupt takes the data out while it runs.
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
-/// Creates the controller in its static memory. Not inlined: the controller is large and passes through the stack,
-/// which is free again after this function returns.
+/// Creates the controller in its static memory. Not inlined, because the controller is large and is created on the
+/// stack. After this function returns, its stack is free again.
 #[inline(never)]
 fn controller(points: &'static mut [RawPoint]) -> &'static mut Jtc {
     static PLACE: StaticCell<Jtc> = StaticCell::new();
@@ -155,7 +156,7 @@ pub fn start(parts: Parts) {
     rcc::enable_and_reset::<TIM7>();
     pac::TIM7.psc().write_value((clock::TICK_PRESCALER - 1) as u16);
     pac::TIM7.arr().write(|w| w.set_arr((clock::TICK_US - 1) as u16));
-    // Prescaler and period take effect with an update event, which must not be treated as a tick.
+    // Prescaler and period take effect at an update event, which must not cause a tick.
     pac::TIM7.egr().write(|w| w.set_ug(true));
     pac::TIM7.sr().write(|w| w.set_uif(false));
     pac::TIM7.dier().write(|w| w.set_uie(true));
@@ -222,7 +223,8 @@ impl Tick {
         if let Some(frame) = &outputs.bus {
             self.can.send(frame);
         }
-        // Recorded before the executed frames are returned to the links, and after everything on which the arm depends.
+        // The record is written before the executed frames are returned to the links, and after all actions on which
+        // the arm depends.
         record_step(&mut self.recorder, self.controller, &inputs, &outputs);
         self.slot.done(outputs.host_done);
         if outputs.status {
@@ -241,7 +243,7 @@ impl Tick {
         if silent == LINKS_SILENT_ERROR {
             self.controller.raise_internal();
         }
-        // The tick is complete. Only this line prevents the watchdog from resetting the processor.
+        // The tick is complete. Only this line of code prevents the watchdog from resetting the processor.
         if silent < LINKS_SILENT_RESET {
             self.watchdog.pet();
         }
@@ -281,8 +283,8 @@ impl Tick {
         }
     }
 
-    /// Returns the number of ticks that were missed since the last one, or came late by half a tick or more, computed
-    /// from the microseconds between the ticks.
+    /// Computes, from the microseconds between two ticks, how many ticks were missed between them or were late by
+    /// half a tick or more.
     fn missed_ticks(&mut self) -> u16 {
         let now = Instant::now();
         let before = self.began.replace(now).unwrap_or(now);
@@ -291,7 +293,7 @@ impl Tick {
         u16::try_from(periods.saturating_sub(1)).unwrap_or(u16::MAX)
     }
 
-    /// Skips a tick that is already due, because drives must not get two frames back to back (J-12).
+    /// Skips a tick that is already due, because drives must not receive two frames without a pause (J-12).
     fn leave_out_late_tick(&mut self) {
         if pac::TIM7.sr().read().uif() {
             pac::TIM7.sr().write(|w| w.set_uif(false));
@@ -300,14 +302,15 @@ impl Tick {
     }
 }
 
-/// Runs one step of the controller. A separate function, so that its instructions can be counted by its symbol.
+/// Runs one step of the controller. The function is separate, so that its instructions can be counted by its symbol.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn control_step(controller: &mut Jtc, inputs: &Inputs<'_>) -> Outputs {
     controller.tick(inputs)
 }
 
-/// Runs the flight recorder after the step. A separate function for the same reason.
+/// Runs the flight recorder after the step. The function is separate, so that its instructions can be counted by its
+/// symbol.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn record_step(recorder: &mut FlightRecorder, controller: &mut Jtc, inputs: &Inputs<'_>, outputs: &Outputs) {

@@ -1,8 +1,8 @@
-//! A serial line. DMA fills a ring with received bytes and never stops, even after line errors. Statuses are sent by
-//! DMA, which the tick starts.
+//! A serial line. DMA writes received bytes into a ring and never stops, even after line errors. Statuses are sent
+//! by DMA, which the tick starts.
 //!
-//! No byte causes an interrupt. The tick searches the ring for Stop and Pause. The links check the ring after every
-//! tick, and immediately if the line becomes idle.
+//! Bytes do not cause interrupts. The tick searches the ring for Stop and Pause. The links check the ring after
+//! every tick, and immediately if the line becomes idle.
 use core::sync::atomic::{Ordering, fence};
 
 use embassy_stm32::interrupt::InterruptExt;
@@ -23,10 +23,10 @@ use openjtc_firmware::clock::Baud;
 
 use crate::clocks;
 
-/// Wakes the links: a tick has ended, or a line has become idle.
+/// Event that wakes the links when a tick has ended or a line has become idle.
 pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Bytes per ring: about 21 ms at 15 MBd.
+/// Number of bytes per ring, which is enough for about 21 ms at 15 MBd.
 pub const RING: usize = 32 * 1024;
 
 /// A USART and the streams of DMA1 that serve it.
@@ -74,7 +74,7 @@ struct Stream {
 
 impl Stream {
     const fn new(number: usize, request: u8) -> Self {
-        // Each stream has five flags; four streams share a register.
+        // Each DMA stream has five flags; four streams share a register.
         const SHIFT: [u32; 4] = [0, 6, 16, 22];
         Self {
             registers: DMA1.st(number),
@@ -85,7 +85,7 @@ impl Stream {
         }
     }
 
-    /// Configures transfers of bytes between a register and memory; `start` starts them.
+    /// Configures transfers of bytes between a register and memory. `start` starts the transfers.
     fn configure(self, direction: Dir, register: *mut (), memory: *mut u8, ring: bool) {
         self.multiplexer.write(|w| w.set_dmareq_id(self.request));
         let stream = self.registers;
@@ -97,14 +97,14 @@ impl Stream {
             w.set_minc(true);
             w.set_psize(Size::BITS8);
             w.set_msize(Size::BITS8);
-            // Reception must not wait; transmission may.
+            // Reception must not wait, so its priority is higher than the priority of transmission.
             w.set_pl(if ring { Pl::VERY_HIGH } else { Pl::LOW });
-            // A USART needs buffered transfers; without them the stream can lock up.
+            // A USART needs buffered transfers, because without buffered transfers the stream can lock up.
             w.set_trbuff(true);
         });
     }
 
-    /// Transfers `count` bytes. The stream must have stopped.
+    /// Transfers `count` bytes. Must be called only when the stream has stopped.
     fn start(self, count: usize) {
         // A stream does not start while flags of its last transfer are set.
         self.clear.write_value(self.flags);
@@ -142,7 +142,7 @@ pub fn open(
     });
     usart.cr1().write(|w| {
         w.set_over8(if baud.over8 { Over8::OVERSAMPLING8 } else { Over8::OVERSAMPLING16 });
-        // The FIFO allows a DMA delay of 16 bytes.
+        // Because of the FIFO, DMA may be delayed by the time of 16 bytes.
         w.set_fifoen(true);
         w.set_te(true);
         w.set_re(true);
@@ -171,7 +171,7 @@ pub fn open(
 /// Reader of the ring that DMA fills. Each line has two independent readers.
 struct Ring {
     stream: Stream,
-    /// Written by DMA, so no reference to it may exist.
+    /// Pointer to the ring. DMA writes the ring, so no Rust reference to it may exist.
     bytes: *const u8,
     /// Position of the first byte that was not taken yet.
     next: usize,
@@ -179,13 +179,13 @@ struct Ring {
 
 impl Ring {
     /// Returns the number of bytes that have arrived and were not taken yet. The result is valid only if fewer bytes
-    /// are waiting than the ring holds.
+    /// are waiting than the size of the ring.
     fn waiting(&self) -> usize {
         let end = RING - self.stream.remaining();
         (end + RING - self.next) % RING
     }
 
-    /// Copies the oldest bytes without taking them: as many as are contiguous and fit into the buffer.
+    /// Copies the oldest bytes without taking them. Copies as many bytes as are contiguous and fit into the buffer.
     fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         let count = self.waiting().min(into.len()).min(RING - self.next);
         cortex_m::asm::dmb();
@@ -200,15 +200,15 @@ impl Ring {
     }
 }
 
-/// The tick's reader of a line, which sees every byte, independently of the links.
+/// The tick's reader of a line, which receives every byte, independently of the links.
 pub struct Lookahead(Ring);
 
 // SAFETY: it reads a register and memory that only DMA writes; both are possible from any context.
 unsafe impl Send for Lookahead {}
 
 impl Lookahead {
-    /// Passes the bytes that have arrived since the last call to `look`, in pieces. Passes at most `most` bytes; the
-    /// next call continues.
+    /// Passes the bytes that have arrived since the last call to `look`, in pieces. Passes at most `most` bytes. The
+    /// next call passes the bytes after them.
     pub fn read(&mut self, most: usize, mut look: impl FnMut(&[u8])) {
         let mut left = self.0.waiting().min(most);
         let mut piece = [0; 64];
@@ -240,17 +240,17 @@ impl Receiver {
         self.ring.waiting()
     }
 
-    /// Copies the oldest bytes without taking them: as many as are contiguous and fit into the buffer.
+    /// Copies the oldest bytes without taking them. Copies as many bytes as are contiguous and fit into the buffer.
     pub fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         self.ring.peek(into)
     }
 
-    /// Takes `count` of the waiting bytes.
+    /// Removes the `count` oldest waiting bytes.
     pub fn take(&mut self, count: usize) {
         self.ring.take(count);
     }
 
-    /// Continues at byte `position`, counted from the first byte received.
+    /// Continues reading at byte `position`, counted from the first received byte.
     pub fn jump(&mut self, position: u64) {
         self.ring.next = (position % RING as u64) as usize;
     }
@@ -273,7 +273,7 @@ impl Receiver {
 /// The sending half of a line.
 pub struct Transmitter {
     stream: Stream,
-    /// DMA reads it while the stream runs.
+    /// Buffer for transmission, which DMA reads while the stream runs.
     buffer: &'static mut [u8; ANSWER_MAX],
 }
 
@@ -286,7 +286,8 @@ impl Transmitter {
         !self.stream.running()
     }
 
-    /// Sends a frame. Does nothing if the last frame is still being sent, or if the frame is longer than the buffer.
+    /// Sends a frame. Does not send the frame if the last frame is still being sent, or if the frame is longer than
+    /// the buffer.
     pub fn send(&mut self, frame: &[u8]) {
         if self.is_free()
             && let Some(place) = self.buffer.get_mut(..frame.len())
@@ -307,7 +308,7 @@ fn USART3() {
     idle(pac::USART3);
 }
 
-/// Handles the idle interrupt: the line has been silent for the duration of a byte.
+/// Handles the idle interrupt, which occurs when the line has been silent for the duration of a byte.
 fn idle(usart: Usart) {
     usart.icr().write(|w| w.set_idle(true));
     WORK.signal(());

@@ -9,7 +9,7 @@ pub const ADDRESS: usize = 0x0800_0400;
 /// First bytes of the record.
 pub const MAGIC: [u8; 8] = *b"OPENJTC\0";
 
-/// The record, little-endian like all data of this processor. Texts are padded with zeros.
+/// The record, little-endian like all data of this processor. Texts in the record are padded with zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Version {
@@ -23,7 +23,7 @@ pub struct Version {
     pub version: [u8; 12],
     /// Board, spelled as its feature.
     pub board: [u8; 24],
-    /// Commit, followed by `+` if files were changed since, or `not-in-a-repo`.
+    /// Commit of the source, followed by `+` if files were changed after the commit; or `not-in-a-repo`.
     pub build: [u8; 24],
     /// Capacity of the trajectory memory, points.
     pub points: u32,
@@ -59,7 +59,7 @@ impl Version {
     }
 }
 
-/// Pads a text with zeros; truncates it if it does not fit.
+/// Pads a text with zeros, or truncates the text if it is too long.
 const fn padded<const N: usize>(text: &str) -> [u8; N] {
     let mut bytes = [0; N];
     let mut i = 0;

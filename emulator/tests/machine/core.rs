@@ -1,4 +1,4 @@
-//! The core: arithmetic, exceptions, sleep, faults, resets, instruction counts.
+//! Tests of the core: arithmetic, exceptions, sleep, faults, resets and instruction counts.
 use openjtc_emulator::clock::{self, MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::observe::FaultKind;
 use openjtc_emulator::{Elf, FIRST_LINE, RegisterARM, ResetCause, Symbol};
@@ -13,7 +13,7 @@ const CYCLE: u64 = SECOND / 64_000_000;
 fn f64_results_have_the_bits_of_the_pc() {
     const ROUNDS: usize = 500;
     let mut rng = fastrand::Rng::with_seed(7);
-    // Random bits except NaN, including subnormal numbers, infinities and zeros of both signs.
+    // Random numbers of all kinds except NaN, including subnormal numbers, infinities and zeros of both signs.
     let mut number = || match rng.u8(..) {
         0 => 0.0,
         1 => -0.0,
@@ -27,7 +27,7 @@ fn f64_results_have_the_bits_of_the_pc() {
         .take(ROUNDS)
         .collect();
     let mut machine = machine(FLOATS, &[]);
-    // Each pair is run alone, because the program writes its results in the place of the next pair.
+    // The program runs once for each pair, because it writes its results over the memory of the next pair.
     for [a, b] in pairs {
         let mut one = 1u64.to_le_bytes().to_vec();
         one.extend(a.to_le_bytes());
@@ -85,7 +85,8 @@ fn primask_holds_an_interrupt_until_the_very_instruction_that_clears_it() {
     machine.run_until(5 * MICROSECOND);
     assert_eq!((result(&machine, 1), result(&machine, 2)), (0, 1));
     let latency = machine.chip().observers.latencies[FIRST_LINE];
-    // Pending at the end of the store. Four nop, a load, a store and cpsie are executed before the handler.
+    // The interrupt is pending at the end of the store. Four nop, a load, a store and cpsie are executed before the
+    // handler.
     assert_eq!((latency.entries, latency.worst), (1, 7 * CYCLE));
 }
 
@@ -101,7 +102,7 @@ fn wfi_sleeps_until_a_timer_and_costs_no_instructions() {
     machine.run_until(start + 999 * MICROSECOND);
     assert!(machine.instructions() <= 2);
     assert_eq!(result(&machine, 0), 0);
-    // The handler does not clear the flag, so the line stays high and the interrupt occurs again and again.
+    // The handler does not clear the flag, so the interrupt line remains high and the interrupt occurs repeatedly.
     machine.run_until(start + 1000 * MICROSECOND + 40 * CYCLE);
     assert!(result(&machine, 0) >= 3);
     assert_eq!(machine.chip().observers.latencies[FIRST_LINE + 55].worst, 0);

@@ -1,4 +1,4 @@
-//! Flash bank 2: locks, times, errors, stalls of the core, contents after a loss of power.
+//! Tests of flash bank 2: locks, times, errors, stalls of the core, and contents after a loss of power.
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::flash::{BANK2, BANK2_SIZE, Bank2, Flash, OperationKind, WORD, sr};
 use openjtc_emulator::{Machine, ResetCause};
@@ -10,7 +10,7 @@ const KEYR: u32 = 0x104;
 const CR: u32 = 0x10C;
 const SR: u32 = 0x110;
 const CCR: u32 = 0x114;
-/// CR values: programming; erasing sector 6; erasing sector 6 with START.
+/// Values of CR for programming, for erasing sector 6, and for erasing sector 6 with START.
 const PG: u32 = 0x22;
 const SER: u32 = 0x624;
 const START: u32 = 0x6A4;
@@ -77,13 +77,14 @@ fn a_word_is_programmed_once_and_only_as_a_whole() {
     let end = 130 * MICROSECOND;
     assert_eq!((sr(&mut flash, end), flash.overwrites), (0, 0));
     assert_eq!(flash.load(AT + 28, 4), (0x1234_5678, false));
-    // Programming the word again without erasing it makes it unreadable.
+    // If a word is programmed again without being erased, it becomes unreadable.
     program(&mut flash, AT, 0x1234_5678, end);
     assert_eq!((sr(&mut flash, 2 * end), flash.overwrites), (0, 1));
     assert!(flash.load(AT, 4).1);
     assert_eq!(sr(&mut flash, 2 * end), sr::DBECCERR);
     flash.write_register(CCR, sr::DBECCERR, 2 * end, true);
-    // Half a word is buffered. Writing another word, or the same bytes again, is then an error.
+    // Half of a flash word is in the write buffer. In this state it is an error to write another word, or to write
+    // these bytes again.
     flash.store(AT + 32, 4, 0, 2 * end, true);
     assert_eq!(sr(&mut flash, 2 * end), sr::WBNE);
     flash.store(AT + 64, 4, 0, 2 * end, true);
@@ -119,7 +120,7 @@ fn a_failed_operation_says_so() {
     assert_eq!(sr(&mut flash, MILLISECOND), sr::OPERR);
 }
 
-/// The load, and with it the core, waits for the end of the erase operation.
+/// The core waits in the load instruction until the erase operation ends.
 #[test]
 fn a_read_of_the_busy_bank_halts_the_core() {
     let mut machine = machine(ERASE_AND_READ, &[]);

@@ -32,7 +32,7 @@ fn image(main: &[u16], handlers: &[(usize, &[u16])]) -> Elf {
     Elf::from_image(0x0800_0000, bytes)
 }
 
-/// Returns a machine with such an image; its first result words are zero.
+/// Returns a machine with an image of [`image`]; its first result words are zero.
 fn machine(main: &[u16], handlers: &[(usize, &[u16])]) -> Machine {
     let mut machine = Machine::new(image(main, handlers), 1);
     assert!(machine.poke(RESULT, &[0; 64]));

@@ -1,4 +1,4 @@
-//! Small programs, assembled by hand. The text above each program is the source of its half-words.
+//! Small programs, assembled by hand. The text above each program is the assembly source of its half-words.
 
 /// ```text
 /// b .

@@ -1,4 +1,4 @@
-//! USART and DMA: every byte takes its real time on the line and arrives at the right address.
+//! USART and DMA: the transmission of every byte takes the real time, and the byte is stored at the right address.
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::{FIRST_LINE, Machine};
 
@@ -13,7 +13,7 @@ const ISR: u32 = USART3 + 0x1C;
 const ICR: u32 = USART3 + 0x20;
 const RDR: u32 = USART3 + 0x24;
 const TDR: u32 = USART3 + 0x28;
-/// UE, RE, TE, FIFOEN.
+/// Value of CR1 with the bits UE, RE, TE and FIFOEN.
 const ON: u32 = 1 | 4 | 8 | 1 << 29;
 const IDLE: u32 = 0x10;
 const ORE: u32 = 8;
@@ -114,7 +114,7 @@ fn a_dma_ring_takes_a_stream_and_wraps() {
     machine.chip().usarts[1].host_write(start, &(1..=19).collect::<Vec<u8>>());
     machine.run_until(start + 4 * 10 * MICROSECOND + MICROSECOND);
     assert_eq!(machine.memory(RING, 4).unwrap(), [1, 2, 3, 4]);
-    // Half of the transfers are done. The interrupt line stays high, because the flag is never cleared.
+    // Half of the transfers are done. The interrupt line remains high, because the flag is never cleared.
     assert!(machine.chip().observers.latencies[FIRST_LINE + 12].entries > 0);
     machine.run_until(start + MILLISECOND);
     assert_eq!(machine.memory(RING, 8).unwrap(), [17, 18, 19, 12, 13, 14, 15, 16]);

@@ -3,7 +3,7 @@ use jtc_wire::Program;
 use openjtc_emulator::Elf;
 use std::path::PathBuf;
 
-/// The boards, by their file names.
+/// File names of the firmware of all boards.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
 /// Rate of the firmware that [`fast_elf`] returns, Bd.
@@ -50,7 +50,7 @@ pub struct Version {
     pub core_hz: u32,
 }
 
-/// Reads the record from the file; returns `None` if the file has no record.
+/// Reads the version record from the file; returns `None` if the file does not contain a record.
 pub fn version(elf: &Elf) -> Option<Version> {
     const ADDRESS: u32 = 0x0800_0400;
     let bytes = elf.segments.iter().find_map(|(start, data)| {
@@ -68,8 +68,8 @@ pub fn version(elf: &Elf) -> Option<Version> {
     Some(Version { version, board, build, points, segments, segment_points, tick_hz, baud, core_hz })
 }
 
-/// Returns the length and CRC-32 of flash bank 1 after this file is loaded into an erased chip. The CRC is computed bit
-/// by bit from its definition.
+/// Returns the length and the CRC-32 of the program in flash bank 1 after this file is loaded into an erased chip. The
+/// CRC is computed bit by bit from its definition.
 pub fn program(elf: &Elf) -> Program {
     const BANK1: std::ops::Range<u32> = 0x0800_0000..0x0810_0000;
     let mut flash = Vec::new();

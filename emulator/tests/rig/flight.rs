@@ -1,4 +1,4 @@
-//! The flight record, decoded from its bytes as an external tool would.
+//! Decoder of the flight record, which works from the bytes like an external tool.
 use jtc_bus::Frame;
 use jtc_core::{BusState, HOST_LINES};
 use jtc_wire::{UrgentCommand, UrgentCommands};
@@ -26,9 +26,9 @@ pub struct Flight {
     pub state: u8,
     pub trajectory: u8,
     pub safety_output: bool,
-    /// Number of events that the controller has finished.
+    /// Number of events whose processing the controller has finished.
     pub host_done: usize,
-    /// Line of the response record in the status.
+    /// Number of the serial line for which the status contains a response record.
     pub record_line: Option<usize>,
     /// `true` if a status was sent.
     pub status: bool,
@@ -41,11 +41,11 @@ pub struct Flight {
 /// An event from a host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Event {
-    /// 1: a frame, 2: an invalid frame, 3: noise.
+    /// Kind of the event: 1 is a frame, 2 an invalid frame, 3 noise.
     pub kind: u8,
-    /// `true` if an urgent command was received after it.
+    /// `true` if an urgent command was received after the event.
     pub overtaken: bool,
-    /// `true` if it arrived on a line without extensions.
+    /// `true` if the event arrived on a line without extensions.
     pub plain: bool,
     pub line: u8,
     pub frame_type: u8,
@@ -81,12 +81,12 @@ impl Bytes<'_> {
 }
 
 impl Flight {
-    /// The inputs belong to the tick, but the outputs do not yet.
+    /// The inputs belong to the tick, and the outputs still belong to the previous tick.
     pub const PHASE_INPUTS: u32 = 1;
     /// Inputs and outputs belong to the tick.
     pub const PHASE_COMPLETE: u32 = 2;
 
-    /// Returns `None` if these bytes are not a record, which is the case after power-on.
+    /// Decodes a record. Returns `None` if the bytes are not a record, as after power-on.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         assert_eq!(bytes.len(), FLIGHT_SIZE);
         let mut b = Bytes(bytes);
@@ -148,7 +148,7 @@ impl Flight {
         })
     }
 
-    /// Returns the bus state of the inputs.
+    /// Returns the bus state in the inputs of the tick.
     pub fn bus(&self) -> BusState {
         BusState { acknowledged: self.bus_state & 1 != 0, bus_off: self.bus_state & 2 != 0 }
     }

@@ -1,4 +1,4 @@
-//! A host on a line: the bytes that it sent and received.
+//! A host on a serial line, with the bytes that it sent and received.
 use std::collections::VecDeque;
 
 use jtc_wire::{Answer, FrameRef, FromDevice, Info, Response, Status, StatusReceiver};
@@ -14,25 +14,25 @@ pub struct Host {
     pub sent: Vec<u8>,
     /// Number of sent bytes up to the end of the last frame that the device has executed.
     found: usize,
-    /// Bytes that must be received next: the statuses of the shadow controller.
+    /// Bytes that the host must receive next, which are the statuses of the shadow controller.
     pub expected: VecDeque<u8>,
     receiver: StatusReceiver,
     /// The newest status.
     pub last: Option<Status>,
     /// The newest Info.
     pub info: Option<Info>,
-    /// Times at which statuses were complete.
+    /// Times at which the last byte of each status was received.
     pub times: Vec<Time>,
     /// Records received, oldest first.
     pub records: Vec<Response>,
     /// Number of bytes received.
     pub received: u64,
-    /// Time of a device reset, as long as received bytes may be older than the reset.
+    /// Time of a device reset; `None` when no received byte can be older than the reset.
     reset: Option<Time>,
 }
 
 impl Host {
-    /// Receives bytes from the device. Each must equal the next byte of the shadow controller.
+    /// Receives bytes from the device. Each byte must equal the next byte of the shadow controller.
     pub fn receive(&mut self, bytes: &[WireByte]) {
         for byte in bytes {
             self.received += 1;
@@ -58,7 +58,7 @@ impl Host {
         }
     }
 
-    /// Returns the numbers of statuses, invalid frames and invalid bytes.
+    /// Returns how many statuses, invalid frames and invalid bytes were received.
     pub fn counters(&self) -> jtc_wire::StatusCounters {
         self.receiver.counters()
     }
@@ -70,8 +70,8 @@ impl Host {
         self.receiver.clear();
     }
 
-    /// Returns the bytes of a frame that the device has recorded. The host must have sent them after the last recorded
-    /// frame.
+    /// Returns the bytes of a frame that the device has recorded. The host must have sent these bytes after the last
+    /// recorded frame.
     pub fn frame(&self, event: &Event) -> Vec<u8> {
         let length = usize::from(event.len);
         let (_, bytes) = self.place(event);

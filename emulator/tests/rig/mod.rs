@@ -1,9 +1,9 @@
 //! A board under test: the board's own ELF file, the simulated arm on its joint bus, and a host on each serial line. In
 //! parallel, the same controller runs on the PC (the shadow controller) with the inputs from the board's flight record.
-//! Its outputs must be the same.
+//! The outputs of both controllers must be equal.
 //!
-//! Every millisecond of every test is checked: no tick is missing, all torques are bit-identical to those of the shadow
-//! controller, the same frame and the same statuses are sent on the lines, and the invariants of the simulator hold.
+//! Every millisecond of every test is checked: no tick is missing, the torques, the frame and the statuses are
+//! bit-identical to the outputs of the shadow controller, and the invariants of the simulator are true.
 #![allow(dead_code, reason = "each test uses its part")]
 
 mod elf;
@@ -28,10 +28,10 @@ pub use host::Host;
 pub use shadow::Shadow;
 use shadow::{LogMemory, Start, no_log};
 
-/// Exception of the tick.
+/// Exception number of the tick.
 const TIM7: usize = FIRST_LINE + 55;
 
-/// Both lines, in the order of the flight record.
+/// Ports of both lines, in the order of the flight record.
 pub const PORTS: [Port; 2] = [Port::Usart2, Port::Usart3];
 
 /// Index of a port in arrays.
@@ -111,7 +111,7 @@ impl Rig {
         let ms = self.board.now_ms();
         let resets = self.board.machine.chip().observers.resets.clone();
         for reset in &resets[self.resets..] {
-            // A new program begins. Everything that runs in parallel restarts too, except the log.
+            // The program restarts. The shadow controller restarts, too, but the log continues.
             if let Some(shadow) = self.shadow.take() {
                 self.log = shadow.into_log();
             }
@@ -192,7 +192,7 @@ impl Rig {
         Start { cause, boots: self.resets as u32, version, program, arm, log: self.log.clone() }
     }
 
-    /// Checks that the frames from the controller are sent unchanged and in order, or not at all.
+    /// Checks that the frames of the controller are unchanged and in order on the bus. Frames may also be missing.
     fn take_bus(&mut self) {
         let wire = &mut self.board.machine.chip().fdcan.wire;
         self.bus = wire.log().iter().cloned().collect();
@@ -202,7 +202,7 @@ impl Rig {
             assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
             let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
             let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
-                // This frame belongs to the tick that is running now, whose record is read later.
+                // The frame belongs to the tick that is running now, whose record is read later.
                 continue;
             };
             self.to_pass.drain(..=at);
@@ -211,8 +211,8 @@ impl Rig {
 
     /// Returns the flight record. If a tick extends over two milliseconds, waits for its end.
     fn complete_flight(&mut self) -> Option<Flight> {
-        // The longest tick takes a third of a millisecond: a model is received and everything that depends on it is
-        // computed.
+        // The longest tick takes a third of a millisecond, when a model is received and all values that depend on
+        // it are computed.
         for _ in 0..80 {
             // A half-written record is not valid. A tick may also be due at this time.
             if !self.in_tick() {
@@ -273,7 +273,7 @@ impl Rig {
         self.board.write(port, bytes);
     }
 
-    /// Sends a frame and waits for its record, which no other port may get.
+    /// Sends a frame and waits for its record, which must not be sent to another port.
     #[track_caller]
     pub fn response(&mut self, port: Port, frame: &[u8]) -> Response {
         for host in &mut self.hosts {
@@ -308,7 +308,8 @@ impl Rig {
         self.wait_for_hold(12_000);
     }
 
-    /// Starts a trajectory from the current position, out and back in `seconds` each, and runs `ms` of it.
+    /// Starts a trajectory from the current position to another position and back, which takes `seconds` in each
+    /// direction. Runs the board for `ms`.
     #[track_caller]
     pub fn set_off(&mut self, port: Port, seconds: f64, ms: u64) {
         let here = self.telemetry().joints.map(|j| j.set_position);

@@ -10,18 +10,18 @@ use super::elf::Version;
 use super::flight::{Event, Flight};
 use super::host::Host;
 
-/// Causes of a start after which the controller reports a failure (J-12): watchdog, hard fault, panic.
+/// Start causes after which the controller reports a failure (J-12): watchdog, hard fault and panic.
 const FAILED: [u32; 3] = [4, 5, 6];
 
 /// Memory of the flight recorder, divided into the same parts as on the board.
 pub type LogMemory = [Vec<Block>; 3];
 
-/// Returns the state of the memory after a loss of power.
+/// Creates the flight recorder memory in its state after a loss of power.
 pub fn no_log() -> LogMemory {
     RECORDER_BLOCKS.map(|blocks| vec![[0; BLOCK_WORDS]; blocks])
 }
 
-/// The controller that runs in parallel with the board.
+/// Controller that runs on the PC in parallel with the board.
 pub struct Shadow {
     controller: Controller<Vec<RawPoint>>,
     recorder: Recorder<Vec<Block>, 3>,
@@ -32,7 +32,7 @@ pub struct Shadow {
 
 /// Data about a board's start.
 pub struct Start {
-    /// Cause, with the code of the flight record.
+    /// Cause of the start, as the code in the flight record.
     pub cause: u32,
     /// Number of this start since power-on.
     pub boots: u32,
@@ -175,8 +175,8 @@ fn host_event<'a>(event: &Event, bytes: &'a [u8]) -> HostEvent<'a> {
     HostEvent { line: event.line.into(), overtaken: event.overtaken, plain: event.plain, event: what }
 }
 
-/// Adds the expected status (J-04). The line of the answered frame gets the response record, the other line gets the
-/// same status without a record.
+/// Adds the expected status (J-04). The status on the line of the answered frame contains the response record. The
+/// status on the other line does not contain the record.
 fn expect_status(bytes: &[u8], line: Option<usize>, hosts: &mut [Host; 2]) {
     let status = Status::parse(bytes).expect("the controller makes good statuses");
     assert_eq!(status.response().is_some(), line.is_some());

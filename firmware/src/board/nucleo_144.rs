@@ -1,5 +1,5 @@
 //! NUCLEO-H743ZI2 (MB1364) with an STM32H743ZI, and NUCLEO-H745ZI-Q (MB1363) with an STM32H745ZI. The STM32H745ZI also
-//! has a Cortex-M4, which stays stopped. The controller uses the same pins on both boards.
+//! has a Cortex-M4, which this firmware does not use. The controller uses the same pins on both boards.
 use embassy_stm32::Peripherals;
 
 use super::{Board, Pins, led, receive, transmit};

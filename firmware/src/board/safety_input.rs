@@ -5,9 +5,9 @@ use embassy_stm32::{Peri, pac};
 /// The pin, and the EXTI line of the same number that latches its falling edges.
 ///
 /// RM0399, EXTI: SYSCFG_EXTICR selects a pin for the line. A falling edge of the pin sets the line's bit in EXTI_C1PR1
-/// within nanoseconds, without the processor. The bit stays set until a 1 is written to it. The line is unmasked in
-/// EXTI_C1IMR1, because the manual does not guarantee pending bits of masked lines. Its interrupt stays disabled in the
-/// NVIC, and the tick polls the bit.
+/// within nanoseconds, without the processor. The bit remains set until a 1 is written to it. The line is unmasked in
+/// EXTI_C1IMR1, because the manual does not guarantee pending bits of masked lines. The interrupt of the line remains
+/// disabled in the NVIC, and the tick polls the bit.
 pub struct SafetyInput {
     pin: Input<'static>,
     /// Bit of the line in the EXTI registers.
@@ -15,36 +15,37 @@ pub struct SafetyInput {
 }
 
 impl SafetyInput {
-    /// Creates the input, pulled down so that a broken wire reads as an error.
+    /// Configures the input, which is pulled down so that a broken wire reads as an error.
     pub fn new(pin: Peri<'static, impl Pin>) -> Self {
         let line = usize::from(pin.pin());
         let port = pin.port();
         let pin = Input::new(pin, Pull::Down);
         // SYSCFG has a clock that must be enabled (RCC_APB4ENR); EXTI has none.
         pac::RCC.apb4enr().modify(|w| w.set_syscfgen(true));
-        // Reading the register back makes sure that the clock runs.
+        // The read of the register ensures that the clock is running.
         pac::RCC.apb4enr().read();
         pac::SYSCFG.exticr(line / 4).modify(|w| w.set_exti(line % 4, port));
         pac::EXTI.ftsr(0).modify(|w| w.set_line(line, true));
         pac::EXTI.imr(0).modify(|w| w.set_line(line, true));
         let mut input = Self { pin, mask: 1 << (line % 16) };
-        // Discards a falling edge from the time before the pin was an input.
+        // Discards a falling edge that occurred before the pin was an input.
         input.take_edge();
         input
     }
 
-    /// Returns `true` if the level is 1 now and has been 1 since the last call.
+    /// Returns `true` if the level is 1 and has been 1 since the last call.
     pub fn is_safe(&mut self) -> bool {
-        // Reads the edge first. If an edge occurs between the two reads, the level or the next call shows it.
+        // The edge is read before the level. If an edge occurs between the two reads, the level or the next call
+        // detects it.
         let edge = self.take_edge();
         !edge && self.pin.is_high()
     }
 
     /// Returns `true` if there was a falling edge since the last call.
     fn take_edge(&mut self) -> bool {
-        // Uses a mask, because an index is bounds-checked and the tick must contain no panic path.
+        // The code uses a mask because an index would be bounds-checked, and the tick must not contain a panic path.
         let edges = pac::EXTI.pr(0).read().0 & self.mask;
-        // Writing a 1 clears this bit; the other bits stay unchanged.
+        // A write of 1 clears this bit; the other bits do not change.
         pac::EXTI.pr(0).write(|w| w.0 = edges);
         edges != 0
     }

@@ -1,5 +1,5 @@
-//! `cargo xtask bench`: measures figures and their anchors (reference values of other software) in the same run on the
-//! same machine.
+//! `cargo xtask bench`: measures performance figures and reference values of other software (anchors) in one run on
+//! one computer.
 mod load;
 mod table;
 mod tracking;
@@ -16,8 +16,8 @@ use load::{Load, OTHERS_MAX};
 use crate::python;
 use crate::shell::{self, cargo, command, root, run};
 
-/// Time of Pinocchio's inverse dynamics, ns, measured with the same kind of build on the machine for which the absolute
-/// targets were set.
+/// Time of Pinocchio's inverse dynamics, ns, measured with an equal kind of build on the computer for which the
+/// absolute targets were set.
 const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 
 /// Figures by name.
@@ -38,7 +38,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let frames = work.join("ucom-frames.log");
     let kernels = dynamics_program(&work)?;
     let rounds = if quick { 1 } else { 5 };
-    // All builds are done first, so that no build disturbs the measurements.
+    // All programs are built first, so that builds do not disturb the measurements.
     let mut skipped = Vec::new();
     anchors(&work, &kernels, 0, &mut skipped)?;
     for Example { package, name, .. } in EXAMPLES {
@@ -60,7 +60,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
         samples.append(&mut failed.attempt(&["plan."], planned));
         keep_best(&mut figures, samples);
     }
-    // This is measured only once, because the minimum of several maxima would not be a maximum.
+    // The longest tick is measured only once, because the minimum of several maxima would not be a maximum.
     figures.append(&mut stops(quick, &mut failed));
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
@@ -100,8 +100,8 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(if missed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Keeps the better of two measurements of a figure: the smaller time or size, or the greater throughput. This is valid because other
-/// programs can only make a measurement worse.
+/// Keeps the better of two measurements of each figure, which is the smaller time or size or the greater throughput. The better value
+/// is valid, because other programs can only make a measurement worse.
 fn keep_best(figures: &mut Figures, samples: Figures) {
     for (name, value) in samples {
         let throughput = ["_gb_s", "_frames_s"].iter().any(|end| name.ends_with(end));
@@ -118,12 +118,12 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Failed measurements. Each has the beginnings of the names of its figures, and the cause.
+/// Failed measurements. Each entry contains the prefixes of the names of its figures, and the cause.
 #[derive(Default)]
 pub(crate) struct Failed(Vec<(&'static [&'static str], String)>);
 
 impl Failed {
-    /// Runs a measurement. If it fails, notes the cause and returns no figure.
+    /// Runs a measurement. If the measurement fails, stores the cause and returns an empty list.
     fn attempt(
         &mut self,
         figures: &'static [&'static str],
@@ -152,14 +152,14 @@ impl Failed {
     }
 }
 
-/// Beginnings of the names of the anchors' figures.
+/// Prefixes of the names of figures that are measured with the anchors.
 const ANCHORS: &[&str] = &["ours.", "pinocchio", "casadi", "mujoco", "kdl", "rbdl", "libm_sin_cos_6"];
 
 /// Program that measures a crate.
 struct Example {
     package: &'static str,
     name: &'static str,
-    /// Beginnings of the names of its figures.
+    /// Prefixes of the names of the figures that the program prints.
     figures: &'static [&'static str],
 }
 
@@ -175,13 +175,13 @@ const EXAMPLES: [Example; 4] = [
 ];
 
 impl Example {
-    /// Runs the program and returns its figures. The UCoM frames that it has decoded are written to `frames`.
+    /// Runs the program and returns its figures. The program writes the UCoM frames that it has decoded to `frames`.
     fn measure(&self, frames: &Path) -> Result<Figures> {
         let Self { package, name, .. } = *self;
         let mut example =
             cargo(&["run", "--profile", "dist", "--quiet", "--package", package, "--example", name]);
         let text = shell::read(example.env("OPENJTC_UCOM_FRAMES", frames))?;
-        // Some programs print a JSON object, others lines with a name and a number.
+        // Some programs print a JSON object, and other programs print lines with a name and a number.
         let mut figures = if text.trim_start().starts_with('{') { object(&text)? } else { lines(&text) };
         if let Some(bytes) = figures.get("controller_bytes").copied() {
             figures.insert("controller_kib".into(), bytes / 1024.0);
@@ -257,8 +257,8 @@ fn lines(text: &str) -> Figures {
         .collect()
 }
 
-/// Measures our dynamics and those of other libraries in turn, with the same arm and states. If `rounds` is 0, only builds
-/// the programs.
+/// Measures the dynamics of this project and of other libraries alternately, with the same arm and states. If `rounds` is
+/// 0, only builds the programs.
 fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) -> Result<Figures> {
     for (header, package) in [
         ("/usr/include/eigen3/Eigen/Core", "libeigen3-dev"),
@@ -293,7 +293,7 @@ fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) 
     Ok(figures)
 }
 
-/// Prints the errors of each joint, with our control law and without its feed-forward.
+/// Prints the errors of each joint for our control law with and without feed-forward.
 fn print_tracking(figures: &Figures) {
     let figure = |name: String| figures.get(&name).map_or("?".into(), |value| format!("{value:.2}"));
     println!("\ntracking, mrad (RMS, largest) | ours | straight lines, PID and gravity only");

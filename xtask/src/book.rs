@@ -1,4 +1,4 @@
-//! `cargo xtask book`: makes docs/ into an HTML book. Every test run checks the pages without building the book.
+//! `cargo xtask book`: builds an HTML book from docs/. Every test run checks the pages without building the book.
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -17,8 +17,8 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns a cargo command for the program that makes the book. The program is a separate workspace, so that a build of the
-/// project does not build mdbook.
+/// Returns a cargo command for the program that builds the book. The program is in a separate workspace, so that a build of
+/// the project does not include mdbook.
 fn tool(words: &[&str]) -> Command {
     let mut cargo = cargo(words);
     cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));
@@ -26,18 +26,18 @@ fn tool(words: &[&str]) -> Command {
     cargo
 }
 
-/// Builds that program and its tests.
+/// Builds the program that builds the book, and its tests.
 pub(crate) fn build() -> Result<()> {
     run(&mut tool(&["build"]))?;
     run(&mut tool(&["test", "--no-run"]))
 }
 
-/// Makes the book in a folder.
+/// Builds the book in a folder.
 pub(crate) fn make(out: &Path) -> Result<()> {
     run(tool(&["run"]).arg("--").arg(root()).arg(out))
 }
 
-/// Tests the program, makes the book, and checks all its links.
+/// Tests the program, builds the book, and checks all links of the book.
 pub(crate) fn made() -> Result<()> {
     run(&mut tool(&["test"]))?;
     let scratch = Scratch::new("book")?;
@@ -45,7 +45,7 @@ pub(crate) fn made() -> Result<()> {
 }
 
 /// Checks that every page of docs/ is in the book, and that every link to a section leads to a heading of the page. Also checks that
-/// tests run every block of commands, or that the block gives the reason why they do not.
+/// the tests execute every block of commands, or that the block states the reason why it is not executed.
 pub(crate) fn check() -> Result<()> {
     let docs = root().join("docs");
     let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).context("docs/SUMMARY.md")?;
@@ -89,7 +89,7 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-/// Returns the targets of the links in a page, without those in fenced blocks.
+/// Returns the targets of the links in a page, except links in fenced blocks.
 fn targets(page: &str) -> impl Iterator<Item = &str> {
     prose(page).flat_map(|line| line.split("](").skip(1)).filter_map(|rest| Some(rest.split_once(')')?.0))
 }
@@ -104,7 +104,7 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Returns the names of the headings of a page, in the form that links use.
+/// Returns the names of the headings of a page, in the form that is used in links.
 fn anchors(page: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for heading in prose(page).filter(|line| line.starts_with('#')) {
@@ -122,7 +122,7 @@ fn anchors(page: &str) -> BTreeSet<String> {
     names
 }
 
-/// Treatment of a block of commands by tests.
+/// Specification of how tests treat a block of commands.
 #[derive(Debug, PartialEq, Eq)]
 enum Block {
     Run,
@@ -130,7 +130,7 @@ enum Block {
     Forgotten,
 }
 
-/// Returns the blocks of commands in a page, with the line in which each begins.
+/// Returns the blocks of commands in a page, with the line number at which each block begins.
 fn blocks(page: &str) -> Vec<(usize, Block)> {
     let mut found = Vec::new();
     let (mut named, mut generated, mut fenced, mut above) = (false, false, false, "");

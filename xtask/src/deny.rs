@@ -1,7 +1,8 @@
-//! Compares deny.toml, the file of cargo-deny with rules for licences, sources and bans, with cargo's resolution.
+//! Checks cargo's dependency resolution against deny.toml, which contains rules for licences, sources and banned
+//! crates.
 //!
-//! The installation of cargo-deny takes minutes, which is too long for every test run. `cargo xtask dist` runs it. The checks here read the
-//! same file.
+//! The installation of cargo-deny takes minutes, so only `cargo xtask dist` runs cargo-deny. The checks in this module read deny.toml
+//! directly.
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -12,12 +13,12 @@ use toml::{Table, Value};
 use crate::dist::graph::{self, Crate};
 use crate::shell::{self, root, run};
 
-/// Version of cargo-deny that reads deny.toml for a release.
+/// Version of cargo-deny that checks a release.
 const CARGO_DENY: &str = "0.20.2";
 
-/// Workspaces with parts that a release contains.
+/// Workspaces whose crates are part of a release.
 const SHIPPED: [&str; 2] = ["Cargo.toml", "firmware/Cargo.toml"];
-/// All lock files. The sources in each of them are checked.
+/// All lock files. The sources of the dependencies in each workspace are checked.
 const LOCKS: [&str; 5] =
     ["Cargo.lock", "firmware/Cargo.lock", "emulator/Cargo.lock", "fuzz/Cargo.lock", "book/Cargo.lock"];
 
@@ -64,7 +65,7 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-/// Runs cargo-deny itself. If it is missing, installs it below the build folder.
+/// Runs cargo-deny itself. Installs cargo-deny below the build folder if it is missing.
 pub(crate) fn with_cargo_deny() -> Result<()> {
     let folder = shell::target().join("tools");
     let program = folder.join("bin/cargo-deny");
@@ -121,7 +122,7 @@ fn licence(rules: &Table, found: &Crate) -> Result<()> {
     Ok(())
 }
 
-/// Returns the reason why a crate is banned; `None` if it is not.
+/// Returns the reason why a crate is banned; `None` if it is not banned.
 fn banned(rules: &Table, name: &str) -> Option<String> {
     let bans = rules.get("bans")?.get("deny")?.as_array()?;
     let ban = bans.iter().find(|ban| ban.get("crate").and_then(Value::as_str) == Some(name))?;

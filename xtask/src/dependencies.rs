@@ -1,4 +1,5 @@
-//! Checks that docs/dependencies.md lists exactly the direct dependencies in the manifests and in the lists for Python and Node.js.
+//! Checks that docs/dependencies.md lists exactly the direct dependencies of the manifests and of the lists for
+//! Python and Node.js.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};
@@ -20,7 +21,7 @@ fn direct(manifest: &str) -> BTreeSet<String> {
             }
         } else if inside && let Some((key, _)) = line.split_once('=') {
             let name = key.trim().split('.').next().unwrap_or_default();
-            // Comments, and continuation lines of a value, are not names.
+            // Comments and continuation lines of a value do not contain names.
             let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if !name.is_empty() && name.chars().all(is_name) {
                 names.insert(name.to_owned());
@@ -38,7 +39,7 @@ fn documented(page: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// Returns an error that lists missing and surplus entries of the page.
+/// Returns an error that lists entries that are missing on the page, and entries that are not dependencies.
 pub(crate) fn check() -> Result<()> {
     let page =
         std::fs::read_to_string(root().join("docs/dependencies.md")).context("docs/dependencies.md")?;

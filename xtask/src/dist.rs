@@ -1,4 +1,4 @@
-//! `cargo xtask dist`: the files of a release, and checks of them.
+//! `cargo xtask dist`: builds and checks the files of a release.
 mod check;
 mod chroot;
 mod dashboard;
@@ -53,7 +53,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes all files of a release in an empty folder. Returns the omitted parts with the reasons.
+/// Makes all files of a release in an empty folder. Returns the parts that were omitted, with the reasons.
 fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     let mut left_out = Vec::new();
     empty(out)?;
@@ -129,8 +129,8 @@ fn version() -> Result<String> {
     Ok(version.context("the workspace has no version")?.to_owned())
 }
 
-/// Creates the folder, or removes the files of an earlier release that are in its list. If the folder contains any other file, it is
-/// not changed and an error is returned.
+/// Creates the folder, or removes the files of an earlier release that are in its list. If the folder contains any other file,
+/// returns an error and does not change the folder.
 fn empty(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let list = std::fs::read_to_string(out.join(tree::SUMS)).unwrap_or_default();

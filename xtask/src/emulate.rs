@@ -1,4 +1,5 @@
-//! `cargo xtask emulate`: the boards' programs in an emulator of the chip: tests, figures, or a live controller on a serial port.
+//! `cargo xtask emulate`: runs the boards' programs in an emulator of the chip, for tests, for measurements, or as a
+//! live controller on a serial port.
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
@@ -9,7 +10,8 @@ use crate::suite::{self, count_results};
 use crate::tally::{Counts, Outcome, Tally};
 use crate::{firmware, python, size};
 
-/// Figures of the boards' programs, kept in the repository so that a change to them is a decision.
+/// File with measurements of the boards' programs. The file is in the repository, so that every change of a
+/// measurement is reviewed.
 const FIGURES: &str = "docs/board-figures.txt";
 
 /// `arguments`: `--update`, or `--serial PATH` and arguments of the emulator itself.
@@ -25,7 +27,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(tally.finish())
 }
 
-/// Runs the steps, as a part of `cargo xtask test`, too.
+/// Runs the emulator steps, which are also part of `cargo xtask test`.
 pub(crate) fn steps(tally: &mut Tally, update: bool) {
     tally.step("board: lints, every unsafe block explained", || firmware::lints().map(|()| Outcome::Passed));
     tally.step("board: tests of what needs no hardware", firmware::tests);
@@ -40,7 +42,7 @@ pub(crate) fn steps(tally: &mut Tally, update: bool) {
     tally.step("board: figures", || figures(update).map(|()| Outcome::Passed));
 }
 
-/// Unicorn is built from C: cmake, and libclang for its bindings.
+/// Unicorn is built from C code, which needs cmake, and its bindings need libclang.
 fn install_tools() -> Result<()> {
     if !works(shell::command("cmake").arg("--version")) {
         shell::apt_install(&["cmake"])?;
@@ -51,7 +53,7 @@ fn install_tools() -> Result<()> {
     Ok(())
 }
 
-/// Returns `true` if bindgen can find the library: at the places of Debian, or by LIBCLANG_PATH.
+/// Returns `true` if bindgen can find libclang, either in the folders of Debian or with LIBCLANG_PATH.
 fn has_libclang() -> bool {
     let entries = |place: &Path| std::fs::read_dir(place).into_iter().flatten().flatten();
     let of_llvm = entries(Path::new("/usr/lib")).map(|entry| entry.path().join("lib"));
@@ -65,7 +67,8 @@ fn has_libclang() -> bool {
     std::env::var_os("LIBCLANG_PATH").is_some() || places.into_iter().any(found)
 }
 
-/// Returns cargo in `emulator/`. Crates from `crates/` have other features there than in the workspace: their warnings are errors, too.
+/// Returns a cargo command in `emulator/`. Warnings are errors, also in crates from `crates/`, whose features in
+/// `emulator/` differ from the workspace.
 fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = shell::cargo(arguments);
     cargo.current_dir(shell::root().join("emulator"));
@@ -75,7 +78,7 @@ fn cargo(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// Builds all that the emulated sessions run, except the host program.
+/// Builds all programs that the emulated sessions run, except the host program.
 pub(crate) fn programs() -> Result<()> {
     install_tools()?;
     firmware::build_fast()?;
@@ -103,7 +106,7 @@ fn tests() -> Result<Outcome> {
     Ok(Outcome::Counted(counts, String::new()))
 }
 
-/// From a robot description to a motion, on the program that is flashed.
+/// Checks the steps from a robot description to a motion, with the program that is flashed to a board.
 fn driving() -> Result<Outcome> {
     let jtc = suite::programs()?.join("jtc");
     run(&mut cargo(&["build", "--release"]))?;
@@ -115,7 +118,7 @@ fn driving() -> Result<Outcome> {
     run(script.env("PYTHONDONTWRITEBYTECODE", "1")).map(|()| Outcome::Passed)
 }
 
-/// Measures, prints, and compares with the stored figures.
+/// Measures and prints the figures, and compares them with the stored figures.
 fn figures(update: bool) -> Result<()> {
     install_tools()?;
     let mut text = String::new();
@@ -148,14 +151,14 @@ fn compare(kept: &Path, text: &str) -> Result<()> {
     bail!("the figures are not those of {FIGURES}; if that is meant: cargo xtask emulate --update")
 }
 
-/// Returns the lines that are equal in every build. The begin of an interrupt depends on when bytes meet ticks, to the
-/// nanosecond; the program that measures it compares it with its limit.
+/// Returns the lines that are equal in every build. The latency of an interrupt depends on the exact time of bytes
+/// relative to ticks, so it is not compared here. The program that measures the latency compares it with its limit.
 fn lasting(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.lines().filter(|line| !line.contains("interrupts are masked"));
     lines.map(|line| line.split(", begins at most").next().unwrap_or_default())
 }
 
-/// A board that a host program can open, until it is interrupted.
+/// Runs an emulated board that a host program can open, until the command is interrupted.
 fn live(arguments: &[String]) -> Result<ExitCode> {
     install_tools()?;
     let elf = firmware::build(firmware::BOARDS[0])?;

@@ -17,11 +17,11 @@ pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 /// The boards, by the names of the features that select them.
 pub(crate) const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Functions that run at the priority of the tick. The second function wakes the links, and is the only function that the tick
+/// Functions that run at the priority of the tick. The second function wakes the links; it is the only function that the tick
 /// calls through a register.
 const ROOTS: [&str; 2] = ["TIM7", "embassy_executor::raw::waker::wake"];
 
-/// Memories of the chip: name, first address, bytes.
+/// Memories of the chip, each with name, first address and number of bytes.
 const REGIONS: [(&str, u64, u64); 8] = [
     ("flash bank 1", 0x0800_0000, 1024 * 1024),
     ("flash bank 2", 0x0810_0000, 1024 * 1024),
@@ -35,7 +35,7 @@ const REGIONS: [(&str, u64, u64); 8] = [
 
 /// Adds the compiler's target for the board if rustup manages the toolchain.
 pub(crate) fn add_target() -> Result<()> {
-    // If rustup does not manage the toolchain, it has its own targets.
+    // If rustup does not manage the toolchain, the toolchain contains its own targets.
     if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
         && !installed.lines().any(|target| target == TARGET)
     {
@@ -50,7 +50,7 @@ fn cargo_for(board: &str, subcommand: &str) -> Result<Command> {
         shell::cargo(&[subcommand, "--locked", "--release", "--no-default-features", "--features", board]);
     cargo.current_dir(shell::root().join("firmware"));
     cargo.env("CARGO_TARGET_DIR", directory());
-    // Paths of this machine in the program would change its sizes.
+    // Paths of this computer in the program would change the size of the program.
     cargo.arg("--config").arg(paths::remapped(TARGET)?);
     Ok(cargo)
 }
@@ -78,8 +78,8 @@ pub(crate) fn build(board: &str) -> Result<PathBuf> {
 /// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest rate of J-01.
 const FAST: &str = "15000000";
 
-/// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. This build has
-/// its own directory, so that the two builds do not invalidate each other.
+/// Builds the first board's program with the fastest lines, which tests need in addition to the programs that are flashed. This
+/// build has its own directory, so that the two builds do not invalidate each other.
 pub(crate) fn build_fast() -> Result<PathBuf> {
     add_target()?;
     let target = directory().join("fast");

@@ -1,4 +1,4 @@
-//! The command for all tasks of the workspace. `cargo xtask help` lists them.
+//! Command `cargo xtask`, which runs all tasks of the workspace. `cargo xtask help` lists them.
 #![forbid(unsafe_code)]
 
 mod bench;
@@ -12,7 +12,7 @@ mod firmware;
 mod links;
 mod parallel;
 mod prebuild;
-// Used by the checks of the board's program.
+// Module that is used by the checks of the board's program.
 mod package;
 mod panics;
 mod paths;

@@ -1,5 +1,5 @@
-//! Python package: builds its wheel, installs it in an empty environment, and tests it there. The source tree is not tested, because it
-//! lacks the compiled part.
+//! Tests the Python package: builds its wheel, installs the wheel in an empty environment, and tests it there. The source tree is not
+//! tested, because it does not contain the compiled part.
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -10,10 +10,10 @@ use crate::shell::{self, Scratch, root, run};
 use crate::suite;
 use crate::tally::{self, Counts, Outcome, Tally};
 
-/// Requirements of its build and its tests.
+/// Requirements for the build and the tests of the Python package.
 const REQUIREMENTS: &str = "requirements-package.txt";
 
-/// Program for a new environment: the lines of the README that need only the package.
+/// Program for a new environment, with the lines of the README that need only the package.
 const FIRST_LINES: &str = "import openjtc\n\
     with openjtc.connect('sim:', speed=None) as robot:\n    \
         run = robot.move([0, 30, -60, 0, 30, 0], degrees=True)\n    \
@@ -53,7 +53,8 @@ pub(crate) fn build() -> Result<PathBuf> {
     made.next().context("Maturin left no wheel")
 }
 
-/// Runs the steps of `cargo xtask test`. No other check runs at the same time: many of these tests watch simulated arms in real time.
+/// Runs the steps of `cargo xtask test`. No other check runs at the same time: many tests of the package run
+/// simulated arms in real time.
 pub(crate) fn steps(tally: &mut Tally) {
     let mut wheel = None;
     tally.step("Python package: wheel", || {
@@ -108,7 +109,7 @@ fn tested(wheel: &Path) -> Result<Outcome> {
     Ok(Outcome::Counted(counts, tally::failures(&ended.output, "FAILURES").to_owned()))
 }
 
-/// Returns the counts in the last line of pytest.
+/// Returns the test counts in the last line that pytest prints.
 fn counted(output: &str) -> Counts {
     let line = output.lines().rev().find(|line| line.contains(" in ")).unwrap_or_default();
     let words: Vec<&str> = line.split([' ', ',', '=']).filter(|word| !word.is_empty()).collect();

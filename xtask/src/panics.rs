@@ -1,8 +1,8 @@
 //! Checks that the control tick cannot reach a panic, by following the calls of the linked program.
 //!
-//! The check reads the ELF and not the source, because only the compiled code runs on the board. From each root it follows every branch
-//! that leaves the function. If reached code forms the address of a function, the check assumes that it calls this function. Calls through
-//! a register are listed, because their targets are not known here.
+//! The check reads the ELF and not the source, because only the compiled code runs on the board. From each root function, the check
+//! follows every branch that leaves the function. If the code computes the address of a function, the check assumes that the code calls
+//! this function. Calls through a register are listed, because the check does not know their targets.
 
 mod thumb;
 
@@ -15,7 +15,7 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
 use thumb::Flow;
 
-/// Parts of the names of functions that end in a panic.
+/// Name parts of functions that panic.
 const PANICS: [&str; 8] = [
     "panicking",
     "panic_",
@@ -27,17 +27,17 @@ const PANICS: [&str; 8] = [
     "len_mismatch_fail",
 ];
 
-/// Result of the search from the roots.
+/// Result of the search from the root functions.
 #[derive(Debug)]
 pub(crate) struct Report {
-    /// Number of reached functions, including the roots.
+    /// Number of functions that were reached, including the roots.
     pub functions: usize,
-    /// Number of their instructions.
+    /// Number of instructions of the reached functions.
     pub instructions: usize,
     /// Calls and jumps through a register: function and address.
     pub indirect: Vec<String>,
-    /// A path to each place that panics or traps. A path lists the names of functions, each with the address of the branch that leaves
-    /// it, and then the place.
+    /// Call path to each instruction that panics or traps. A path lists the names of functions, each with the address of the branch
+    /// that leaves the function, and finally the instruction.
     pub paths: Vec<String>,
 }
 
@@ -66,7 +66,7 @@ impl fmt::Display for Report {
 /// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the line of an address.
 pub(crate) fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     let program = Program::read(elf)?;
-    // Reached functions, each with the calling function and the address of the branch.
+    // Functions that were reached, each with the calling function and the address of the branch.
     let mut from: BTreeMap<u32, Option<(u32, u32)>> = BTreeMap::new();
     let mut queue = VecDeque::new();
     for root in roots {
@@ -113,7 +113,7 @@ fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32)
 /// Target of an instruction that leaves a function.
 enum End {
     Function(u32),
-    /// An address outside all functions.
+    /// Address that is outside of all functions.
     Nowhere(u32),
     Indirect,
     Trap,
@@ -123,14 +123,14 @@ struct Function {
     name: String,
     panics: bool,
     end: u32,
-    /// Index of its section.
+    /// Index of the section that contains the function.
     section: usize,
 }
 
 struct Program<'a> {
     /// Functions by their first address.
     functions: BTreeMap<u32, Function>,
-    /// Executable sections: first address and bytes.
+    /// Executable sections, each with first address and bytes.
     sections: Vec<(u32, &'a [u8])>,
     /// Addresses at which data in the code begins (true) and at which code continues (false).
     data: BTreeMap<u32, bool>,
@@ -165,7 +165,7 @@ impl<'a> Program<'a> {
                     section,
                 });
                 function.end = function.end.max(end);
-                // The linker merges equal functions into one with several names.
+                // The linker merges equal functions into one function with several names.
                 if panics && !function.panics {
                     (function.name, function.panics) = (name, true);
                 }
@@ -203,7 +203,7 @@ impl<'a> Program<'a> {
         bytes.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]))
     }
 
-    /// Returns the pieces of a function. The flag is true for data.
+    /// Returns the pieces of a function; the flag of a piece is true if it contains data.
     fn pieces(&self, function: &Range<u32>) -> Vec<(Range<u32>, bool)> {
         let mut is_data = self.data.range(..=function.start).next_back().is_some_and(|(_, data)| *data);
         let mut at = function.start;
@@ -216,7 +216,7 @@ impl<'a> Program<'a> {
         pieces
     }
 
-    /// Calls `found` for each instruction, or address, through which the function may be left.
+    /// Calls `found` for each instruction or address through which the execution may leave the function.
     fn scan(&self, start: u32, function: &Function, count: &mut usize, mut found: impl FnMut(u32, End)) {
         let whole = start..function.end;
         let mut halves = [None; 16];
@@ -245,7 +245,7 @@ impl<'a> Program<'a> {
                         call = true;
                         found(address, self.function_at(to).map_or(End::Nowhere(to), End::Function));
                     }
-                    // The linker uses such a jump to a constant address for long distances.
+                    // The linker uses a jump to a constant address for long distances.
                     Flow::Indirect(register) => match halves[usize::from(register)] {
                         Some((at, to)) if at + 4 == address => {
                             found(address, self.function_at(to & !1).map_or(End::Nowhere(to), End::Function));

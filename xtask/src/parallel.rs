@@ -15,17 +15,17 @@ use crate::tally::{Outcome, Tally};
 
 /// Output and result of a program.
 pub(crate) struct Ended {
-    /// On both of its outputs.
+    /// Text on standard output and standard error.
     pub output: String,
-    /// With exit code 0.
+    /// `true` if the exit code was 0.
     pub passed: bool,
     /// Duration.
     pub seconds: f64,
 }
 
-/// Result of a program that ran at the same time as others.
+/// Result of a program that ran in parallel with other programs.
 pub(crate) trait Ran {
-    /// Returns the output and the end of the program if the program ran.
+    /// Returns the output and the result of the program if the program ran.
     fn ended(&self) -> Option<&Ended>;
 
     /// Returns the output if the program failed.
@@ -51,10 +51,10 @@ impl Ran for Result<Option<Ended>> {
     }
 }
 
-/// Function that runs a program with this file for its output; `None`: the program cannot run.
+/// Function that runs a program and writes its output to this file; `None` if the program cannot run.
 type Run<'a> = Box<dyn Fn(&Path) -> Result<Option<Ended>> + Send + Sync + 'a>;
 
-/// Check that runs at the same time as others, as a step of its own.
+/// Check that runs in parallel with other checks and is reported as a separate step.
 pub(crate) struct Check<'a> {
     /// Title of the step.
     pub title: String,
@@ -62,7 +62,7 @@ pub(crate) struct Check<'a> {
     pub run: Run<'a>,
     /// Returns the outcome of the step.
     pub outcome: fn(&Ended) -> Result<Outcome>,
-    /// Reason why the check cannot run, if so.
+    /// Reason why the check cannot run, if any.
     pub missing: String,
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn whole(ended: &Ended) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// Runs the checks whose steps are wanted, each as a step. The longest should come first.
+/// Runs the checks whose steps are selected, each as a separate step. The longest check should be first in the list.
 pub(crate) fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
     checks.retain(|check| tally.wants(&check.title));
     let ran = run_all(
@@ -94,11 +94,12 @@ pub(crate) fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
     }
 }
 
-/// Calls `run` with each of `items`, with one more at once than there are processors; `log` is a file for the output. Calls `ended` with
-/// each result.
+/// Calls `run` for each of `items`, in parallel, with one more call at a time than there are processors. `log` is a file for the output.
+/// Calls `ended` for each result.
 ///
-/// Tests with simulated arms and browsers watch clocks, and a busy computer can make them fail. So a program that failed runs again
-/// when all others have ended. Then its second result counts. Returns how many of `items` passed only then.
+/// Tests with simulated arms and browsers depend on real time, so they can fail on a busy computer. Therefore, a program that
+/// failed runs again when all other programs have ended, and its second result is used. Returns the number of `items` that passed
+/// only in the second run.
 pub(crate) fn run_all<T: Send, R: Ran + Send>(
     items: Vec<T>,
     run: impl Fn(&T, &Path) -> R + Sync,
@@ -139,7 +140,7 @@ pub(crate) fn run_all<T: Send, R: Ran + Send>(
     Ok(passed_alone)
 }
 
-/// Runs a command whose output goes to `log`.
+/// Runs a command and writes its output to `log`.
 pub(crate) fn run(command: &mut Command, log: &Path) -> Result<Ended> {
     let start = Instant::now();
     let mut file = File::options().create(true).truncate(true).read(true).write(true).open(log)?;

@@ -1,4 +1,5 @@
-//! Folders of this computer whose paths compilers would write into their output, and the names that replace the paths.
+//! Folders of this computer whose paths would become part of compiled programs, and the names that replace these
+//! paths.
 use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
@@ -26,7 +27,7 @@ pub(crate) fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
             path.display()
         );
     }
-    // A checkout that is reached through a link has two paths.
+    // A checkout that is opened through a symbolic link has two paths.
     for at in 0..folders.len() {
         let (path, name) = folders[at].clone();
         if let Ok(real) = path.canonicalize()
@@ -38,7 +39,7 @@ pub(crate) fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     Ok(folders)
 }
 
-/// Returns the switches for cargo's `--config` that keep these paths out of the compiler's output for `triple`.
+/// Returns switches for cargo's `--config`, so that the compiler output for `triple` does not contain these paths.
 pub(crate) fn remapped(triple: &str) -> Result<String> {
     let flags = folders()?.into_iter();
     let flags: Vec<String> =

@@ -1,7 +1,8 @@
-//! `cargo xtask plain-words`: counts marks of sentences that are hard to read in comments, messages, help and documents.
+//! `cargo xtask plain-words`: counts marks (patterns of sentences that are hard to read) in comments, messages, help
+//! and documents.
 //!
 //! The counts of each part of the project are stored and may only decrease. CONTRIBUTING.md explains how to write
-//! instead.
+//! plain sentences.
 mod marks;
 mod texts;
 
@@ -15,21 +16,20 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, files, root};
 
-/// File with the stored counts.
+/// File that contains the stored counts of marks.
 const KEPT: &str = "xtask/plain-words.txt";
 /// Files with prose.
 const EXTENSIONS: [&str; 7] = ["rs", "py", "pyi", "md", "toml", "ts", "svelte"];
-/// Excluded files: the changelog, which is a record of the past, and files that another project or a command has
-/// written.
+/// Excluded files: the changelog, and files that another project or a command has written.
 const EXCLUDED: [&str; 3] = ["CHANGELOG.md", "Cargo.toml", "api-types.ts"];
 
-/// Mark in a file.
+/// Occurrence of a mark in a file.
 struct Place {
     part: String,
     /// Path and line.
     at: String,
     mark: &'static str,
-    /// Sentence with the mark.
+    /// Sentence that contains the mark.
     sentence: String,
 }
 
@@ -126,7 +126,8 @@ fn places() -> Result<Vec<Place>> {
     Ok(places)
 }
 
-/// Returns the name of the crate. For other files, returns the name of the folder, or `pages` for files at the root.
+/// Returns the name of the crate. For files outside of crates, returns the name of the folder, or `pages` for files
+/// at the root.
 fn part(path: &Path) -> String {
     let mut folders = path.iter().map(|folder| folder.to_string_lossy());
     let first = folders.next().unwrap_or_default();

@@ -1,8 +1,8 @@
-//! Builds for later steps, which run at the lowest priority while earlier steps wait.
+//! Builds that later steps need. The builds run at the lowest priority while earlier steps wait.
 //!
-//! Most tests wait, for example for a line that is as slow as a real one, or for the end of a lease. The free processor time is used to
-//! build the boards' programs, the emulator and the Python package. A failed build is reported in the step that needs it, because that
-//! step runs the same build.
+//! Most tests spend their time waiting, for example for a serial line with a realistic speed, or for the end of a lease. The free
+//! processor time is used to build the boards' programs, the emulator and the Python package. A failed build is reported in the step
+//! that needs it, because that step runs the same build.
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 
@@ -10,27 +10,27 @@ use anyhow::Result;
 
 use crate::{book, emulate, firmware, package, python, shell, web};
 
-/// Build in the background.
+/// Build that runs in the background.
 pub(crate) struct Prebuild {
     workspace_is_built: Option<Sender<()>>,
     making: Option<JoinHandle<()>>,
 }
 
 impl Prebuild {
-    /// Begins the builds. The slowest ones come first.
+    /// Begins the builds. The slowest builds are first in the list.
     pub(crate) fn begin() -> Self {
         let (sender, receiver) = mpsc::channel();
         let make = move || {
             if let Err(error) = shell::in_background(|| make(&receiver)) {
-                // The steps do the builds themselves, but the run takes longer.
+                // Without background builds, the steps build the programs themselves, but the tests take longer.
                 println!("-- the builds in advance ended: {error:#}");
             }
         };
         Self { workspace_is_built: Some(sender), making: Some(std::thread::spawn(make)) }
     }
 
-    /// Allows the build of the Python package. Cargo allows one build at a time in a target folder. If this low-priority build began
-    /// earlier, it would delay the steps.
+    /// Allows the build of the Python package. Cargo allows only one build at a time in a target folder. If the low-priority build
+    /// began earlier, it would delay the steps.
     pub(crate) fn workspace_is_built(&self) {
         if let Some(sender) = &self.workspace_is_built {
             // An error means that an earlier build has failed and the thread has ended.
@@ -41,7 +41,7 @@ impl Prebuild {
 
 impl Drop for Prebuild {
     fn drop(&mut self) {
-        // If the workspace was not built, this ends the wait of the thread.
+        // If the workspace was not built, this call ends the wait of the thread.
         self.workspace_is_built = None;
         if let Some(thread) = self.making.take() {
             // A panic of the thread has no effect on the checks, so it is ignored.

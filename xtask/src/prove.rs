@@ -1,4 +1,5 @@
-//! `cargo xtask prove`: checks that take hours and are therefore not part of `cargo xtask test`. Their results are in docs/evidence.md.
+//! `cargo xtask prove`: checks that take hours and are therefore not part of `cargo xtask test`. The results of these
+//! checks are in docs/evidence.md.
 mod changes;
 mod evidence;
 mod fuzz;
@@ -8,7 +9,7 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
-/// `arguments`: `mutants` or `fuzz`, followed by the arguments of that check.
+/// `arguments`: `mutants` or `fuzz`, followed by the arguments of the selected check.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     match arguments.split_first() {
         Some((what, rest)) if what == "mutants" => mutants::main(rest),

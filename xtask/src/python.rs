@@ -1,4 +1,5 @@
-//! Independent references in Python: a virtual environment, made automatically, and the checks that run in it.
+//! Checks against independent references in Python. The checks run in a virtual environment, which is created
+//! automatically.
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,10 +12,10 @@ use crate::shell::{self, apt_install, command, root, run, works};
 use crate::suite;
 use crate::tally::{Outcome, Tally};
 
-/// Returns the interpreter of a virtual environment with the packages of references/`requirements`; makes the environment
-/// if it does not exist.
+/// Returns the interpreter of a virtual environment with the packages of references/`requirements`; creates the
+/// environment if it does not exist.
 pub(crate) fn environment(requirements: &str) -> Result<PathBuf> {
-    // A second caller waits while the environment is being made.
+    // A second caller waits while the environment is being created.
     static MAKING: Mutex<()> = Mutex::new(());
     let _making = MAKING.lock().unwrap_or_else(PoisonError::into_inner);
     let list = root().join("references").join(requirements);
@@ -45,7 +46,7 @@ pub(crate) fn environment(requirements: &str) -> Result<PathBuf> {
     Ok(python)
 }
 
-/// Returns `pip install` of this interpreter's environment; the caller adds the packages.
+/// Returns a `pip install` command for the environment of this interpreter; the caller adds the packages.
 pub(crate) fn pip_install(python: &Path) -> Command {
     let mut install = command(python);
     install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
@@ -61,9 +62,9 @@ pub(crate) fn robots() -> PathBuf {
 struct Check {
     /// Below references/.
     script: &'static str,
-    /// Program below the release directory that it runs, as its first argument.
+    /// Program below the release folder that the check runs; passed as the first argument.
     program: Option<&'static str>,
-    /// Files of the demo that it reads, as the arguments after.
+    /// Files of the demo that the check reads; passed as the next arguments.
     demo_files: &'static [&'static str],
 }
 
@@ -98,7 +99,8 @@ static CHECKS: [Check; 24] = [
     Check { script: "ucom/check_pc_probe.py", program: Some("ucom"), demo_files: &[] },
 ];
 
-/// Runs the steps before the references, and returns a check for each reference; `demo` is the folder of the demo's files.
+/// Runs the preparation steps, and returns a check for each reference. `demo` is the folder with the files of the
+/// demo.
 pub(crate) fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<parallel::Check<'a>> {
     let mut python = None;
     tally.step("Python environment of the references", || {
@@ -139,7 +141,7 @@ pub(crate) fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<parallel::Che
 }
 
 impl Check {
-    /// Runs the check; `None` if the demo did not leave its files at `demo`.
+    /// Runs the check; `None` if the demo did not write its files to `demo`.
     fn run(&self, (python, demo): (&Path, &Path), log: &Path) -> Result<Option<Ended>> {
         if !self.demo_files.iter().all(|name| demo.join(name).exists()) {
             return Ok(None);

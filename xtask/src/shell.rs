@@ -1,4 +1,4 @@
-//! Running other programs: commands printed before they run, failures named with the command that failed.
+//! Runs other programs. Prints each command before running it, and includes the command in the error if it fails.
 use std::cell::Cell;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Write};
@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
-/// The root of the workspace.
+/// Returns the root folder of the workspace.
 pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }
@@ -20,12 +20,12 @@ pub(crate) fn target() -> PathBuf {
     }
 }
 
-/// `program` in the root of the workspace.
+/// Returns a command that runs `program` in the root of the workspace.
 pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
-    // Cargo sets these for xtask's own package. Build scripts that read them, as ring's does, would run again each time that a person runs
-    // cargo in between.
+    // Cargo sets these variables for xtask's own package. Build scripts that read the variables (for example ring's) would run again each
+    // time that cargo is used without xtask in between.
     for (name, _) in std::env::vars_os() {
         let text = name.to_string_lossy();
         if text.starts_with("CARGO_PKG_") || text.starts_with("CARGO_MANIFEST_") {
@@ -35,15 +35,16 @@ pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     command
 }
 
-/// Cargo of the pinned toolchain.
+/// Returns a command that runs cargo of the pinned toolchain.
 pub(crate) fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.args(arguments);
     cargo
 }
 
-/// Lets cargo compile the packages of the workspace with Clippy, which is the compiler with more warnings. A single build then makes the
-/// programs and finds what `cargo clippy` finds; that command alone would compile all dependencies once more.
+/// Configures cargo to compile the packages of the workspace with Clippy, which is the compiler with more warnings. A single build then
+/// creates the programs and reports the warnings of `cargo clippy`. A separate `cargo clippy` would compile all dependencies a second
+/// time.
 pub(crate) fn lint(cargo: &mut Command) -> Result<&mut Command> {
     let sysroot = read(command("rustc").args(["--print", "sysroot"]))?;
     let clippy = Path::new(sysroot.trim()).join("bin/clippy-driver");
@@ -55,9 +56,10 @@ pub(crate) fn lint(cargo: &mut Command) -> Result<&mut Command> {
 
 /// Returns the processor time of all programs that have ended so far, with their child processes; `None` if the system has no `/proc`.
 ///
-/// The programs of [`in_background`] count when they end.
+/// Programs of [`in_background`] are included when they have ended.
 pub(crate) fn processor_seconds() -> Option<f64> {
-    // proc_pid_stat(5): the name in parentheses, then the fields from the third on; cutime and cstime are the 16th and 17th, in 1/100 s.
+    // According to proc_pid_stat(5), the name in parentheses is followed by the third and later fields. cutime and
+    // cstime are fields 16 and 17, in 1/100 s.
     let line = std::fs::read_to_string("/proc/self/stat").ok()?;
     let mut fields = line.rsplit(") ").next()?.split(' ').skip(13);
     let ticks = fields.next()?.parse::<f64>().ok()? + fields.next()?.parse::<f64>().ok()?;
@@ -80,11 +82,11 @@ fn announce(command: &Command) {
 }
 
 thread_local! {
-    /// `true` if programs of this thread run in the background: at the lowest priority, and without output.
+    /// `true` if programs of this thread run in the background, at the lowest priority and without output.
     static IN_BACKGROUND: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `body`; its programs started by [`run`] or [`read`] run at the lowest priority, and print nothing.
+/// Runs `body`. Programs that `body` starts with [`run`] or [`read`] run at the lowest priority and without output.
 pub(crate) fn in_background<T>(body: impl FnOnce() -> T) -> T {
     IN_BACKGROUND.set(true);
     let done = body();
@@ -92,7 +94,7 @@ pub(crate) fn in_background<T>(body: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Returns the command with a lower priority: 19 is the lowest.
+/// Returns the command with a lower priority; `by` = 19 is the lowest priority.
 pub(crate) fn nice(command: &Command, by: u8) -> Command {
     let mut nice = Command::new("nice");
     nice.args(["-n", &by.to_string()]).arg(command.get_program()).args(command.get_args());
@@ -108,7 +110,7 @@ pub(crate) fn nice(command: &Command, by: u8) -> Command {
     nice
 }
 
-/// Run with the output going to the terminal; an exit code other than 0 is an error.
+/// Runs a command whose output is shown on the terminal. Returns an error if the exit code is not 0.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let background = IN_BACKGROUND.get();
     if !background {
@@ -125,7 +127,7 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a command, shows each line of its standard output as it comes and passes it to `line`, too.
+/// Runs a command. Prints each line of its standard output immediately, and also passes the line to `line`.
 pub(crate) fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
     read_lines(command, |text| {
         println!("{text}");
@@ -133,7 +135,7 @@ pub(crate) fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Re
     })
 }
 
-/// Runs a command and passes each line of its standard output to `line` as it comes.
+/// Runs a command and passes each line of its standard output to `line` immediately.
 pub(crate) fn read_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
     announce(command);
     let mut child = command
@@ -153,7 +155,7 @@ pub(crate) fn read_lines(command: &mut Command, mut line: impl FnMut(&str)) -> R
     Ok(())
 }
 
-/// Run and return its standard output; progress and errors go to the terminal.
+/// Runs a command and returns its standard output. Progress and errors are shown on the terminal.
 pub(crate) fn read(command: &mut Command) -> Result<String> {
     let background = IN_BACKGROUND.get();
     let output = command
@@ -171,7 +173,7 @@ pub(crate) fn read(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Returns `true` if a program can be started at all; its output is dropped.
+/// Returns `true` if a program can be started and its exit code is 0. The output of the program is discarded.
 pub(crate) fn works(command: &mut Command) -> bool {
     command
         .stdin(Stdio::null())
@@ -181,7 +183,7 @@ pub(crate) fn works(command: &mut Command) -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Install Debian packages; needs root.
+/// Installs Debian packages. Needs root privileges.
 pub(crate) fn apt_install(packages: &[&str]) -> Result<()> {
     let hint = format!("install it by hand: sudo apt-get install {}", packages.join(" "));
     if !works(command("id").arg("-u")) || read(command("id").arg("-u"))?.trim() != "0" {
@@ -200,11 +202,11 @@ pub(crate) fn apt_install(packages: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// A directory of its own under the temporary directory, removed when dropped.
+/// Separate folder below the temporary folder, which is removed on drop.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
-    /// Makes a new folder; `name` is its purpose.
+    /// Creates a new folder; `name` describes its purpose.
     pub(crate) fn new(name: &str) -> Result<Self> {
         let path = std::env::temp_dir().join(format!("openjtc-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;
@@ -223,7 +225,8 @@ impl Drop for Scratch {
     }
 }
 
-/// Files below `directory` with one of these extensions, sorted; build output, installed packages and hidden directories left out.
+/// Returns the sorted files below `directory` with one of these extensions. Omits build output, installed packages
+/// and hidden folders.
 pub(crate) fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut waiting = vec![directory.to_owned()];
@@ -246,7 +249,7 @@ pub(crate) fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     found
 }
 
-/// The value of `--name value` or `--name=value`, removed from `arguments`.
+/// Removes `--name value` or `--name=value` from `arguments` and returns the value.
 pub(crate) fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<String>> {
     let prefix = format!("{name}=");
     if let Some(at) = arguments.iter().position(|a| a.starts_with(&prefix)) {
@@ -260,14 +263,14 @@ pub(crate) fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<S
     Ok(Some(arguments.remove(at)))
 }
 
-/// Returns `true` if `--name` is given; removes it from `arguments`.
+/// Removes `--name` from `arguments`; returns `true` if it was present.
 pub(crate) fn flag(arguments: &mut Vec<String>, name: &str) -> bool {
     let before = arguments.len();
     arguments.retain(|a| a != name);
     arguments.len() != before
 }
 
-/// Returns an error if unknown arguments are left.
+/// Returns an error if `arguments` still contains unknown arguments.
 pub(crate) fn nothing_left(arguments: &[String]) -> Result<()> {
     match arguments.first() {
         Some(argument) => bail!("unknown argument `{argument}`; see `cargo xtask help`"),

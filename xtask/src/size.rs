@@ -1,5 +1,5 @@
-//! `cargo xtask size`: compares the static memory of the controller with its trajectory with the limit, and prints the memory of each
-//! board by region.
+//! `cargo xtask size`: checks that the static memory of the controller and its trajectory is below the limit. Prints the memory of
+//! each board by region.
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
@@ -11,7 +11,7 @@ use crate::{firmware, suite};
 /// remaining data, including the stored arm. The receive buffers of 60 000 bytes are not included.
 pub(crate) const LIMIT: u64 = 432_000 + 40 * 1024;
 
-/// Returns the size that the controller with memory for 12 000 points has in the compiled program, bytes.
+/// Returns the size of the controller with memory for 12 000 points in the compiled program, bytes.
 pub(crate) fn controller_bytes() -> Result<u64> {
     let text = shell::read(&mut shell::command(suite::programs()?.join("examples/tick")))?;
     let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));
@@ -33,7 +33,7 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-/// Returns the memory that a board's program uses by region, one line each. The program must have been built.
+/// Returns the memory use of a board's program, with one line for each region. The program must have been built.
 pub(crate) fn regions(board: &str) -> Result<String> {
     let used = firmware::used(&firmware::elf(board))?;
     Ok(used.iter().map(|(name, bytes, size)| format!("  {name}: {bytes} of {size} B\n")).collect())

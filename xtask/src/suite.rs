@@ -1,8 +1,9 @@
-//! The tests of the workspace: cargo builds them, and their programs run in parallel.
+//! The tests of the workspace. Cargo builds the test programs, and this module runs them in parallel.
 //!
-//! Cargo runs one test program after the other, and many of ours wait in real time: for leases that lapse, for boards that are silent.
-//! These programs use little of a processor, so several run at once. The tests of a crate are linked into one program, `suite`, which
-//! runs once for each of its files: no test then shares a process with more than those of its own file.
+//! Cargo runs one test program after the other. Many tests of this project wait in real time, for example for the end of a lease or
+//! for the timeout of a silent board. These programs use little processor time, so several programs run in parallel. The tests of a
+//! crate are linked into one program, `suite`, which runs once for each test file. A process therefore runs only the tests of one
+//! file.
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::num::NonZero;
@@ -19,13 +20,13 @@ use crate::tally::{self, Counts, Outcome};
 struct Program {
     package: PathBuf,
     executable: PathBuf,
-    /// Names of the program, and of the file within it.
+    /// Name of the program and, for `suite`, of the test file.
     name: String,
-    /// Selected tests; empty: all.
+    /// Selected tests; empty if all tests are selected.
     tests: Vec<String>,
 }
 
-/// Every test of the workspace, and those in its documentation; their own counts are summed up. Calls `built` when cargo has built the
+/// Runs all tests of the workspace and all documentation tests, and adds up the test counts. Calls `built` when cargo has built the
 /// workspace.
 pub(crate) fn run(built: impl FnOnce()) -> Result<Outcome> {
     let tests = build()?;
@@ -40,7 +41,7 @@ pub(crate) fn run(built: impl FnOnce()) -> Result<Outcome> {
         println!("failed: {failure}");
     }
     if counts.failed == 0 {
-        // A program that broke off has counted nothing.
+        // A program that ended too early has not reported test counts.
         ensure!(failures.is_empty(), "a test program broke off: {}", failures.join(", "));
         documented?;
         ensure!(counts.passed > 0, "no test was run at all");
@@ -50,13 +51,14 @@ pub(crate) fn run(built: impl FnOnce()) -> Result<Outcome> {
 
 /// Builds the commands and the examples with the dependencies that the tests have. Returns their folder.
 ///
-/// Cargo chooses features for the packages that it is given. For one package it would build half of the dependencies a second time.
+/// Cargo selects features for all packages of a command together. With a single package, it would build half of the
+/// dependencies a second time.
 pub(crate) fn programs() -> Result<PathBuf> {
     compile(&["build", "--bins", "--examples"], |_| {})?;
     Ok(shell::target().join("release"))
 }
 
-/// Builds everything; a warning of the compiler or of Clippy is an error.
+/// Builds the whole workspace. Each warning of the compiler or of Clippy is an error.
 pub(crate) fn lints() -> Result<()> {
     let mut warnings = 0;
     for build in [&["test", "--tests", "--no-run"], &["build", "--bins", "--examples"]] {
@@ -68,7 +70,8 @@ pub(crate) fn lints() -> Result<()> {
     Ok(())
 }
 
-/// Builds a part of the workspace, prints what the compiler and Clippy say, and passes each message of cargo to `each`.
+/// Builds a part of the workspace, prints the messages of the compiler and Clippy, and passes each message of cargo
+/// to `each`.
 fn compile(arguments: &[&str], mut each: impl FnMut(&Value)) -> Result<()> {
     let mut build = cargo(arguments);
     build.args(["--release", "--workspace", "--message-format=json"]);
@@ -103,7 +106,7 @@ fn build() -> Result<Vec<Program>> {
 }
 
 impl Program {
-    /// A suite in as many parts as it has files.
+    /// Splits a suite into one part for each of its test files.
     fn by_file(self) -> Result<Vec<Self>> {
         if self.name != "suite" {
             return Ok(vec![self]);
@@ -119,7 +122,7 @@ impl Program {
     }
 }
 
-/// Names of tests by the module at the root that they are in, from a list of libtest's.
+/// Returns the names of the tests in a list that libtest has printed, grouped by the top-level module.
 fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
     let mut files = BTreeMap::<&str, Vec<String>>::new();
     for test in list.lines().filter_map(|line| line.strip_suffix(": test")) {
@@ -128,14 +131,15 @@ fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
     files
 }
 
-/// Tests of one program of boards that run at once, for each processor: these tests wait for nearly all of their time. Of others one
-/// runs, which is usual: a simulated controller needs a good part of a processor, and is late without it.
+/// Number of tests of one UCoM program that run in parallel, per processor. Tests of UCoM boards spend nearly all of their time
+/// waiting. For other programs, the default of one test per processor is used, because a simulated controller needs much processor
+/// time to be on time.
 const BOARD_TESTS_FOR_A_PROCESSOR: usize = 2;
-/// Argument of the GNU tools' `env` for a program that shall handle these signals.
+/// Argument of the GNU program `env` that sets these signals to their default handling.
 const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
 
-/// Runs all programs, and prints the output of each when it has ended. Returns the names of the failed ones, and adds their failure
-/// messages to `printed`.
+/// Runs all programs, and prints the output of each when it has ended. Returns the names of the failed programs, and adds their
+/// failure messages to `printed`.
 fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) -> Result<Vec<String>> {
     let mut failures = Vec::new();
     let ended = |program: Program, ended: Result<Ended>| {
@@ -152,15 +156,15 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
             }
             Err(error) => failures.push(format!("{name}, which cannot be run: {error:#}")),
         }
-        // A reader of a pipe sees the progress.
+        // The output is flushed so that a reader of a pipe sees the progress.
         std::io::stdout().flush().ok();
     };
-    // A run under `nohup` or in the background of a script ignores signals that tests send to their programs, and the programs
-    // inherit this.
+    // If xtask runs under `nohup` or in the background of a script, it ignores signals that tests send to their programs. The
+    // test programs inherit this setting.
     let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
     let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
     let threads = (BOARD_TESTS_FOR_A_PROCESSOR * processors).to_string();
-    // In the directory of its package, as cargo does.
+    // Each program runs in the folder of its package, as with cargo.
     let run = |program: &Program, log: &Path| {
         let mut command = if heeds_signals {
             let mut env = shell::command("env");
@@ -183,7 +187,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
     Ok(failures)
 }
 
-/// Adds the numbers of a line of results, if it is one.
+/// Adds the numbers of a line to the counts if it is a result line.
 pub(crate) fn count_results(line: &str, counts: &mut Counts) {
     let Some(rest) = line.strip_prefix("test result: ") else { return };
     counts.passed += count(rest, "passed");
@@ -191,7 +195,7 @@ pub(crate) fn count_results(line: &str, counts: &mut Counts) {
     counts.skipped += count(rest, "ignored");
 }
 
-/// The number before `word` in a result line.
+/// Returns the number before `word` in a result line.
 fn count(line: &str, word: &str) -> u64 {
     let Some((before, _)) = line.split_once(&format!(" {word}")) else { return 0 };
     before.rsplit(' ').next().and_then(|number| number.parse().ok()).unwrap_or(0)

@@ -25,7 +25,7 @@ pub(crate) struct Counts {
     pub failed: u64,
     /// Skipped tests.
     pub skipped: u64,
-    /// Test programs that failed at first, and passed when they ran again alone.
+    /// Test programs that failed in the first run, and passed in a second run without other programs.
     pub passed_alone: u64,
 }
 
@@ -39,17 +39,17 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// Creates a tally that runs only the steps with `only` in their title. `None`: runs all steps.
+    /// Creates a tally that runs only the steps with `only` in their title. With `None`, the tally runs all steps.
     pub(crate) fn new(only: Option<String>) -> Self {
         Self { only, ..Self::default() }
     }
 
-    /// Returns `true` if a step with this title shall run.
+    /// Returns `true` if the step with this title is selected.
     pub(crate) fn wants(&self, title: &str) -> bool {
         self.only.as_ref().is_none_or(|only| title.contains(only))
     }
 
-    /// Runs a step under its heading. An error is reported and counted. The next step still runs.
+    /// Runs a step under its heading. An error is reported and counted. After an error, the next step still runs.
     pub(crate) fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
         if !self.wants(title) {
             return;
@@ -96,12 +96,12 @@ impl Tally {
         }
     }
 
-    /// Counts programs that failed at first, and passed when they ran again alone.
+    /// Counts programs that failed in the first run, and passed in a second run without other programs.
     pub(crate) fn passed_alone(&mut self, programs: u64) {
         self.counts.passed_alone += programs;
     }
 
-    /// Prints the failed and skipped steps once more, then the closing line.
+    /// Prints the failed and skipped steps again, and then the closing line.
     pub(crate) fn finish(self) -> ExitCode {
         println!();
         for skip in &self.skips {

@@ -1,4 +1,5 @@
-//! `cargo xtask test`: every check of the project, in the order in which a mistake is cheapest to find.
+//! `cargo xtask test`: runs every check of the project. The checks that find an error with the least effort run
+//! first.
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -15,7 +16,7 @@ use crate::{
 
 /// Crates that run on the board.
 const BOARD_CRATES: [&str; 5] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-core", "ucom"];
-/// Largest tracking error of the demo, mrad RMS of any joint.
+/// Largest permitted tracking error of each joint in the demo, mrad RMS.
 const RMS_LIMIT_MRAD: f64 = 2.0;
 
 /// `arguments`: `--quick`, `--only TEXT`.
@@ -48,13 +49,13 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
             let mut doc = cargo(&["doc", "--release", "--workspace", "--no-deps"]);
             passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
         });
-        // From here on they are run.
+        // The following steps run the programs that were built in the background.
         drop(prebuild);
         tally.step("book: made, every link leads somewhere", || passed(book::made()));
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         let references = python::checks(&mut tally, scratch.path());
-        // The longest first: most of these checks wait for simulated arms and browsers.
+        // The longest checks are first in the list, because most of them wait for simulated arms and browsers.
         let all = [web::browser()].into_iter().chain(references);
         parallel::steps(&mut tally, all.collect());
         package::steps(&mut tally);
@@ -98,7 +99,7 @@ fn board_builds() -> Result<()> {
     Ok(())
 }
 
-/// Runs the newcomer's command, into a directory of its own, and checks its output.
+/// Runs `jtc demo`, which writes to the folder `out`, and checks its output.
 fn demo(out: &Path) -> Result<()> {
     let mut demo = shell::command(suite::programs()?.join("jtc"));
     let text = shell::read(demo.args(["demo", "--speed", "max", "--json", "--out"]).arg(out))?;
@@ -143,7 +144,8 @@ fn check_demo_files(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A header of names, then at least one second of rows with as many finite numbers.
+/// Checks that the file contains a header with names, and at least one second of rows. Each row must contain as many
+/// finite numbers as there are names.
 fn check_csv(csv: &str) -> Result<()> {
     let mut lines = csv.lines();
     let header = lines.next().context("recording.csv is empty")?;

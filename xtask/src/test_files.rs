@@ -1,5 +1,5 @@
 //! Checks that every file with tests belongs to a test program. The tests of a crate are one program, and cargo does not find
-//! other files by itself.
+//! other test files by itself.
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ fn programs(package: &Path) -> Result<Option<Vec<PathBuf>>> {
     Ok(Some(roots.collect()))
 }
 
-/// Returns the files that may declare the module with the source `file`, and its name.
+/// Returns the files that may declare the module with the source `file`, and the name of this module.
 fn parents(file: &Path, tests: &Path, programs: &[PathBuf]) -> Option<(Vec<PathBuf>, String)> {
     let is_folder = file.file_name()? == "mod.rs";
     let module = if is_folder { file.parent()? } else { file };
@@ -32,7 +32,7 @@ fn parents(file: &Path, tests: &Path, programs: &[PathBuf]) -> Option<(Vec<PathB
     Some((parents, module.file_stem()?.to_string_lossy().into_owned()))
 }
 
-/// Returns the files in `package`'s tests/ that belong to no program.
+/// Returns the files in tests/ of `package` that do not belong to a test program.
 fn forgotten(package: &Path) -> Result<Vec<PathBuf>> {
     let Some(programs) = programs(package)? else { return Ok(Vec::new()) };
     let tests = package.join("tests");
@@ -54,7 +54,7 @@ fn forgotten(package: &Path) -> Result<Vec<PathBuf>> {
     Ok(forgotten)
 }
 
-/// Returns an error that lists the files with tests that belong to no program.
+/// Returns an error that lists the files with tests that do not belong to a test program.
 pub(crate) fn check() -> Result<()> {
     let mut missing = Vec::new();
     for manifest in shell::files(&root().join("crates"), &["toml"]) {

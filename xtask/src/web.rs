@@ -1,4 +1,5 @@
-//! Dashboard: checks its source, builds it again and compares the result with the files in the agents, and uses it in a browser.
+//! Checks of the dashboard: checks its source, builds it again, compares the result with the files in the agents, and
+//! tests it in a browser.
 //!
 //! A build of the programs needs none of these steps, because the built files are in the repository.
 use std::path::{Path, PathBuf};
@@ -11,10 +12,11 @@ use crate::python;
 use crate::shell::{self, Scratch, run};
 use crate::tally::{self, Counts, Outcome, Tally};
 
-/// Path of Debian's browser.
+/// Path of the browser that Debian installs.
 pub(crate) const BROWSER: &str = "/usr/bin/chromium";
 
-/// Returns a command for `program` of Node.js in `web/`, from the references' environment, so that no Node.js must be installed.
+/// Returns a command for `program` of Node.js in `web/`, from the references' environment, so that Node.js need not
+/// be installed on the system.
 fn command(program: &str) -> Result<Command> {
     let python = python::environment("requirements.txt")?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -37,7 +39,7 @@ fn install() -> Result<()> {
         .context("the packages could not be installed; is the network there?")
 }
 
-/// Runs the steps of the source.
+/// Runs the steps that check the dashboard source.
 pub(crate) fn steps(tally: &mut Tally) {
     tally.step("dashboard: types and tests of its source", || {
         install()?;
@@ -53,7 +55,7 @@ pub(crate) fn steps(tally: &mut Tally) {
     });
 }
 
-/// Builds the dashboard in a temporary folder, and compares each file.
+/// Builds the dashboard in a temporary folder, and compares each file with the file in the agents.
 fn same_build() -> Result<()> {
     let (kept, scratch) = (shell::root().join("web/dist"), Scratch::new("web-dist")?);
     let built = scratch.path().join("dist");
@@ -97,7 +99,7 @@ pub(crate) fn install_browser() -> Result<()> {
     if Path::new(BROWSER).exists() { Ok(()) } else { shell::apt_install(&["chromium"]) }
 }
 
-/// Returns the check that uses the dashboard in a browser.
+/// Returns the check that tests the dashboard in a browser.
 pub(crate) fn browser<'a>() -> parallel::Check<'a> {
     parallel::Check {
         title: "dashboard: used in a browser".into(),
@@ -107,7 +109,8 @@ pub(crate) fn browser<'a>() -> parallel::Check<'a> {
     }
 }
 
-/// Uses the dashboard in a browser, with the built programs; returns the output. `None`: no browser is installed, and none can be.
+/// Tests the dashboard in a browser, with the built programs, and returns the output. Returns `None` if no browser is
+/// installed and none can be installed.
 fn use_in_browser(log: &Path) -> Result<Option<Ended>> {
     if install_browser().is_err() {
         return Ok(None);
@@ -117,11 +120,12 @@ fn use_in_browser(log: &Path) -> Result<Option<Ended>> {
     let mut npm = command("npm")?;
     npm.args(["run", "--silent", "e2e"]);
     npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
-    // The browser draws 3D without hardware support, so parallel programs that depend on the time get priority.
+    // The browser draws 3D without hardware support and needs much processor time, so parallel programs that depend
+    // on real time get priority.
     parallel::run(&mut shell::nice(&npm, 5), log).map(Some)
 }
 
-/// Returns the counts of Node's own test runner.
+/// Returns the test counts that Node's test runner prints.
 fn counted(Ended { output, passed, .. }: &Ended) -> Result<Outcome> {
     let number = |word: &str| {
         let lines = output.lines().map(|line| line.trim_start_matches(['#', 'ℹ', ' ']));

@@ -3,7 +3,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::root;
 
-/// Returns the bytes at the start of a line, up to the first word that is not a byte.
+/// Returns the bytes at the start of a line, up to the first word that is not a byte value.
 fn bytes(line: &str) -> Vec<u8> {
     line.split_whitespace()
         .take_while(|word| word.len() == 2)
@@ -11,8 +11,8 @@ fn bytes(line: &str) -> Vec<u8> {
         .collect()
 }
 
-/// Returns the CRC-16/XMODEM. The CRC is calculated here, so that the page is not checked with the code that it
-/// describes.
+/// Returns the CRC-16/XMODEM. This function calculates the CRC itself, so that the page is not checked with the
+/// code that the page describes.
 fn crc(bytes: &[u8]) -> u16 {
     let mut crc = 0u16;
     for byte in bytes {

@@ -1,9 +1,9 @@
-//! Measures figures that need several crates and prints lines `name value`, which `cargo xtask bench` adds to the figures of the
+//! Measures figures that need several crates. Prints lines `name value`, which `cargo xtask bench` adds to the figures of the
 //! crates.
 //!
-//! Run `figures [libm|tick|line|tracking|ucom|recording]` for all groups, or for one. Figures in virtual time are the same in every run.
-//! `figures recording-file FILE SECONDS` writes a recording of any length, with the same contents as for the group
-//! `recording`.
+//! Run `figures` for all groups, or `figures libm|tick|line|tracking|ucom|recording` for one group. Figures in virtual time do not
+//! change between runs. `figures recording-file FILE SECONDS` writes a recording of this duration, with contents like the recording of
+//! the group `recording`.
 
 mod libm;
 mod line;

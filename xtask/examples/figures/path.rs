@@ -13,7 +13,7 @@ pub(crate) fn smooth(points: usize) -> Vec<Point> {
     let omega = std::f64::consts::TAU * (seconds / 10.0).round().max(1.0) / seconds;
     (0..points)
         .map(|i| {
-            // (1 − cos ωt)²/4 has velocity and acceleration zero at the start and the end of each period.
+            // The velocity and the acceleration of (1 − cos ωt)²/4 are zero at the start and the end of each period.
             let t = i as f64 * f64::from(STEP_MS) * 1e-3;
             let (s, c) = (omega * t).sin_cos();
             let u = 1.0 - c;
@@ -29,7 +29,7 @@ pub(crate) fn smooth(points: usize) -> Vec<Point> {
         .collect()
 }
 
-/// Returns the points in the format of the wire.
+/// Returns the points in the format of the JTC protocol.
 pub(crate) fn raw(points: &[Point]) -> Result<Vec<RawPoint>, Box<dyn std::error::Error>> {
     Ok(points.iter().enumerate().map(|(i, point)| point.raw(i)).collect::<Result<_, _>>()?)
 }

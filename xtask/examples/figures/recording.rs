@@ -1,4 +1,4 @@
-//! Reports of long recordings: the time and the memory for an hour at 1 kHz.
+//! Time and memory for the report of a long recording, which contains one hour at 1 kHz.
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -14,11 +14,11 @@ use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use crate::print;
 use crate::world::Result;
 
-/// Duration of the measured recording. The next constant is the factor from this duration to an hour.
+/// Duration of the measured recording. The next constant is the ratio of an hour to this duration.
 const SECONDS: u32 = 300;
 const IN_AN_HOUR: f64 = 3600.0 / SECONDS as f64;
 
-/// Prints for both formats: the time of a report, the time for reading the same file, and the memory of a program that only makes the
+/// Prints, for both formats, the time to make a report, the time to read the file, and the memory of a program that only makes the
 /// report.
 pub(crate) fn figures() -> Result<()> {
     let dir = tempfile::tempdir()?;
@@ -43,7 +43,7 @@ pub(crate) fn figures() -> Result<()> {
     Ok(())
 }
 
-/// Prints the largest memory of a report, MB, if the system reports it.
+/// Prints the largest memory use of a report, MB, if the system reports this value.
 pub(crate) fn memory(path: &Path) -> Result<()> {
     report(path)?;
     let status = std::fs::read_to_string("/proc/self/status")?;
@@ -90,14 +90,14 @@ fn lines(path: &Path) -> Result<()> {
     }
 }
 
-/// Writes a recording of `seconds` at 1 kHz in which all values are known.
+/// Writes a recording of `seconds` at 1 kHz with a value in every field.
 pub(crate) fn write(path: &Path, seconds: u32) -> Result<()> {
     let arm = Arm::avena();
     let info = RecordingInfo { trajectory: "long".into(), ..RecordingInfo::of(&arm) };
     let mut recorder = Recorder::create(path, &info)?;
     for i in 0..seconds * 1000 {
         recorder.write(&sample(i))?;
-        // The recording of a running motion is also written at this interval.
+        // The recorder of a running motion also writes at this interval.
         if i % 200 == 199 {
             recorder.flush()?;
         }
@@ -106,7 +106,7 @@ pub(crate) fn write(path: &Path, seconds: u32) -> Result<()> {
     Ok(())
 }
 
-/// Returns the sample of a millisecond, with noise in the measured values.
+/// Returns the sample for one millisecond, with noise in the measured values.
 fn sample(i: u32) -> Sample {
     let time_s = f64::from(i) * 1e-3;
     let noise = |n: u32| {

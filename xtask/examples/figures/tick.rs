@@ -1,5 +1,5 @@
-//! Longest time of a tick. A run against the simulator, with a friction table and with a segment that arrives during the run, is recorded
-//! and replayed with new controllers.
+//! Longest time of a tick. The inputs of a motion in the simulator are recorded and replayed with new controllers. The motion uses a
+//! friction table, and a segment arrives while the arm moves.
 use std::hint::black_box;
 
 use jtc_bus::Frame;
@@ -12,9 +12,9 @@ use test_kit::clock::CpuTime;
 use crate::world::Result;
 use crate::{path, print};
 
-/// Ticks of the motion.
+/// Number of ticks of the motion.
 const MOVING: usize = 5_000;
-/// Number of replays of the whole run.
+/// Number of replays of the recorded inputs.
 const ROUNDS: usize = 15;
 
 /// Inputs of the controller in one tick.
@@ -61,8 +61,9 @@ fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
     Inputs { bus, host: host.as_slice(), ..Inputs::QUIET }
 }
 
-/// Records a whole run: bring-up, parameters, upload, motion. The simulated world answers its own controller. A second controller
-/// with the same inputs shows when the next frame must be sent.
+/// Records the inputs of a complete session: start-up, parameters, upload, motion. The simulated drives answer the
+/// simulator's own controller. A second controller receives the same inputs and shows when the next frame must be
+/// sent.
 fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
     let mut world = World::new(SimConfig { baud: None, ..SimConfig::default() });
     let mut shadow = controller();
@@ -92,7 +93,7 @@ fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
 pub(crate) fn figures() -> Result<()> {
     let frames = script()?;
     let seen = record(&frames);
-    // The minimum of all rounds is used, because it does not contain the time of other programs on the machine.
+    // The minimum of all rounds is used, because it does not include the time of other programs on the computer.
     let mut least = vec![f64::INFINITY; seen.len()];
     for _ in 0..ROUNDS {
         let mut controller = controller();

@@ -1,4 +1,4 @@
-//! Position errors of the arm with the errors of the demo's model, and without feed-forward.
+//! Position errors of the arm with the model errors of the demo, and without feed-forward.
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -12,7 +12,7 @@ use jtc_wire::RawPoint;
 use crate::world::{Result, executing};
 use crate::{path, print};
 
-/// Sums over the milliseconds of an execution.
+/// Sums over all milliseconds of an execution.
 #[derive(Clone, Copy, Default)]
 struct Errors {
     squares: [f64; 6],
@@ -56,7 +56,8 @@ fn motion() -> Result<(Vec<RawPoint>, bool)> {
     Ok((points, true))
 }
 
-/// Returns a point per millisecond on straight lines, with velocity and acceleration 0: the controller then uses only PID and gravity.
+/// Returns one point per millisecond, interpolated linearly, with velocity and acceleration 0. With these points, the
+/// controller uses only PID and gravity compensation.
 fn straight(points: &[RawPoint]) -> Result<Vec<RawPoint>> {
     let step = usize::from(path::STEP_MS);
     let mut fine = Vec::with_capacity(points.len() * step);

@@ -1,5 +1,5 @@
-//! UCoM: time for numbering 31 boards and for an update of one board with 60 KiB, compared with the time of their frames on the bus.
-//! Also speed of decoding, and memory of a board.
+//! UCoM figures: time to number 31 boards and to update one board with 60 KiB, compared with the time of the frames on the bus. Also
+//! the speed of decoding, and the memory of a board.
 use std::hint::black_box;
 
 use can_link::{BusEvent, CanFrame, Id, MemberId, TimedBus};
@@ -27,8 +27,8 @@ struct Bench {
     chain: ChainSim,
     /// All frames in the order of the bus.
     received: Vec<CanFrame>,
-    /// Time when the last frame of program data ended on the bus. The next field is the total time that the boards took to answer such
-    /// frames, ns.
+    /// Time at which the last frame of program data ended on the bus. The next field is the total time until the boards answered
+    /// frames of program data, ns.
     asked_at: Option<u64>,
     turn_round_ns: u64,
 }
@@ -64,7 +64,7 @@ impl Bench {
         self.bus.now_ns() / NS_PER_US
     }
 
-    /// Runs a procedure to its end and returns its cost.
+    /// Runs a procedure until it ends, and returns its cost.
     fn run(&mut self, request: Request) -> Result<Cost> {
         let before = self.bus.stats();
         self.turn_round_ns = 0;
@@ -182,14 +182,14 @@ fn update(name: &str, profile: Profile) -> Result<()> {
     print(&format!("{name}_s"), cost.seconds);
     print(&format!("{name}_bus_s"), cost.busy_seconds);
     print(&format!("{name}_turn_round_s"), cost.turn_round_seconds);
-    // The share is the time that the PC adds to the time of the bus. The time of the boards' answers and the wait for the restart are
+    // The result is the time that the PC adds to the bus time. The response times of the boards and the wait for the restart are
     // subtracted.
     let waits = cost.turn_round_seconds + f64::from(profile.xreset_wait) * 1e-3;
     print(&format!("{name}_share"), (cost.seconds - waits) / cost.busy_seconds);
     Ok(())
 }
 
-/// Prints the number of frames that are decoded in a second. The frames are those for numbering a chain.
+/// Prints the number of frames that are decoded per second, measured with the frames that number a chain of boards.
 fn decode(received: &[CanFrame]) -> Result<()> {
     let profile = Profile::default();
     let frames: Vec<Frame> = received
@@ -210,7 +210,7 @@ fn decode(received: &[CanFrame]) -> Result<()> {
     }
     print("ucom_decode_frames_s", 1e9 / best);
     if let Some(path) = std::env::var_os("OPENJTC_UCOM_FRAMES") {
-        // The benchmark of python-can reads this file: one frame per line.
+        // The benchmark of python-can reads the following file, which contains one frame per line.
         let text: String = received.iter().map(|frame| format!("(0.0) can0 {}\n", candump(frame))).collect();
         std::fs::write(&path, text)?;
         let board = |number| DbcBoard { number, ..DbcBoard::default() };

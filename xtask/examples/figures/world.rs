@@ -17,8 +17,8 @@ pub(crate) fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     Ok(session)
 }
 
-/// Uploads and starts `points` with the simulator's own operator. The library's session cannot be used for all measurements, because it
-/// uploads only points that pass its check, and points without velocities do not.
+/// Uploads and starts `points` with the simulated host of the simulator. The library's session cannot be used for all measurements,
+/// because it does not upload points without velocities, which fail its check.
 pub(crate) fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;

@@ -1,21 +1,21 @@
 //! The control law of the existing firmware in the version published in April 2022, for comparison.
 //!
-//! τ = 1.3·(inverse dynamics + PID + friction). Each channel of the trajectory is interpolated linearly between points. The inverse
-//! dynamics use rigid links at the measured position, with the commanded velocity and acceleration. The error is the present set position
-//! minus the measured position, which is two milliseconds old. The derivative is taken of the mean of five errors. The sign function in
-//! the friction polynomial is a step at zero. If the answer of a joint is lost, its last measured position is used.
+//! The law is τ = 1.3·(inverse dynamics + PID + friction). Each channel of the trajectory is interpolated linearly between points. The
+//! inverse dynamics use rigid links at the measured position, with the commanded velocity and acceleration. The error is the current set
+//! position minus the measured position, which is two milliseconds old. The derivative is computed from the mean of five errors. The
+//! sign function in the friction polynomial is a step at zero. If the answer of a joint is lost, its last measured position is used.
 use jtc_bus::{Answer, Frame, JOINTS, NodeState, Request, Scale, Target, config};
 use jtc_core::{Config, Friction, Parameters, PidGains, SetPoint};
 use jtc_dynamics::Dynamics;
 use jtc_wire::RawPoint;
 
-/// Factor of the torque.
+/// Gain factor of the commanded torque.
 const GAIN: f64 = 1.3;
 /// Duration of a tick, s.
 const DT: f64 = 0.001;
 /// Number of errors in the mean for the derivative.
 const WINDOW: usize = 5;
-/// Ticks in position hold before the motion.
+/// Number of ticks in position hold before the motion.
 const SETTLE: u32 = 2_000;
 
 /// PID controller. After a reset the errors of the last ticks are zero.
@@ -46,7 +46,7 @@ pub(crate) enum Phase {
     BringUp,
     /// The arm is in position hold, for this number of ticks.
     Hold(u32),
-    /// The arm follows the path and is at this millisecond of it.
+    /// The arm follows the path; the value is the current millisecond of the path.
     Operate(u32),
     /// The end of the path was reached.
     Finish,
@@ -67,15 +67,15 @@ pub(crate) struct Existing {
     configured: bool,
     /// Current phase.
     pub phase: Phase,
-    /// Commanded point of this tick.
+    /// Commanded trajectory point of this tick.
     pub set: SetPoint,
     /// Measured positions, rad.
     pub measured: [f64; JOINTS],
 }
 
 impl Existing {
-    /// Creates the controller for a path, with the parameters of the built-in arm. The existing firmware has the same
-    /// parameters.
+    /// Creates the controller for a path, with the parameters of the built-in arm. These parameters are also used in
+    /// the existing firmware.
     pub(crate) fn new(config: &Config, parameters: &Parameters, points: &[RawPoint], step_ms: u16) -> Self {
         let Friction::Polynomial(friction) = parameters.friction else { unreachable!("it has a polynomial") };
         Self {
@@ -118,7 +118,8 @@ impl Existing {
         Request::Move { torque: self.torque(), pump: false }.emit()
     }
 
-    /// Returns the next frame of the bring-up, until all joints are enabled: every fourth tick the next request, else a Move.
+    /// Returns the next frame until all joints are enabled. The frame is a request in every fourth tick, and a Move
+    /// in all other ticks.
     fn bring_up(&mut self) -> Frame {
         const TORQUE_MODE: u8 = 1;
         let states = self.states;

@@ -1,4 +1,5 @@
-//! Runs the existing firmware's control law and ours along the same paths on the same simulated plant, and writes docs/tracking.md.
+//! Runs the control law of the existing firmware and the control law of this project along the same paths on the same
+//! simulated plant. Writes the results to docs/tracking.md.
 mod existing;
 mod page;
 mod paths;
@@ -16,22 +17,22 @@ const SEEDS: u64 = 10;
 /// Condition of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Condition {
-    /// Heading on the page.
+    /// Heading of the condition on the page.
     pub name: &'static str,
     /// Description of the condition.
     pub what: &'static str,
     /// Share of the requested torque that the drives deliver.
     delivers: f64,
-    /// Our torque gain (J-61).
+    /// Torque gain of our controller (J-61).
     gain: f64,
     friction: FrictionModel,
     /// Speed around zero within which our friction compensation changes its sign, rad/s (a setting).
     sign_width: f64,
-    /// Error of the masses and the friction in the model that both controllers use.
+    /// Relative errors of the masses and of the friction in the model that both controllers use.
     error: ModelError,
     /// Mass at the flange that both controllers do not know, kg.
     mass: f64,
-    /// Probability that the reception of a frame fails.
+    /// Probability that a frame is not received.
     lost: f64,
     jitter_ms: u8,
     /// `true` if the result is compared with the goal.
@@ -115,8 +116,8 @@ impl Condition {
         Self { error: ModelError { mass, friction, ..self.error }, ..self }
     }
 
-    /// Returns the simulation of a seed. Gravity has the direction for a hanging arm, like in the existing firmware. `gain` is
-    /// our torque gain.
+    /// Returns the simulation of a seed. The arm hangs from the ceiling, as in the existing firmware. `gain` is the torque
+    /// gain of our controller.
     fn world(&self, seed: u64, start: [f64; JOINTS], gain: f64) -> SimConfig {
         let mut controller = Config { gravity: [0.0, 0.0, 9.81], ..Config::avena() };
         controller.friction_sign_width = self.sign_width;
@@ -138,8 +139,8 @@ impl Condition {
         world
     }
 
-    /// Returns the results of the existing law and of ours. Each figure is the median over the seeds whose run reached the end of the
-    /// path.
+    /// Returns the results of the existing control law and of our control law. Each figure is the median over the seeds whose run
+    /// reached the end of the path.
     pub fn compare(&self, path: &Path) -> Result<[Runs; 2]> {
         let start = path.points.first().map(jtc_wire::RawPoint::position_rad).ok_or("an empty path")?;
         let (mut existing, mut ours) = (Vec::new(), Vec::new());
@@ -156,7 +157,7 @@ impl Condition {
 pub struct Runs {
     /// Number of runs that reached the end of the path.
     pub finished: usize,
-    /// Medians over these runs.
+    /// Medians over the runs that reached the end of the path.
     pub figures: Option<Figures>,
     /// Reasons why the other runs ended.
     pub errors: Vec<String>,
@@ -191,8 +192,8 @@ fn median(all: &[Figures]) -> Figures {
     }
 }
 
-/// Returns our errors with a partly and a completely correct model. Each entry is a heading, and an error per joint in
-/// mrad.
+/// Returns the errors of our controller with a partly correct and a completely correct model. Each entry contains a
+/// heading, and the error of each joint in mrad.
 fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64; JOINTS])>> {
     let sharp = match condition.friction {
         FrictionModel::Smooth { width } => width,

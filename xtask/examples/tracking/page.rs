@@ -12,17 +12,18 @@ pub(crate) struct Comparison {
     pub condition: Condition,
     pub existing: Runs,
     pub ours: Runs,
-    /// Errors of our law with a better model, mrad, if the goal was missed.
+    /// Errors of our control law with a better model, mrad; used if the goal was missed.
     pub bounds: Vec<(&'static str, [f64; JOINTS])>,
 }
 
-/// Goal: a fifth of the existing firmware's error, but at least the error that an encoder of 16 bits can show, mrad.
+/// Goal for the error, mrad: a fifth of the error of the existing firmware, but not less than the resolution of a
+/// 16-bit encoder.
 const SHARE: f64 = 0.2;
 const LEAST: f64 = 0.04;
 
-/// Figures of the existing firmware's own code, compiled for a PC, on this plant. The first three are for ideal drives: commanded −
-/// measured and commanded − true, mrad, and the change of torque, N·m/ms. The fourth is for drives that deliver 1/1.3 of the torque:
-/// commanded − measured, mrad.
+/// Results of the original code of the existing firmware, compiled for a PC, on this plant. With ideal drives, the first three
+/// results are commanded − measured position (mrad), commanded − true position (mrad), and the change of torque (N·m/ms). The fourth
+/// result is commanded − measured position (mrad) with drives that deliver 1/1.3 of the torque.
 const REFERENCE: [(&str, [f64; JOINTS]); 4] = [
     ("ideal drives, commanded − measured", [0.258, 0.416, 0.368, 0.121, 0.127, 0.136]),
     ("ideal drives, commanded − true", [1.07, 0.88, 1.14, 0.76, 0.65, 0.91]),
@@ -73,7 +74,7 @@ impl Comparison {
         all.filter(|(_, ours, goal)| self.condition.judged && rounded(*ours) > *goal).collect()
     }
 
-    /// Returns the result in one sentence.
+    /// Returns the result of the comparison in one sentence.
     pub(crate) fn verdict(&self) -> String {
         if self.ours.finished < self.existing.finished {
             return format!(
@@ -131,7 +132,7 @@ impl Comparison {
     }
 }
 
-/// Rounds to the digits that the page shows.
+/// Rounds a value to the digits that the page shows.
 fn rounded(value: f64) -> f64 {
     (1e3 * value).round() / 1e3
 }

@@ -4,11 +4,11 @@ use jtc_wire::RawPoint;
 
 use crate::run::{Path, Result};
 
-/// Points of the recorded path, from 0, after which its recording lacks a point.
+/// Indices (from 0) of the recorded points after which one point is missing in the recording.
 const MISSING_AFTER: [usize; 5] = [184, 358, 544, 726, 906];
 /// Name of the recorded path on the page.
 pub(crate) const RECORDED: &str = "recorded path";
-/// Time between its points, ms.
+/// Time between the points of the recorded path, ms.
 const STEP_MS: u16 = 10;
 
 /// Returns the path of `jtc demo`, and the path that was recorded with the existing arm if its data are available.
@@ -21,7 +21,7 @@ pub(crate) fn all() -> Result<Vec<Path>> {
     Ok(paths)
 }
 
-/// Returns the points of `TrajectoryInt.csv`. Points that the recording lacks are interpolated.
+/// Returns the points of `TrajectoryInt.csv`. Points that are missing in the recording are interpolated.
 fn recorded() -> Option<Vec<RawPoint>> {
     let raw =
         |[position, velocity, acceleration]: [[i16; 6]; 3]| RawPoint { position, velocity, acceleration };
@@ -37,7 +37,8 @@ fn recorded() -> Option<Vec<RawPoint>> {
     Some(points)
 }
 
-/// Returns the point in the middle between two points that are 20 ms apart. The position is interpolated with a cubic.
+/// Returns the point in the middle between two points that are 20 ms apart. The position is interpolated with a cubic
+/// polynomial.
 fn between(a: &RawPoint, b: &RawPoint) -> RawPoint {
     let mean = |a: &[i16; 6], b: &[i16; 6]| {
         core::array::from_fn(|j| ((i32::from(a[j]) + i32::from(b[j])) / 2) as i16)

@@ -1,4 +1,4 @@
-//! Run of a controller along a path on the simulated plant, and its figures.
+//! Simulation of a controller that follows a path on the simulated plant, and the resulting errors.
 use jtc_bus::{JOINTS, Scale};
 use jtc_core::{ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_sim::{Bus, Fault, FaultKind, Operator, Plant, SimConfig, Trigger, host};
@@ -8,28 +8,28 @@ use crate::existing::{Existing, Phase};
 
 pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// Figures of a run, or the reason why the run ended early.
+/// Results of a simulation, or the reason why it ended early.
 pub(crate) type Outcome = std::result::Result<Figures, String>;
 
-/// Path: points, and the time between them.
+/// Path, as points and the time between two points.
 pub struct Path {
     pub name: &'static str,
     pub points: Vec<RawPoint>,
     pub step_ms: u16,
 }
 
-/// RMS values over the path, per joint.
+/// RMS values over the path, for each joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Figures {
     /// Commanded minus true position at the time when the command begins to act, mrad.
     pub true_error: [f64; JOINTS],
     /// Position error that the controller calculates, mrad.
     pub own_error: [f64; JOINTS],
-    /// Change of the torque at the joint from a millisecond to the next, N·m.
+    /// Change of the joint torque between two consecutive milliseconds, N·m.
     pub roughness: [f64; JOINTS],
 }
 
-/// Sums over the milliseconds of a run.
+/// Sums over all milliseconds of a simulation.
 #[derive(Default)]
 struct Sums {
     true_error: [f64; JOINTS],
@@ -101,7 +101,7 @@ pub(crate) fn ours(config: SimConfig, lost: f64, path: &Path) -> Result<Outcome>
     Err(format!("{} takes longer than a minute", path.name).into())
 }
 
-/// Runs the existing law on the same plant and bus.
+/// Runs the existing control law on the simulated plant and bus.
 pub(crate) fn existing(config: &SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
     let mut plant = Plant::new(config);
     let mut bus = Bus::new(

@@ -1,4 +1,4 @@
-//! Load of the machine, which shows if the machine is idle enough to judge the measurements.
+//! Load of the computer by other programs, which determines if the measurements can be judged.
 use std::time::Instant;
 
 /// Largest share of one processor that other programs may use while figures are judged.
@@ -7,7 +7,8 @@ pub(super) const OTHERS_MAX: f64 = 0.1;
 /// Processor times, to measure the load by other programs.
 pub(super) struct Load {
     began: Instant,
-    /// Processor time of all programs, and of this one with its child processes, s, if the system reports them.
+    /// Processor times, s, of all programs, and of this program with its child processes; `None` if the system does
+    /// not report the times.
     busy: Option<(f64, f64)>,
 }
 
@@ -34,8 +35,8 @@ fn busy() -> Option<(f64, f64)> {
     // All fields except the idle times: user, nice and system, then irq, softirq and steal.
     let all = sum(all.get(1..4)?)? + sum(all.get(6..9)?)?;
     let own = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // Fields 14 to 17 of the line are utime, stime, cutime and cstime. The fields are counted after the name, which may
-    // contain spaces.
+    // Fields 14 to 17 of the line are utime, stime, cutime and cstime. The code counts fields after the name, because
+    // the name may contain spaces.
     let own: Vec<&str> = own.rsplit_once(')')?.1.split_whitespace().collect();
     let own = sum(own.get(11..15)?)?;
     Some((all / USER_HZ, own / USER_HZ))

@@ -5,21 +5,22 @@ use crate::size;
 /// Target of a figure.
 #[derive(Clone, Copy)]
 enum Target {
-    /// Ours ≤ factor × anchor.
+    /// Our value must be at most factor × anchor.
     Share(f64),
-    /// Ours ≤ value.
+    /// Our value must be at most this value.
     AtMost(f64),
-    /// Ours ≥ value.
+    /// Our value must be at least this value.
     AtLeast(f64),
-    /// For information only.
+    /// The figure has no target and is for information only.
     None,
 }
 
-/// Row of the table.
+/// Row of the table, which compares one figure.
 struct Row {
     title: &'static str,
     ours: &'static str,
-    /// Anchors of the figure. The smallest one is compared. The table lists an anchor that could not be measured.
+    /// Anchors of the figure. The figure is compared with the smallest anchor. The table also lists anchors that
+    /// could not be measured.
     anchors: &'static [&'static str],
     target: Target,
     unit: &'static str,
@@ -262,8 +263,8 @@ pub(super) fn targets() -> usize {
     ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
 }
 
-/// Prints every row, with the cause if its measurement failed. Returns the number of missed targets. If the machine was not `quiet`,
-/// the measurements are not judged.
+/// Prints every row, and the cause if a measurement failed. Returns the number of missed targets. If the computer was not
+/// `quiet`, the measurements are not judged.
 pub(super) fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
     println!("\n| figure | ours | anchor | ratio | target | met |\n|---|---|---|---|---|---|");
     let mut missed = 0;
@@ -276,7 +277,7 @@ pub(super) fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
 }
 
 impl Row {
-    /// Returns the row of the table, and true if its target was missed.
+    /// Returns the row of the table, and `true` if the target of the row was missed.
     fn judge(&self, figures: &Figures, failed: &Failed, quiet: bool) -> (String, bool) {
         let ours = figures.get(self.ours).copied();
         let anchor = self
@@ -331,7 +332,7 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// All figures of the table exist, except those of one failed measurement.
+    /// All figures of the table exist, except the figures of one failed measurement.
     #[test]
     fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
         let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));

@@ -18,7 +18,7 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
 mod tests {
     use super::*;
 
-    /// Rows of a section: names with six figures.
+    /// Rows of a section, each with a name and six numbers.
     type Rows = Vec<(String, [f64; 6])>;
 
     fn page() -> String {
@@ -48,8 +48,8 @@ mod tests {
         rows.iter().find(|(row, _)| row == name).map(|(_, figures)| *figures)
     }
 
-    /// The page says that a goal is met only if its figures meet the goal. Otherwise it lists the joints that miss the goal, with
-    /// the limiting quantity.
+    /// The page says that a goal is met only if its figures meet the goal. Otherwise the page lists the joints that miss the
+    /// goal, with the quantity that limits each joint.
     #[test]
     fn j62_the_page_of_tracking_judges_its_own_figures() {
         let (page, sections) = (page(), sections(&page()));
@@ -89,7 +89,7 @@ mod tests {
         }
     }
 
-    /// Each known figure of the existing firmware agrees within a tenth with our implementation of its law.
+    /// Each known result of the existing firmware agrees with our implementation of its control law within 10 %.
     #[test]
     fn j62_the_existing_law_of_the_page_is_that_of_the_existing_firmware() {
         let sections = sections(&page());

@@ -1,5 +1,5 @@
-//! Trial of the packages. The packages are installed in a separate Debian, used, removed and purged. After that no file
-//! may be left.
+//! Test of the packages. The packages are installed in a separate Debian system, used, removed and purged. After the
+//! purge, no file of the packages may remain.
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::{assembled_twice, programs, write};
 use crate::shell::{self, run};
 use crate::tally::{Outcome, Tally};
 
-/// Runs the steps that belong to `cargo xtask test`, with the programs that it has built.
+/// Runs the steps that belong to `cargo xtask test`, with the programs that were built for the tests.
 pub(crate) fn steps(tally: &mut Tally) {
     tally.step("packages: assembled twice, installed, used, removed", || {
         if programs::own().is_err() || !Path::new("/var/lib/dpkg/status").exists() {
@@ -51,7 +51,7 @@ fn debs(paths: &[PathBuf]) -> Vec<PathBuf> {
     debs
 }
 
-/// Tries the packages from the installation to the purge.
+/// Tests the packages from the installation to the purge.
 fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     ensure!(debs.len() == 2, "there are {} packages to try, not those of jtc and ucom", debs.len());
     let before = root.files()?;
@@ -143,7 +143,7 @@ fn units(root: &Root) -> Result<()> {
     }
     let users = fs::read_to_string(root.path().join("etc/passwd"))?;
     ensure!(users.lines().any(|line| line.starts_with("jtc:")), "the user jtc was not made");
-    // First checks with a broken unit that the method finds a mistake.
+    // The first check uses an invalid unit, to verify that the method detects an error.
     let broken = root.path().join("etc/systemd/system/jtc-broken.service");
     fs::write(&broken, "[Service]\nExecStart=/usr/bin/no-such-program\nNoSuchKey=1\n")?;
     let found = complaints(root, "jtc-broken.service")?;
@@ -158,8 +158,8 @@ fn units(root: &Root) -> Result<()> {
     Ok(())
 }
 
-/// Returns systemd's complaints about a unit of this project. Other units are not checked, because the copied Debian may lack their
-/// dependencies.
+/// Returns the problems that systemd reports for a unit of this project. Other units are not checked, because the copied Debian may
+/// lack their dependencies.
 fn complaints(root: &Root, unit: &str) -> Result<Vec<String>> {
     let verified = root.command("systemd-analyze").args(["verify", "--man=no", unit]).output()?;
     let text = String::from_utf8_lossy(&verified.stderr).into_owned();

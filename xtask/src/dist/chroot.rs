@@ -1,4 +1,4 @@
-//! Small Debian system in a folder, for trial installations of packages.
+//! Small Debian system in a folder, in which packages are installed for a test.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -10,9 +10,9 @@ use anyhow::{Context, Result, bail, ensure};
 use super::tree::sha256;
 use crate::shell::{self, Scratch, apt_install, run, works};
 
-/// Folders that are not compared, because they contain dpkg's own records, or files that are lost at a reboot.
+/// Folders that are not compared, because they contain dpkg's own records or temporary files.
 const UNCOMPARED: [&str; 6] = ["var/lib/dpkg", "var/log", "var/cache", "proc", "tmp", "run"];
-/// Backups written by the programs that change users.
+/// Backup files that are written by the programs that change user accounts.
 const BACKUPS: [&str; 7] = [
     "etc/passwd-",
     "etc/group-",
@@ -22,24 +22,24 @@ const BACKUPS: [&str; 7] = [
     "etc/subgid-",
     "etc/.pwd.lock",
 ];
-/// Packages that the trial uses if this computer has them, in addition to the essential ones.
+/// Packages that the test uses in addition to the essential packages, if they are installed on this computer.
 const WANTED: [&str; 3] = ["passwd", "systemd", "man-db"];
-/// Files that the trial does not need.
+/// Files that the test does not need.
 const LEFT_OUT: [&str; 5] =
     ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
 
-/// Folder of the system, which is removed on drop.
+/// Folder of the Debian system, which is removed on drop.
 pub(super) struct Root(Scratch);
 
 /// Package of this computer, according to dpkg.
 struct Installed {
     essential: bool,
-    /// Names of its dependencies: for each dependency a list of alternatives.
+    /// Dependencies of the package. Each entry is a list of alternative package names.
     depends: Vec<Vec<String>>,
 }
 
 impl Root {
-    /// Copies the essential packages of this computer's Debian. Needs no network, and takes seconds.
+    /// Copies the essential packages of this computer's Debian. The copy needs no network and takes seconds.
     pub(super) fn copied(name: &str) -> Result<Self> {
         let root = Self(Scratch::new(name)?);
         for folder in ["bin", "sbin", "lib", "lib32", "lib64", "libx32"] {
@@ -60,7 +60,7 @@ impl Root {
         Ok(root)
     }
 
-    /// Creates a new Debian 12 from its archive, with the programs that the trial uses.
+    /// Creates a new Debian 12 from its archive, with the programs that the test uses.
     pub(super) fn bootstrapped(name: &str) -> Result<Self> {
         if !works(shell::command("debootstrap").arg("--version")) {
             apt_install(&["debootstrap"])?;
@@ -77,8 +77,8 @@ impl Root {
         self.0.path()
     }
 
-    /// Writes dpkg's records of the new system. The records are copies of this computer's records of the copied
-    /// packages.
+    /// Writes dpkg's records of the new system. The new records are copies of this computer's records for the
+    /// copied packages.
     fn remember(&self, packages: &BTreeSet<String>) -> Result<()> {
         let to = self.path().join("var/lib/dpkg");
         for folder in ["info", "updates", "triggers", "alternatives"] {
@@ -144,8 +144,8 @@ impl Root {
         chroot
     }
 
-    /// Returns a command that runs dpkg on the system. The command also installs manual pages, which dpkg is configured to leave
-    /// out in some containers.
+    /// Returns a command that runs dpkg on the system. The command also installs manual pages, which dpkg does not install in
+    /// some containers.
     pub(super) fn dpkg(&self) -> Command {
         let mut dpkg = shell::command("dpkg");
         dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");
@@ -153,7 +153,7 @@ impl Root {
         dpkg
     }
 
-    /// Returns all files that packages could have left, by path, with kind, mode, owner and content.
+    /// Returns all files that packages may have created, by path, with kind, mode, owner and content.
     pub(super) fn files(&self) -> Result<BTreeMap<String, String>> {
         let mut found = BTreeMap::new();
         let mut waiting = vec![self.path().to_owned()];
@@ -182,7 +182,7 @@ impl Root {
     }
 }
 
-/// Returns all packages of this computer.
+/// Returns all packages that are installed on this computer.
 fn installed() -> Result<BTreeMap<String, Installed>> {
     let mut query = shell::command("dpkg-query");
     let format = "${db:Status-Abbrev}\t${Package}\t${Essential}\t${Pre-Depends}, ${Depends}\t${Provides}\n";
@@ -212,7 +212,7 @@ fn installed() -> Result<BTreeMap<String, Installed>> {
     Ok(packages)
 }
 
-/// Returns the essential packages, those that the trial uses, and all their dependencies.
+/// Returns the essential packages and the packages that the test uses, with all dependencies.
 fn closure(installed: &BTreeMap<String, Installed>) -> Result<BTreeSet<String>> {
     let begins = |name: &str, package: &Installed| package.essential || WANTED.contains(&name);
     let mut waiting: Vec<&str> =

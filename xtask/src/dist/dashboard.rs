@@ -1,4 +1,4 @@
-//! Libraries in the pages of the dashboard, which the programs contain.
+//! JavaScript libraries that are part of the dashboard pages in the programs.
 use anyhow::{Context, Result};
 use serde_json::Value;
 
@@ -15,11 +15,11 @@ pub(super) struct Library {
     pub version: String,
     /// Licence, as an SPDX identifier.
     pub licence: String,
-    /// Text of its licence.
+    /// Text of the library's licence.
     pub text: String,
 }
 
-/// Returns all libraries. The texts are stored next to this program, so that a release can be made without Node.js.
+/// Returns all libraries. The texts are stored next to this program, so that a release can be built without Node.js.
 pub(super) fn libraries() -> Result<Vec<Library>> {
     let lock = root().join("web/package-lock.json");
     let lock: Value =

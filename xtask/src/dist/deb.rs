@@ -1,5 +1,5 @@
-//! Format of Debian packages (deb(5)), reproducible byte for byte. The packages do not contain the sums of their files,
-//! because dpkg makes them itself.
+//! Format of Debian packages (deb(5)), reproducible byte for byte. The packages do not contain checksums of their
+//! files, because dpkg computes the checksums.
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result, ensure};
@@ -10,15 +10,15 @@ use super::tree::Tree;
 pub(super) struct Deb<'a> {
     /// Name.
     pub name: &'a str,
-    /// Version with Debian's revision.
+    /// Version of the package, including Debian's revision.
     pub version: &'a str,
     /// Architecture: `amd64`, `arm64`.
     pub architecture: &'a str,
-    /// More lines of the control file, such as `Section: science`.
+    /// Additional lines of the control file, such as `Section: science`.
     pub fields: &'a str,
     /// Files that the package installs.
     pub tree: &'a Tree,
-    /// Scripts by name: `postinst`, `postrm`.
+    /// Installation scripts by name, such as `postinst` and `postrm`.
     pub scripts: &'a [(&'a str, &'a str)],
 }
 
@@ -28,7 +28,7 @@ impl Deb<'_> {
         format!("{}_{}_{}.deb", self.name, self.version, self.architecture)
     }
 
-    /// Returns the bytes of the package, in which all files have this `time` (Unix time, s).
+    /// Returns the bytes of the package. All files in the package have the time stamp `time` (Unix time, s).
     pub(super) fn bytes(&self, time: u64) -> Result<Vec<u8>> {
         let mut ar = ar::Builder::new(Vec::new());
         for (name, bytes) in [

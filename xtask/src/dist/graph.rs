@@ -15,17 +15,17 @@ pub(crate) struct Crate {
     pub name: String,
     /// Version.
     pub version: String,
-    /// Licence as an SPDX expression; `None` if its manifest has none.
+    /// Licence as an SPDX expression; `None` if the manifest contains no licence.
     pub licence: Option<String>,
     /// Source of the crate; `None` for the project's own crates.
     pub source: Option<String>,
-    /// Authors, as listed in its manifest.
+    /// Authors of the crate, as listed in its manifest.
     pub authors: Vec<String>,
-    /// Address of its repository.
+    /// Address of the crate's repository.
     pub repository: Option<String>,
-    /// Folder of its source.
+    /// Folder of the crate's source.
     pub folder: PathBuf,
-    /// SHA-256 of its archive in the registry.
+    /// SHA-256 of the crate's archive in the registry.
     pub checksum: Option<String>,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct Crate {
 pub(crate) struct Graph {
     /// The crates.
     pub crates: BTreeMap<String, Crate>,
-    /// Dependencies of each crate, by the same names.
+    /// Dependencies of each crate, by `name version`.
     pub uses: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -74,7 +74,7 @@ pub(crate) fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
     Ok(graph)
 }
 
-/// Returns cargo's resolution for a platform, without the network if possible.
+/// Returns cargo's resolution for a platform, without network access if possible.
 fn metadata(manifest: &Path, platform: &str) -> Result<Value> {
     let ask = || {
         let mut cargo = shell::cargo(&[
@@ -142,7 +142,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Adds the checksums in the lock files.
+    /// Adds the checksums from the lock files.
     fn checksums(&mut self) -> Result<()> {
         for lock in ["Cargo.lock", "firmware/Cargo.lock"] {
             let text = std::fs::read_to_string(shell::root().join(lock)).context(lock)?;

@@ -1,4 +1,4 @@
-//! The boards' programs as images of flash, and their list that `jtc firmware flash` reads.
+//! Flash images of the programs for the boards, and the list of images that `jtc firmware flash` reads.
 use anyhow::{Context, Result, ensure};
 use object::{Object as _, ObjectSegment as _};
 use serde_json::json;
@@ -8,10 +8,11 @@ use crate::firmware;
 
 /// First address of flash.
 const FLASH: u64 = 0x0800_0000;
-/// Number of bytes from there to the stored arm, which no image may overwrite. The stored arm is in the last two sectors of bank 2. The
-/// few words for the second core of an H745 are at the start of bank 2, so the images of these boards contain a gap of erased flash.
+/// Number of bytes from the start of flash to the stored arm, which an image must not overwrite. The stored arm is in the last two
+/// sectors of bank 2. The few words for the second core of an H745 are at the start of bank 2, so the images of these boards contain a
+/// gap of erased flash.
 const ROOM: u64 = (2048 - 2 * 128) * 1024;
-/// Value of flash that is not written.
+/// Value of erased flash bytes.
 const ERASED: u8 = 0xff;
 
 /// Program of a board.
@@ -22,8 +23,8 @@ pub(super) struct Image {
     pub bin: Vec<u8>,
 }
 
-/// Builds the programs of all boards. The contents of flash are the same in every build folder. The names in the ELF files, which
-/// debuggers read, are not the same, so a release does not contain the ELF files.
+/// Builds the programs of all boards. The contents of flash do not depend on the build folder. The file names in the ELF files
+/// depend on the build folder, so a release does not contain the ELF files.
 pub(super) fn build() -> Result<Vec<Image>> {
     let image = |board| {
         let path = firmware::build(board)?;
@@ -34,7 +35,7 @@ pub(super) fn build() -> Result<Vec<Image>> {
     firmware::BOARDS.into_iter().map(image).collect()
 }
 
-/// Returns the contents of flash from an ELF.
+/// Returns the contents of flash according to an ELF file.
 fn flash(elf: &[u8]) -> Result<Vec<u8>> {
     let file = object::read::elf::ElfFile32::<object::Endianness>::parse(elf)?;
     let mut bin = Vec::new();
@@ -43,7 +44,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         if bytes.is_empty() {
             continue;
         }
-        // This is the load address, which differs from the run address.
+        // The code uses the load address, which differs from the run address.
         let address = u64::from(segment.elf_program_header().p_paddr.get(file.endian()));
         let end = address + bytes.len() as u64;
         ensure!(
@@ -79,7 +80,7 @@ pub(super) fn install(images: &[Image], version: &str, folder: &str, tree: &mut 
     Ok(())
 }
 
-/// Returns the file name, such as `nucleo-h745zi-q.bin`.
+/// Returns the file name of the image, such as `nucleo-h745zi-q.bin`.
 pub(super) fn name(image: &Image) -> String {
     format!("{}.bin", image.board)
 }

@@ -8,10 +8,10 @@ use super::dashboard;
 use super::graph::{Crate, Graph};
 use crate::shell;
 
-/// Beginnings of the names of licence files in crates.
+/// Prefixes of the names of licence files in crates.
 const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"];
 
-/// Folders of a crate that are not shipped in a program.
+/// Folders of a crate whose files do not become part of a program.
 const NOT_SHIPPED: [&str; 7] = ["tests", "test", "examples", "benches", "fuzz", "target", "node_modules"];
 
 /// Returns a licence as an SPDX expression. Old manifests contain `/` instead of `OR`.
@@ -19,7 +19,8 @@ pub(crate) fn expression(licence: &str) -> String {
     licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
 }
 
-/// Returns THIRD-PARTY.txt: each crate and library with its licence, then each text once. Returns an error for a crate without a licence.
+/// Returns THIRD-PARTY.txt: a list of all crates and libraries with their licences, followed by each licence text
+/// once. Returns an error for a crate without a licence.
 pub(crate) fn third_party(graph: &Graph) -> Result<String> {
     let mut list =
         String::from("openjtc contains what others wrote. Their licences, and below them the texts.\n\n");
@@ -45,7 +46,7 @@ pub(crate) fn third_party(graph: &Graph) -> Result<String> {
     Ok(list)
 }
 
-/// Parts that the compiler and the linker put into programs in addition to crates.
+/// Components that the compiler and the linker add to programs in addition to crates.
 pub(crate) const RUNTIME: [(&str, &str); 3] = [
     ("musl", "MIT"),
     ("llvm-libunwind", "Apache-2.0 WITH LLVM-exception"),
@@ -58,7 +59,7 @@ fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     let version = version.split(' ').nth(1).unwrap_or_default().to_owned();
     let label = format!("Rust's standard library {version}");
     writeln!(list, "{label}: MIT OR Apache-2.0")?;
-    // The project's licences have the same texts.
+    // The project's licences have equal texts.
     let apache = std::fs::read_to_string(shell::root().join("LICENSE-APACHE"))?;
     texts.add(&label, &apache);
     for (name, licence) in RUNTIME {
@@ -73,7 +74,7 @@ fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     Ok(())
 }
 
-/// Licence texts in the order of their first use, each with the labels of the parts that have it.
+/// Licence texts in the order of their first use, each with the labels of the parts under this licence.
 #[derive(Default)]
 struct Texts(Vec<(String, Vec<String>)>);
 
@@ -89,7 +90,8 @@ impl Texts {
         }
     }
 
-    /// Adds the licence texts in the source of a crate. If it has none, adds the standard text.
+    /// Adds the licence texts in the source of a crate. Adds the standard text if the source contains no licence
+    /// text.
     fn of(&mut self, found: &Crate, label: &str) -> Result<()> {
         let files = files(&found.folder)?;
         for file in &files {
@@ -119,7 +121,8 @@ impl Texts {
     }
 }
 
-/// Returns the licence files in the source of a crate, including those of C code and other parts in it. Tests and examples are not shipped.
+/// Returns the licence files in the source of a crate, including the files for C code and other parts. Tests and
+/// examples are excluded, because they do not become part of a program.
 fn files(source: &Path) -> Result<Vec<PathBuf>> {
     let (mut found, mut waiting) = (Vec::new(), vec![source.to_owned()]);
     while let Some(folder) = waiting.pop() {

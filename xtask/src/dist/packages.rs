@@ -10,10 +10,10 @@ use super::programs::{PROGRAMS, Platform};
 use super::tree::{Tree, gzip};
 use crate::shell::root;
 
-/// The revision of the Debian packages of one version.
+/// Revision number of the Debian packages of a version.
 const REVISION: u32 = 1;
 
-/// udev rules. Both packages install them, under different names.
+/// udev rules. Both packages install these files, under different names.
 const RULES: &str = include_str!("../../packaging/serial.rules");
 
 /// Intended findings of lintian, with the reasons.
@@ -34,7 +34,7 @@ pub(super) struct Release {
     pub time: u64,
     /// Text of THIRD-PARTY.txt.
     pub third_party: String,
-    /// Programs of the boards.
+    /// Flash images of the boards.
     pub images: Vec<Image>,
 }
 
@@ -116,7 +116,7 @@ impl Release {
         tree.put("THIRD-PARTY.txt", &*self.third_party);
         tree.put("udev/70-openjtc.rules", RULES);
         if name == "jtc" {
-            // The program searches for the images at this path, next to its own folder.
+            // The program searches for the images at the following path, next to its own folder.
             images::install(&self.images, &self.version, "share/openjtc/firmware", &mut tree)?;
         }
         let folder = format!("{name}-{}-{}-linux", self.version, platform.machine);
@@ -172,7 +172,7 @@ fn copyright() -> Result<String> {
     ))
 }
 
-/// Returns a Unix time in the format of mails.
+/// Returns a Unix time in the date format of e-mail.
 fn rfc2822(time: u64) -> Result<String> {
     let mut date = crate::shell::command("date");
     let text = crate::shell::read(date.env("LC_ALL", "C").args(["-u", "-R", "-d", &format!("@{time}")]))

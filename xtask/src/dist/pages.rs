@@ -19,8 +19,8 @@ impl Pages {
     /// Returns the pages of the program with this name in `folder`.
     pub(super) fn of(folder: &Path, name: &str) -> Result<Self> {
         let program = folder.join(name);
-        // The environment variables of `jtc` and `ucom` are removed, because options that this user has set must not
-        // get into the packages.
+        // The environment variables of `jtc` and `ucom` are removed, because options that the user has set must not
+        // become part of the packages.
         let ask = || {
             let mut ask = shell::command(&program);
             ask.env_clear();
@@ -55,7 +55,7 @@ impl Pages {
         Ok(())
     }
 
-    /// Adds the pages at the paths of the archives.
+    /// Adds the pages at the paths that are used in the archives.
     pub(super) fn unpacked(&self, name: &str, tree: &mut Tree) {
         for (page, text) in &self.manual {
             tree.put(format!("man/man1/{page}"), &**text);

@@ -1,5 +1,5 @@
-//! Programs of a release: static and stripped. Their bytes do not depend on the location of the checkout and of cargo's
-//! folders.
+//! Programs of a release, which are statically linked and stripped. The bytes of the programs do not depend on the
+//! location of the checkout or of cargo's folders.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -8,19 +8,19 @@ use anyhow::{Context, Result, ensure};
 use crate::shell::{self, run};
 use crate::{paths, python};
 
-/// Names of the programs, with their packages.
+/// Names of the programs, with the packages that contain them.
 pub(super) const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
 
 /// Platform of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Platform {
-    /// Name used by the Linux kernel and Rust.
+    /// Platform name that the Linux kernel and Rust use.
     pub machine: &'static str,
-    /// Name used by Debian.
+    /// Platform name that Debian uses.
     pub debian: &'static str,
-    /// Rust's target of static programs.
+    /// Rust target for static programs.
     pub triple: &'static str,
-    /// Rust's target of libraries that Python loads.
+    /// Rust target for libraries that Python loads.
     pub library: &'static str,
 }
 
@@ -40,14 +40,15 @@ pub(super) const PLATFORMS: [Platform; 2] = [
     },
 ];
 
-/// Returns the platform of this computer. Returns an error if a release has no programs for it.
+/// Returns the platform of this computer. Returns an error if a release contains no programs for this platform.
 pub(super) fn own() -> Result<Platform> {
     let machine = std::env::consts::ARCH;
     let own = PLATFORMS.into_iter().find(|platform| platform.machine == machine);
     own.with_context(|| format!("there are no packages for computers like this ({machine}), which would have to run their programs"))
 }
 
-/// Adds the compiler's target if rustup manages the toolchain. Returns an error if the target is not available here.
+/// Installs the compiler target if rustup manages the toolchain. Returns an error if the target is not available
+/// here.
 pub(super) fn add_target(triple: &str) -> Result<()> {
     let installed = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))?;
     if installed.lines().any(|target| target == triple) {
@@ -56,7 +57,8 @@ pub(super) fn add_target(triple: &str) -> Result<()> {
     run(shell::command("rustup").args(["target", "add", triple]))
 }
 
-/// Returns the Unix time that all archives contain, s. This is the time of the last commit, or `SOURCE_DATE_EPOCH`.
+/// Returns the Unix time that all archives contain, s. The time is the time of the last commit, or
+/// `SOURCE_DATE_EPOCH`.
 pub(super) fn time() -> Result<u64> {
     let time = match std::env::var("SOURCE_DATE_EPOCH") {
         Ok(time) => time,
@@ -73,10 +75,10 @@ pub(super) fn tools() -> Result<PathBuf> {
     Ok(python.parent().context("an interpreter in no folder")?.to_owned())
 }
 
-/// Adds switches for `triple` to a cargo command that keep paths of this computer out of the output.
+/// Adds switches for `triple` to a cargo command, so that the output does not contain paths of this computer.
 pub(super) fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
-    // C code and its assembler code need these options.
+    // The following options are necessary for C code and its assembler code.
     let folders = paths::folders()?;
     let maps: Vec<String> =
         folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();
@@ -92,7 +94,7 @@ pub(super) fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Resu
     Ok(())
 }
 
-/// Builds the programs and returns their folder.
+/// Builds the programs and returns the folder that contains them.
 pub(super) fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     add_target(platform.triple)?;
     let tools = tools()?;
@@ -116,7 +118,7 @@ pub(super) fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Returns an error if the program requests a loader, because it then needs libraries of the system.
+/// Returns an error if the program requests a dynamic loader, because such a program needs libraries of the system.
 fn is_static(name: &str, bytes: &[u8]) -> Result<()> {
     use object::read::elf::{FileHeader as _, ProgramHeader as _};
     let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
@@ -129,7 +131,7 @@ fn is_static(name: &str, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Returns an error for a file that contains a folder of this computer.
+/// Returns an error if a file contains the path of a folder of this computer.
 pub(super) fn has_no_paths(name: &str, bytes: &[u8]) -> Result<()> {
     for (path, _) in paths::folders()? {
         let path = path.to_string_lossy();

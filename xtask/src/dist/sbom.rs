@@ -7,8 +7,8 @@ use super::graph::{Crate, Graph};
 use super::{licences, programs};
 use crate::shell::{self, Scratch, run};
 
-/// Returns the bill of materials of `graph` and of the libraries in the dashboard's pages. Equal lock files give equal
-/// bytes.
+/// Returns the bill of materials of `graph` and of the libraries in the dashboard's pages. Equal lock files result in
+/// equal bytes.
 pub(super) fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
     let scripts = dashboard::libraries()?;
     let crates = graph.crates.values().map(component);
@@ -73,7 +73,7 @@ fn component(found: &Crate) -> Value {
     component
 }
 
-/// Returns the package URL of a crate. The project's own crates are not in a registry.
+/// Returns the package URL of a crate. The project's own crates have no registry address.
 fn purl(found: &Crate) -> String {
     reference(if found.source.is_some() { "cargo" } else { "generic" }, &found.name, &found.version)
 }

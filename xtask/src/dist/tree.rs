@@ -7,11 +7,11 @@ use anyhow::{Context, Result, ensure};
 use flate2::{Compression, GzBuilder};
 use sha2::{Digest as _, Sha256};
 
-/// Files by their path below the root, such as `usr/bin/jtc`.
+/// Files of the package by their path below the root, such as `usr/bin/jtc`.
 #[derive(Clone, Default, Debug, PartialEq)]
 pub(super) struct Tree(BTreeMap<String, File>);
 
-/// File with its content and kind.
+/// File of a package, with content and kind.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct File {
     /// Content of the file.
@@ -21,7 +21,7 @@ pub(super) struct File {
 }
 
 impl Tree {
-    /// Adds a file that everyone can read.
+    /// Adds a file that all users can read.
     pub(super) fn put(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         self.0.insert(path.into(), File { bytes: bytes.into(), runs: false });
     }
@@ -31,7 +31,7 @@ impl Tree {
         self.0.insert(path.into(), File { bytes: bytes.into(), runs: true });
     }
 
-    /// Adds a file of this computer.
+    /// Adds a copy of a file of this computer.
     pub(super) fn copy(&mut self, path: impl Into<String>, from: &Path) -> Result<()> {
         let bytes = std::fs::read(from).with_context(|| from.display().to_string())?;
         self.put(path, bytes);
@@ -44,7 +44,7 @@ impl Tree {
     }
 
     /// Returns a tar archive with sorted paths. All files belong to root and have the time `time` (Unix time, s). `prefix` (`./` or
-    /// `name/`) is put before each path. The archive also contains the folders.
+    /// `name/`) is added at the beginning of each path. The archive also contains entries for the folders.
     pub(super) fn tar(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         let mut tar = tar::Builder::new(Vec::new());
         let mut folders = BTreeSet::new();
@@ -66,7 +66,7 @@ impl Tree {
         Ok(tar.into_inner()?)
     }
 
-    /// Returns the archive compressed.
+    /// Returns the compressed archive.
     pub(super) fn tar_gz(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         compress(&self.tar(prefix, time)?, Compression::default())
     }
@@ -80,7 +80,7 @@ fn header(kind: tar::EntryType, mode: u32, size: u64, time: u64) -> tar::Header 
     header.set_mtime(time);
     header.set_uid(0);
     header.set_gid(0);
-    // The names of user and group 0 fit into their fields.
+    // The names of user 0 and group 0 fit into their fields.
     let _ = header.set_username("root");
     let _ = header.set_groupname("root");
     header
@@ -91,8 +91,8 @@ pub(super) fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
     compress(bytes, Compression::best())
 }
 
-/// Compresses without a time and a name in the header. For a program the best level would take three times as long as the
-/// default and save 1 %.
+/// Compresses data without a time and a name in the header. For a program, the best level would take three times as
+/// long as the default level and save 1 %.
 fn compress(bytes: &[u8], by: Compression) -> Result<Vec<u8>> {
     let mut gzip = GzBuilder::new().mtime(0).operating_system(3).write(Vec::new(), by);
     gzip.write_all(bytes)?;
@@ -104,10 +104,10 @@ pub(super) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Name of the list that `sha256sum --check` reads.
+/// Name of the list of checksums that `sha256sum --check` reads.
 pub(super) const SUMS: &str = "SHA256SUMS";
 
-/// Writes the list into a folder, with the sums of all other files of the folder.
+/// Writes the list of checksums into a folder. The list contains the checksums of all other files in the folder.
 pub(super) fn write_sums(folder: &Path) -> Result<()> {
     let mut lines = BTreeMap::new();
     for entry in std::fs::read_dir(folder)? {
@@ -153,7 +153,7 @@ mod tests {
                 (path, header.mode().unwrap())
             })
             .collect();
-        // The archiver leaves out a `./` before a name. dpkg and tar accept both forms.
+        // The archiver omits a `./` at the beginning of a name. dpkg and tar accept both forms.
         let expected = [
             ("./", 0o755),
             ("etc/", 0o755),

@@ -1,4 +1,4 @@
-//! Makes a release again from a copy of the checkout in another folder, and compares it byte for byte.
+//! Builds a release again from a copy of the checkout in another folder, and compares both releases byte by byte.
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -7,9 +7,11 @@ use anyhow::{Context, Result, bail};
 
 use crate::shell::{self, run};
 
-/// Makes the release of `first` again elsewhere. If files differ, returns an error that lists them and keeps both releases.
+/// Builds the release of `first` again in another folder. If files differ, returns an error that lists them and keeps
+/// both releases.
 pub(super) fn compare(first: &Path, quick: bool) -> Result<()> {
-    // The folder for temporary files is not used, because some systems keep it in memory, and this needs gigabytes.
+    // The folder for temporary files is not used, because on some systems it is in memory, and the build needs
+    // gigabytes.
     let folder = shell::target().join("made-again-in-a-folder-with-a-longer-name");
     if folder.exists() {
         fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -62,7 +64,8 @@ pub(super) fn compare(first: &Path, quick: bool) -> Result<()> {
     Ok(())
 }
 
-/// Copies the present checkout with uncommitted changes and history, without build output and the release.
+/// Copies the current checkout with uncommitted changes and history, but without build output and without the
+/// release.
 fn copy(to: &Path, release: &Path) -> Result<()> {
     run(shell::command("git").args(["clone", "--quiet", "--no-local", "."]).arg(to))?;
     let listed = shell::read(shell::command("git").args([

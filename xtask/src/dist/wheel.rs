@@ -8,12 +8,12 @@ use super::packages::Made;
 use super::programs::{self, Platform};
 use crate::shell::{self, Scratch, run};
 
-/// Returns the folder of its source; `None` in a checkout without it.
+/// Returns the folder of the Python package's source; `None` if the checkout does not contain the folder.
 pub(super) fn folder() -> Option<PathBuf> {
     Some(shell::root().join("crates/openjtc-py")).filter(|folder| folder.join("pyproject.toml").exists())
 }
 
-/// Text about third-party parts. `license-files` in pyproject.toml contains this path.
+/// File that lists third-party parts. `license-files` in pyproject.toml contains the path of this file.
 const THIRD_PARTY: &str = "LICENSE-THIRD-PARTY.txt";
 
 /// Builds the wheel, which works with every glibc from 2.17 on.

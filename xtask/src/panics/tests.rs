@@ -1,4 +1,4 @@
-//! Small programs in machine code, in ELF files.
+//! Tests with small programs in machine code, which are put into ELF files.
 use object::write::{Object, SectionId, Symbol, SymbolSection};
 use object::{Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
 
@@ -38,7 +38,7 @@ fn check(parts: &[(&str, &[u16])]) -> Report {
     reachable_panics(&program(parts), &["tick"]).unwrap()
 }
 
-/// Returns BL from `at` to `to`, for short distances forward.
+/// Returns the code of a BL from `at` to `to`, for short distances forward.
 fn call(at: u32, to: u32) -> [u16; 2] {
     [0xF000, 0xF800 | ((to - at - 4) >> 1) as u16]
 }
@@ -46,7 +46,7 @@ fn call(at: u32, to: u32) -> [u16; 2] {
 #[test]
 fn a_panic_behind_two_calls_is_found_with_its_way() {
     let [a, b] = call(0, 4);
-    // `helper` ends in a conditional jump: BNE.W to 12.
+    // The last instruction of `helper` is a conditional jump (BNE.W to 12).
     let report = check(&[("tick", &[a, b]), ("helper", &[0xF040, 0x8002, RETURN, NOP]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.paths, ["tick (0x0) > helper (0x4) > core::panicking::panic_fmt"]);
     assert_eq!((report.functions, report.indirect.len()), (2, 0));
@@ -54,7 +54,7 @@ fn a_panic_behind_two_calls_is_found_with_its_way() {
 
 #[test]
 fn a_short_branch_that_leaves_its_function_counts() {
-    // CBZ r0 from 0 to 4.
+    // The instruction is CBZ r0 from 0 to 4.
     let report = check(&[("tick", &[0xB100, RETURN]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.paths, ["tick (0x0) > core::panicking::panic_fmt"]);
 }
@@ -100,7 +100,7 @@ fn data_between_code_is_no_code() {
 
 #[test]
 fn a_function_whose_address_is_formed_counts_as_called() {
-    // MOVW r0, #9; MOVT r0, #0: the address of the panic at 8, in Thumb.
+    // The instructions MOVW r0, #9 and MOVT r0, #0 load the Thumb address of the panic at 8.
     let report = check(&[("tick", &[0xF240, 0x0009, 0xF2C0, 0x0000]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.paths, ["tick (0x4) > core::panicking::panic_fmt"]);
 }
@@ -110,7 +110,7 @@ fn calls_through_a_register_are_listed_and_bridges_are_crossed() {
     // BLX r3.
     let report = check(&[("tick", &[0x4798, RETURN]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.indirect, ["tick at 0x0"]);
-    // MOVW r12, #13; MOVT r12, #0; BX r12: a jump to the panic at 12.
+    // The instructions MOVW r12, #13, MOVT r12, #0 and BX r12 jump to the panic at 12.
     let report = check(&[("tick", &[0xF240, 0x0C0D, 0xF2C0, 0x0C00, 0x4760, NOP]), (PANIC, &[0xE7FE])]);
     assert!(report.indirect.is_empty() && !report.paths.is_empty(), "{report}");
 }

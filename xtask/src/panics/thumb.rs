@@ -1,15 +1,16 @@
 //! Decodes the Thumb-2 instructions that affect the next address (ARMv7-M Architecture Reference Manual, A7.7).
 
-/// Effect of an instruction on the flow of control and on the formation of addresses.
+/// Effect of an instruction on control flow and on the computation of addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flow {
-    /// Branch to an address: B, `B<cc>`, CBZ, CBNZ or BL.
+    /// Branch to an address with B, `B<cc>`, CBZ, CBNZ or BL.
     Direct(u32),
-    /// BX, BLX, MOV or LDR to the program counter. The address is known only at run time.
+    /// Branch to a computed address with BX, BLX, or with MOV or LDR to the program counter. The address is known
+    /// only at run time.
     Indirect(u8),
-    /// MOVW: sets the lower half of a register. The upper half becomes 0.
+    /// MOVW, which sets the lower half of a register and clears the upper half.
     Low(u8, u16),
-    /// MOVT: sets the upper half of a register.
+    /// MOVT, which sets the upper half of a register.
     High(u8, u16),
     /// UDF: an abort.
     Trap,
@@ -36,7 +37,7 @@ fn narrow(address: u32, code: u32) -> Flow {
     let to = |offset: u32| Flow::Direct(address.wrapping_add(4).wrapping_add(offset));
     let register = (code >> 3 & 0xF) as u8;
     match code {
-        // BX, which is a return if it uses the link register; BLX.
+        // BX (which is a return if it uses the link register) and BLX.
         0x4700..=0x47FF if register == 14 && code & 0x80 == 0 => Flow::Other,
         0x4700..=0x47FF => Flow::Indirect(register),
         // MOV to the program counter, which is a return if it uses the link register.
@@ -63,8 +64,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
             to(signed(offset, 25))
         }
-        // UDF, and B with a condition. The values 14 and 15 are not conditions. These values encode barriers and
-        // similar instructions.
+        // UDF, and B with a condition. The condition values 14 and 15 encode barriers and similar instructions.
         (0xF000, 0x8000) if first & 0xFFF0 == 0xF7F0 && second & 0xF000 == 0xA000 => Flow::Trap,
         (0xF000, 0x8000) if first >> 7 & 7 != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | (first & 0x3F) << 12 | (second & 0x7FF) << 1;
@@ -75,7 +75,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             0xF2C0 => Flow::High(register, immediate as u16),
             _ => Flow::Other,
         },
-        // LDR to the program counter from any memory but the stack, which is used for returns.
+        // LDR to the program counter from any memory except the stack. A load from the stack is a return.
         _ if first & 0xFF70 == 0xF850 && second >> 12 == 15 && first & 0xF != 13 => Flow::Indirect(15),
         _ => Flow::Other,
     }
@@ -87,8 +87,8 @@ mod tests {
 
     const AT: u32 = 0x0800_1000;
 
-    /// Code (the two halfwords of a long instruction in reading order), and its meaning according to LLVM's assembler and disassembler:
-    /// offsets from the instruction's address + 4.
+    /// Instruction codes (the first halfword of a long instruction first), and their meaning according to LLVM's assembler and
+    /// disassembler. Offsets are relative to the instruction's address + 4.
     const BRANCHES: [(u32, i32); 11] = [
         (0xF001_F918, 4_656),      // bl
         (0xF7FE_FEE4, -4_664),     // bl

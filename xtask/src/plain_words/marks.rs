@@ -1,4 +1,5 @@
-//! Marks: words and constructions that hide the actor, or that have another meaning in most texts.
+//! Marks, which are words and constructions that hide the subject of a sentence, or that have another meaning in most
+//! texts.
 use std::sync::LazyLock;
 
 use regex::Regex;
@@ -24,7 +25,7 @@ static PATTERNS: LazyLock<Vec<(&str, Regex)>> = LazyLock::new(|| {
     MARKS.iter().filter_map(|(mark, pattern)| Some((*mark, Regex::new(pattern).ok()?))).collect()
 });
 
-/// Returns the marks in a text, with the byte at which each begins.
+/// Returns the marks in a text, with the byte position at which each mark begins.
 pub(super) fn find(words: &str) -> Vec<(&'static str, usize)> {
     let mut found = Vec::new();
     for (mark, pattern) in PATTERNS.iter() {
@@ -33,7 +34,7 @@ pub(super) fn find(words: &str) -> Vec<(&'static str, usize)> {
     found
 }
 
-/// Returns the sentence around a byte.
+/// Returns the sentence that contains a byte position.
 pub(super) fn sentence(words: &str, at: usize) -> &str {
     let start = words[..at].rfind(". ").map_or(0, |end| end + 2);
     let end = words[at..].find(". ").map_or(words.len(), |end| at + end + 1);

@@ -5,7 +5,7 @@ use ra_ap_rustc_lexer::{FrontmatterAllowed, LiteralKind, TokenKind, tokenize};
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Text {
     pub words: String,
-    /// Position in `words` at which each line of the file begins, with the number of the line.
+    /// Positions in `words` at which the lines of the file begin, with the line numbers.
     lines: Vec<(usize, usize)>,
 }
 

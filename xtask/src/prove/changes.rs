@@ -1,4 +1,5 @@
-//! Changes since a run of mutants. Only the mutants in changed parts run again, and the other results are kept.
+//! Source changes since the last mutation test. Only the mutants in changed parts are tested again, and the results
+//! of the other mutants are kept.
 use std::collections::BTreeMap;
 use std::fs::{read_to_string, write};
 use std::path::Path;
@@ -8,24 +9,24 @@ use serde_json::{Value, json};
 
 use crate::shell::{command, root};
 
-/// Changes of a file since it was tested, from `git diff -U0`.
+/// Changes of a file since its last mutation test, from `git diff -U0`.
 pub(super) struct Changes {
     pub(super) diff: String,
-    /// Pieces: first old line, number of old lines, number of new lines.
+    /// Changed pieces, each with the first old line, the number of old lines and the number of new lines.
     pieces: Vec<(u64, u64, u64)>,
 }
 
 impl Changes {
-    /// Compares `old` with the present file.
+    /// Compares `old` with the current file.
     fn of(old: &Path, file: &str) -> Result<Self> {
         let mut git = command("git");
         git.args(["diff", "--no-index", "-U0"]).arg(old).arg(file);
-        // `git diff` ends with 1 if there is a difference.
+        // The exit code of `git diff` is 1 if there is a difference.
         let diff = String::from_utf8(git.output().context("cannot start git")?.stdout)?;
         Ok(Self { pieces: diff.lines().filter_map(piece).collect(), diff })
     }
 
-    /// Returns the present number of an old line. `None`: the line was changed or removed.
+    /// Returns the current number of an old line; `None` if the line was changed or removed.
     fn now(&self, line: u64) -> Option<u64> {
         let mut shifted = line;
         for &(first, old, new) in &self.pieces {
@@ -43,7 +44,8 @@ impl Changes {
     }
 }
 
-/// Returns first old line, number of old lines and number of new lines of a header such as `@@ -12,2 +13 @@`.
+/// Parses a header such as `@@ -12,2 +13 @@`. Returns the first old line, the number of old lines and the number of
+/// new lines.
 fn piece(line: &str) -> Option<(u64, u64, u64)> {
     let (old, new) = line.strip_prefix("@@ -")?.split_once(" +")?;
     let new = new.split(' ').next()?;
@@ -51,7 +53,8 @@ fn piece(line: &str) -> Option<(u64, u64, u64)> {
     Some((old.split(',').next()?.parse().ok()?, count(old)?, count(new)?))
 }
 
-/// Returns the changes of the files in a report. The report contains their sources. Deleted files are left out.
+/// Returns the changes of the files in a report. The report contains the sources of the files. Deleted files are
+/// omitted.
 pub(super) fn changes(results: &Path, report: &Value) -> Result<BTreeMap<String, Changes>> {
     let old = results.join("old.rs");
     let mut all = BTreeMap::new();

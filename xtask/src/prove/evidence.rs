@@ -1,5 +1,5 @@
-//! docs/evidence.md, which contains generated tables between marks, and explanations of mutants that no test can
-//! detect.
+//! Reads and updates docs/evidence.md, which contains generated tables between marks, and explanations of
+//! mutants that tests cannot detect.
 use std::collections::BTreeSet;
 use std::fs::{read_to_string, write};
 
@@ -28,7 +28,8 @@ pub(super) fn table(page: &str, name: &str) -> Result<String> {
     Ok(parts(page, name)?.1.0.trim().to_owned())
 }
 
-/// Splits the page into three parts: up to the end of the first mark, between the marks, and from the second mark on.
+/// Splits the page at two marks into three parts. The first part ends with the first mark, and the third part begins
+/// with the second mark.
 fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))> {
     let (open, close) = (format!("<!-- {name} -->"), format!("<!-- end of {name} -->"));
     let missing = || format!("{PAGE} lacks `{open}` … `{close}`");
@@ -37,19 +38,19 @@ fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))>
     Ok((&page[..start], (&page[start..end], &page[end..])))
 }
 
-/// Mutant, identified without its line number: by the file, the line of source without indentation, and the change.
+/// Mutant, identified by the file, the source line without indentation, and the change, but not by a line number.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Named {
     /// Path from the root of the workspace.
     pub file: String,
-    /// Line in which the mutant begins.
+    /// Source line in which the mutant begins.
     pub line: String,
-    /// Change as described by cargo-gamma.
+    /// Change of the source, as described by cargo-gamma.
     pub change: String,
 }
 
-/// Returns the mutants that the page explains as equivalent. These are the items ``- `LINE` → `CHANGE`: sentence`` below a heading
-/// `### FILE`.
+/// Returns the mutants that the page explains as equivalent. The explanations are the items ``- `LINE` → `CHANGE`: sentence``
+/// below a heading `### FILE`.
 pub(super) fn explained(page: &str) -> BTreeSet<Named> {
     let mut file = "";
     let mut explained = BTreeSet::new();
@@ -59,7 +60,7 @@ pub(super) fn explained(page: &str) -> BTreeSet<Named> {
         }
         let item = text.strip_prefix("- `").and_then(|rest| rest.split_once("` → `"));
         let Some((line, rest)) = item else { continue };
-        // A mutant without a sentence is not explained.
+        // A mutant without a sentence is treated as not explained.
         let Some((change, sentence)) = rest.split_once("`: ") else { continue };
         if !sentence.trim().is_empty() {
             explained.insert(Named { file: file.into(), line: line.into(), change: change.into() });

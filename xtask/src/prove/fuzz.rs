@@ -1,4 +1,5 @@
-//! `cargo xtask prove fuzz`: runs the fuzz targets with cargo-fuzz on the nightly toolchain. Installs both if they are missing.
+//! `cargo xtask prove fuzz`: runs the fuzz targets with cargo-fuzz on the nightly toolchain. Installs cargo-fuzz and
+//! the toolchain if they are missing.
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::create_dir_all;
@@ -12,14 +13,14 @@ use crate::shell::{self, command, root, run, works};
 
 const RUNS: &str = "20000000";
 const PORTION: u64 = 500_000;
-/// Number of executions of a target that are also guided by comparisons, which finds keywords and constants. All others
-/// are guided only by the reached code, which is two to three times as fast.
+/// Number of executions of a target that are also guided by comparisons, in order to find keywords and constants. All
+/// other executions are guided only by code coverage, which is two to three times as fast.
 const COMPARING: u64 = 1_000_000;
 /// Name of the table in docs/evidence.md.
 const TABLE: &str = "fuzz";
 
-/// Option that limits the length of inputs. Longer inputs only repeat the contents of shorter ones, and are slow. Kept inputs
-/// must be readable and small enough for git.
+/// Option that limits the length of inputs. Longer inputs are slow and only repeat the contents of shorter inputs. Kept
+/// inputs must be readable and small enough for git.
 const LENGTH: &str = "-max_len=4096";
 
 /// Returns a command of the nightly toolchain, without the variables of the pinned toolchain.
@@ -60,7 +61,7 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
             done += portion;
         }
         if keep {
-            // The merge ignores how often code is reached, so that it keeps few inputs.
+            // The merge ignores how often code is executed, so that only few inputs are kept.
             let merge = ["-set_cover_merge=1", "-use_counters=0", LENGTH];
             run(&mut fuzz(&target, &COMPARISONS, &[directories[1], directories[0]], &merge))?;
         }
@@ -79,7 +80,7 @@ fn install() -> Result<()> {
     Ok(())
 }
 
-/// Returns the folders of inputs: found inputs, kept inputs, and regressions if there are any.
+/// Returns the folders of found inputs and kept inputs, and the folder of regressions if it exists.
 fn directories(target: &str) -> Result<Vec<String>> {
     // Found inputs accumulate in the build folder, outside git. Kept inputs are in git.
     let mut directories = vec![format!("fuzz/target/corpus/{target}"), format!("fuzz/corpus/{target}")];
@@ -121,7 +122,7 @@ fn executions(table: &str, target: &str) -> u64 {
     rows(table).iter().filter(|((name, _), _)| name == target).map(|(_, executions)| executions).sum()
 }
 
-/// Returns the table with `portion` more executions of `target` on `commit`.
+/// Returns the table after adding `portion` executions of `target` on `commit`.
 fn with(table: &str, target: &str, commit: &str, portion: u64) -> String {
     let mut rows = rows(table);
     *rows.entry((target.into(), commit.into())).or_default() += portion;
@@ -137,8 +138,8 @@ const COMPARISONS: [&str; 0] = [];
 /// Arguments of the build that is guided only by coverage, in a separate folder so that neither build is repeated.
 const COVERAGE: [&str; 2] = ["--no-trace-compares", "--target-dir=fuzz/target/coverage"];
 
-/// Returns the command that runs the fuzzer on `directories`. New inputs are written to the first one. The address sanitizer is off,
-/// because the code has no `unsafe` and the fuzzer is several times as fast without it.
+/// Returns the command that runs the fuzzer on `directories`. New inputs are written to the first folder. The address sanitizer is
+/// off, because the code has no `unsafe` and the fuzzer is several times as fast without it.
 fn fuzz(target: &str, build: &[&str], directories: &[&str], options: &[&str]) -> Command {
     let mut fuzz = nightly(&["cargo", "fuzz", "run", "-s", "none"]);
     fuzz.args(build).arg(target).args(directories).arg("--").args(options);

@@ -1,5 +1,5 @@
-//! `cargo xtask prove mutants`: mutation testing of the crates that run on a board with cargo-gamma, which builds all
-//! mutants into one set of test programs. The changes to make are in gamma.toml.
+//! `cargo xtask prove mutants`: uses cargo-gamma for mutation testing of the crates that run on a board. cargo-gamma
+//! builds all mutants into one set of test programs. The file gamma.toml defines the changes that create mutants.
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::{create_dir_all, read_to_string, write};
@@ -13,23 +13,24 @@ use super::changes::{changes, complete};
 use super::evidence::{self, Named};
 use crate::shell::{self, cargo, command, run, target, works};
 
-/// Version of cargo-gamma. Reports of other versions may differ.
+/// Version of cargo-gamma. The report format of other versions may differ.
 const VERSION: &str = "0.4.0";
 const REPORT: &str = "gamma-report.json";
-/// File with the commit that the report is about.
+/// File with the commit that was tested for the report.
 const COMMIT: &str = "commit";
-/// Crates that run on a board. The crates with the fastest tests come first.
+/// Crates that run on a board. The crates with the fastest tests are first in the list.
 const PACKAGES: [&str; 5] = ["jtc-bus", "jtc-dynamics", "jtc-wire", "ucom", "jtc-core"];
-/// Crates whose tests are run on the mutants of `ucom`. Its board is also tested from the PC's side.
+/// Crates whose tests are run on the mutants of `ucom`. The board side of `ucom` is also tested by tests of the PC
+/// side.
 const JUDGES_OF_UCOM: [&str; 3] = ["ucom", "ucom-sim", "ucom-host"];
 /// Largest share of a crate's mutants that may survive, including explained ones.
 const SURVIVING_MAX: f64 = 0.03;
 
-/// Results of the mutants of a crate.
+/// Results of the mutation test of a crate.
 #[derive(Default)]
 struct Tally {
     killed: usize,
-    /// Number of mutants that made a test run without end. This is treated as a failure of the test.
+    /// Number of mutants with which a test did not end. A test that does not end is treated as a failed test.
     endless: usize,
     equivalent: usize,
     unexplained: Vec<String>,
@@ -49,16 +50,16 @@ impl Tally {
     }
 }
 
-/// Selection of mutants of a crate.
+/// Selection of the mutants of a crate to be tested.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Which {
     /// All mutants.
     All,
-    /// Mutants that survived the last run.
+    /// Mutants that survived the last mutation test.
     Survivors,
-    /// Mutants on lines that have changed since the last run.
+    /// Mutants on lines that have changed since the last mutation test.
     Changed,
-    /// Mutants that an interrupted run has not reached.
+    /// Mutants that an interrupted mutation test has not reached.
     Left,
 }
 
@@ -129,12 +130,12 @@ fn program() -> PathBuf {
     target().join("tools/bin/cargo-gamma")
 }
 
-/// Returns the folder of a crate's results.
+/// Returns the folder with the results of a crate.
 fn results(package: &str) -> PathBuf {
     target().join("mutants").join(package)
 }
 
-/// Runs cargo-gamma for one crate. Its exit code depends on the mutants, so the result is judged from its report.
+/// Runs cargo-gamma for one crate. The exit code depends on the mutants, so the result is determined from the report.
 fn campaign(package: &str, which: Which) -> Result<()> {
     let results = results(package);
     create_dir_all(&results).with_context(|| format!("cannot create {}", results.display()))?;
@@ -145,7 +146,8 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     let commit = commit()?;
     let mut gamma: Command = command(program());
     gamma.args(["gamma", "run", "--color", "never", "--progress", "never"]);
-    // This profile keeps all assertions and optimises the crates that compute, because simulated arms need most of the time.
+    // The profile contains all assertions and optimises the crates that compute, because simulated arms need most of
+    // the time.
     gamma.args(["--profile", "release"]);
     gamma.arg("--artifact-dir").arg(&results);
     if which == Which::Left {
@@ -169,7 +171,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     }
     println!("== {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
-    // Exit code 2 means that too many mutants survived. This is not an error here.
+    // Exit code 2 means that too many mutants survived. Exit code 2 is not treated as an error here.
     ensure!(
         matches!(status.code(), Some(0 | 2)),
         "cargo-gamma ended with {status}; go on with `cargo xtask prove mutants --package {package} --resume`"
@@ -249,7 +251,7 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
                         tally.unexplained.push(format!("{file}:{at}\n- `{line}` → `{change}`:"));
                     }
                 }
-                // The mutant does not compile, or was not in this run.
+                // The mutant does not compile, or was not tested in this run.
                 _ => {}
             }
         }
@@ -257,7 +259,7 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Returns the table with a row for each crate. A crate without results on this computer keeps its present row.
+/// Returns the table with a row for each crate. The row of a crate without results on this computer does not change.
 fn table(tallies: &BTreeMap<&str, (Tally, String)>, before: &str) -> String {
     let mut table = String::from(
         "| crate | mutants | killed | never ended | equivalent | unexplained | alive | commit |\n\

@@ -1,5 +1,5 @@
-//! The board and its environment: firmware, a simulated arm with drives and gripper on the joint bus, and a host on a
-//! serial line.
+//! The board with its firmware and its environment: a simulated arm with drives and gripper on the joint bus, and a
+//! host on each serial line.
 use std::cell::{Ref, RefCell};
 use std::rc::Rc;
 
@@ -113,7 +113,8 @@ impl Board {
         self.ms
     }
 
-    /// Advances everything by one millisecond: first the machine and the bus, then the drives and the arm.
+    /// Advances the board and its environment by one millisecond. The machine and the bus advance first, and then the
+    /// drives and the arm.
     pub fn step(&mut self) {
         self.ms += 1;
         self.machine.run_until(self.ms * MILLISECOND);
@@ -185,7 +186,7 @@ impl Board {
         self.machine.chip().usarts[Self::index(port)].host_baud = baud;
     }
 
-    /// Returns the rate that the firmware has set at a port, bit/s; 0 if it has set none.
+    /// Returns the rate that the firmware has set at a port, bit/s; 0 if no rate is set.
     pub fn firmware_baud(&self, port: Port) -> u32 {
         self.machine.uc.get_data().usarts[Self::index(port)].baud()
     }

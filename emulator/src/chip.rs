@@ -226,7 +226,7 @@ impl Chip {
         self.update_clocks();
     }
 
-    /// Drives a pin from outside; `None` leaves it open. EXTI detects the edges.
+    /// Drives a pin from outside; with `None`, the pin is not connected. EXTI detects the edges.
     pub fn drive_pin(&mut self, pin: Pin, level: Option<bool>) {
         let Some(port) = Gpio::port(pin) else { return };
         let before = self.gpio.levels(port);
@@ -286,7 +286,7 @@ impl Chip {
         timers.chain(usarts).chain(others).min().unwrap_or(NEVER)
     }
 
-    /// Returns the supply and voltage scale of the PWR registers: CR3 and the VOS code of D3CR.
+    /// Returns supply and voltage scale, which are the PWR register CR3 and the VOS code of D3CR.
     pub fn supply(&self) -> (u32, u32) {
         (self.plain.read(PWR + 0x0C), self.plain.read(PWR + 0x18) >> 14 & 3)
     }

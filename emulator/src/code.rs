@@ -1,4 +1,4 @@
-//! Properties of an instruction that the machine must know before executing it, stored per address.
+//! Properties of instructions that the machine must know before it executes an instruction; stored for each address.
 //!
 //! Unicorn executes `SEV` without effect, does not report changes of the stack pointer, and skips the instructions of
 //! an IT block whose condition is false. When an address is executed for the first time, the machine therefore

@@ -27,7 +27,7 @@ mod raised {
     pub const EXCEPTION_EXIT: u32 = 8;
 }
 
-/// Branches to this address and above are exception returns.
+/// Start of the address range of exception returns. A branch to such an address returns from an exception.
 const EXC_RETURN: u32 = 0xFFFF_FFE0;
 
 impl Machine {
@@ -334,7 +334,7 @@ fn half_word(uc: &Unicorn<'_, Chip>, address: u32) -> u16 {
     u16::from_le_bytes(bytes)
 }
 
-/// Returns `true` if the masks no longer block a pending exception.
+/// Returns `true` if the current masks permit a pending exception.
 fn unmasked(uc: &Unicorn<'_, Chip>) -> bool {
     let read = |register: RegisterARM| uc.reg_read(register).unwrap_or(0);
     let masks = Masks {

@@ -10,7 +10,7 @@ const TO_PERIPHERAL: u32 = 0x40;
 const CIRC: u32 = 0x100;
 const MINC: u32 = 0x400;
 
-/// Flags of a stream, as positions within its six bits of LISR or HISR.
+/// Flags of a stream, as bit positions within the six bits of the stream in LISR or HISR.
 const HTIF: u32 = 1 << 4;
 const TCIF: u32 = 1 << 5;
 const TEIF: u32 = 1 << 3;
@@ -18,7 +18,7 @@ const TEIF: u32 = 1 << 3;
 /// Interrupt lines of the streams.
 pub const LINES: [usize; STREAMS] = [11, 12, 13, 14, 15, 16, 17, 47, 56, 57, 58, 59, 60, 68, 69, 70];
 
-/// Memory as the DMA controllers access it.
+/// Memory that the DMA controllers access.
 pub trait Memory {
     /// Reads bytes; returns `false` at an unmapped address.
     fn read(&mut self, address: u32, bytes: &mut [u8]) -> bool;

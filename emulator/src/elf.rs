@@ -1,4 +1,4 @@
-//! The firmware's ELF file: segments with their load addresses, and symbols.
+//! ELF file of the firmware, with symbols and with segments and their load addresses.
 use std::collections::BTreeMap;
 use std::fmt;
 

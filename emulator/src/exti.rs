@@ -9,8 +9,8 @@ const LINES: usize = 16;
 pub struct Exti {
     rtsr: u32,
     ftsr: u32,
-    /// Interrupt mask of core 1. In this model a masked line gets no pending bit, which is the stricter interpretation
-    /// of the manual.
+    /// Interrupt mask of core 1. In this model, a masked line does not set its pending bit, which is the stricter
+    /// interpretation of the manual.
     imr: u32,
     emr: u32,
     pending: u32,

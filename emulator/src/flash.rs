@@ -1,6 +1,6 @@
 //! Bank 2 of the embedded flash (RM0399 chapter 4). Erasing and programming take time, and a read during an operation
 //! stalls the core. After a loss of power during an operation, the contents are undefined. Bank 1 contains the program
-//! and stays locked.
+//! and remains locked.
 mod bank;
 
 use crate::clock::{MICROSECOND, SECOND, Time};
@@ -57,7 +57,7 @@ pub mod sr {
 /// Kind of a flash operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OperationKind {
-    /// Erasing a sector, after which all its bits are 1.
+    /// Erasing a sector, which sets all its bits to 1.
     Erase {
         /// Number of the sector.
         sector: usize,
@@ -90,7 +90,8 @@ pub struct Flash {
     pub program_time: Time,
     /// All operations, oldest first.
     pub operations: Vec<Operation>,
-    /// Reads and writes that waited for an operation: time, and duration for which the core was stalled.
+    /// Reads and writes that waited for an operation, each with its time and the duration for which the core was
+    /// stalled.
     pub stalls: Vec<(Time, Time)>,
     /// Number of accesses to the bank while the protection unit allowed the core to cache or prefetch it.
     pub ahead: u32,
@@ -163,7 +164,7 @@ impl Flash {
         self.running.map(|operation| operation.end).filter(|end| *end > now)
     }
 
-    /// Applies the operation if it has ended by now.
+    /// Completes the running operation if its end time has passed.
     pub fn advance(&mut self, now: Time) {
         let Some(operation) = self.running.take_if(|operation| operation.end <= now) else { return };
         self.guard(operation.end, true);

@@ -1,7 +1,7 @@
 //! Pins (RM0399 chapter 12) that external signals can drive, with a record of every change that the firmware makes.
 use crate::clock::Time;
 
-/// A pin: port letter and number.
+/// A pin, as port letter and number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Pin(pub char, pub u8);
 
@@ -144,12 +144,12 @@ impl Gpio {
         Self::place(pin).map(|(port, _)| port)
     }
 
-    /// Returns the levels on the pins of a port: IDR.
+    /// Returns the levels on the pins of a port (register IDR).
     pub fn levels(&self, port: usize) -> u32 {
         self.ports.get(port).map_or(0, Port::idr)
     }
 
-    /// Drives a pin from outside; `None` leaves it open.
+    /// Drives a pin from outside; with `None`, the pin is not connected.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         let Some((index, bit)) = Self::place(pin) else { return };
         let port = &mut self.ports[index];
@@ -165,7 +165,7 @@ impl Gpio {
         port.is_output(bit).then_some(port.odr >> bit & 1 == 1)
     }
 
-    /// Returns the pull resistor of a pin: PUPDR.
+    /// Returns the pull resistor of a pin (register PUPDR).
     pub fn pull(&self, pin: Pin) -> u32 {
         Self::place(pin).map_or(0, |(index, bit)| self.ports[index].pupdr >> (2 * bit) & 3)
     }

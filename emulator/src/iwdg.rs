@@ -68,7 +68,7 @@ impl Iwdg {
         (u64::from(self.reload) + 1) * divider * SECOND / LSI_HZ
     }
 
-    /// Returns the time at which the watchdog resets the machine if it is not fed.
+    /// Returns the time at which the watchdog resets the machine if the firmware does not feed it.
     pub fn bites(&self) -> Time {
         self.bites
     }

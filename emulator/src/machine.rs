@@ -133,7 +133,7 @@ impl Machine {
     }
 
     /// Returns the contents of flash bank 2 after a power failure at this moment. Words that are being erased or
-    /// programmed get random contents from `seed`.
+    /// programmed contain random values generated from `seed`.
     pub fn cut_power(&self, seed: u64) -> Bank2 {
         self.uc.get_data().flash.cut(self.now(), seed)
     }

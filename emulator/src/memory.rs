@@ -8,7 +8,7 @@ use crate::flash::{BANK2, BANK2_SIZE};
 use crate::nvic::exception;
 use crate::rcc::Gate;
 
-/// Memory as the peripherals access it.
+/// Memory that the peripherals access.
 pub(crate) struct Ram<'a>(pub Unicorn<'a, Chip>);
 
 impl Memory for Ram<'_> {

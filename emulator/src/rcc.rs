@@ -167,8 +167,8 @@ impl Rcc {
         let offset = if reg::C1.contains(&offset) { offset - reg::C1_OFFSET } else { offset };
         let value = self.plain.read(offset);
         match offset {
-            // Each oscillator is ready as soon as it is on (HSI, CSI, HSI48, HSE, PLL1..3). The ready flags of HSIDIV
-            // and of the domains are always set.
+            // Each oscillator (HSI, CSI, HSI48, HSE, PLL1..3) is ready as soon as it is switched on. The ready flags
+            // of HSIDIV and of the domains are always set.
             reg::CR => {
                 let ready = (value & 1) << 2
                     | (value >> 7 & 1) << 8

@@ -28,7 +28,7 @@ pub struct WireByte {
     pub byte: u8,
 }
 
-/// A serial port and the line to its host.
+/// A serial port and the serial line to its host.
 pub struct Usart {
     rx_request: u32,
     tx_request: u32,
@@ -138,7 +138,7 @@ impl Usart {
         };
     }
 
-    /// Returns the bit rate that the registers set, bit/s; 0 if none is set.
+    /// Returns the bit rate that the registers set, bit/s; 0 if no rate is set.
     pub fn baud(&self) -> u32 {
         if self.bit == NEVER { 0 } else { (SECOND as f64 / self.bit as f64).round() as u32 }
     }

@@ -20,8 +20,8 @@ fn expected() -> BTreeSet<u16> {
     [0x200, 0x210, 0x2F0].into_iter().flat_map(|base| (0..7).map(move |node| base + node)).collect()
 }
 
-/// J-10: the configuration of the controller, with the register names of RM0399. The registers contain each value
-/// minus one.
+/// J-10: the configuration of the controller, with the register names of RM0399. The registers contain these
+/// values minus one.
 #[test]
 fn j10_registers_of_the_controller() {
     for board in BOARDS {
@@ -230,7 +230,7 @@ fn j14_j23_a_silent_gripper_is_shown_and_takes_nothing_away() {
     assert_eq!((status.can_error, status.can_current), (0, 1 << 14));
 }
 
-/// J-15: a frame that is too short for its identifier is ignored, whichever node sends it.
+/// J-15: a frame that is too short for its identifier is ignored, for every node that may send it.
 #[test]
 fn j15_short_answers_are_no_answers() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });

@@ -67,7 +67,7 @@ fn unharmed(mut rig: Rig) {
 
 /// J-03, J-04, J-05: the records on the line equal the records of a parser that receives all bytes. Two kinds of
 /// exceptions are counted: noise that was merged with another record, and records that were lost because more than 64
-/// were waiting.
+/// records were waiting.
 #[test]
 fn j03_records_of_kept_streams_are_those_of_the_reference() {
     let mut rig = fast();

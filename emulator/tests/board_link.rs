@@ -12,7 +12,7 @@ use rig::{BOARDS, PORTS, Rig, elf, fast_elf, index};
 const A: Port = Port::Usart2;
 const B: Port = Port::Usart3;
 
-/// Returns a segment 0 of 1 with this number of points, all at position 0.
+/// Returns the only segment of a trajectory with this number of points, all at position 0.
 fn segment(points: usize) -> Vec<u8> {
     let mut frame = vec![0; 60_000];
     let still = std::iter::repeat_n(RawPoint::default(), points);
@@ -167,8 +167,8 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
         let begin = rig.board.machine.now();
         rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
         let end = *rig.hosts[index(port)].times.last().expect("a status");
-        // Six bytes are received, at most one tick passes, and 175 bytes are sent, at 86.8 µs per byte. The record
-        // comes later if a periodic status was sent just before.
+        // The delay consists of six received bytes, at most one tick, and 175 sent bytes, at 86.8 µs per byte. The
+        // record is sent later if a periodic status was sent just before it.
         let took = to_us(end - begin);
         let without_waiting = 181 * 87 + 1_200;
         assert!(took < without_waiting + 15_300, "{took} µs");

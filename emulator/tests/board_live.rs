@@ -1,4 +1,4 @@
-//! The command `jtc` as a user runs it, connected through a pseudo-terminal to the board's firmware, in real time.
+//! Real-time tests of the command `jtc`, which is connected to the board's firmware through a pseudo-terminal.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read};
@@ -133,7 +133,7 @@ fn a_session_at_the_command_line() {
     live.jtc(&["params", "use-defaults"]).ends(0);
     live.wait_for("state", "HoldPos");
 
-    // The complete sequence: upload, approach, execution.
+    // The complete sequence consists of upload, approach and execution.
     let file = live.directory.join("motion.csv");
     std::fs::write(&file, motion()).expect("a file");
     let file = file.to_str().expect("UTF-8");

@@ -47,8 +47,8 @@ fn replayed(rig: &Rig) -> Vec<Telemetry> {
         .collect()
 }
 
-/// The log of the board equals the log of the recorder on the PC in every word. A replay on the PC gives the values
-/// that the board computed, for at least two seconds before the error and 0.3 s after it.
+/// The log of the board equals the log of the recorder on the PC in every word. A replay on the PC computes the
+/// values that the board computed, for at least two seconds before the error and 0.3 s after it.
 #[test]
 fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     let mut rig = moving();

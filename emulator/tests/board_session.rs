@@ -253,8 +253,8 @@ fn j12_one_broadcast_a_tick_and_its_answers() {
         assert_eq!(own, 1, "ms {ms}");
         entries.extend(rig.bus.iter().cloned());
     }
-    // The frames are grouped by ticks, from one broadcast to the next. Ticks need not begin with the milliseconds of
-    // this test.
+    // The frames are grouped by ticks, from one broadcast to the next. A tick does not need to begin at the start of
+    // a millisecond of this test.
     let first = entries.iter().position(|e| e.from_controller).expect("a broadcast");
     let rounds: Vec<_> = entries[first..].chunk_by(|_, next| !next.from_controller).collect();
     let mut starts = Vec::new();

@@ -215,8 +215,8 @@ fn j12_no_tick_is_late_while_the_flash_works() {
     }
 }
 
-/// J-54: the power fails at every operation of a store: before it, in the middle of it, and after it. The board then
-/// starts with either the complete old image or the complete new image, and can store the next image.
+/// J-54: the power fails before, during and after every operation of a store. The board then starts with either the
+/// complete old image or the complete new image, and can store the next image.
 #[test]
 fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     let images = [image(200, 1), image(IMAGE_MAX, 2), image(260, 3)];
@@ -340,8 +340,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
         rig.wait("the operation", 4_000, |rig| {
             let operations = &rig.board.machine.chip().flash.operations;
             let last = operations.last().map(|operation| operation.kind);
-            // An erase operation takes long. Words are written within milliseconds, and writing of the current or
-            // the next word fails.
+            // An erase operation takes a long time. Words are written within milliseconds, and writing of the
+            // current or the next word fails.
             last.is_some_and(|kind| matches!(kind, OperationKind::Program { .. }) == program)
                 && (program || rig.board.machine.chip().flash.busy_until(0).is_some())
         });

@@ -48,11 +48,11 @@ impl Pll {
     }
 }
 
-/// PLL1, output P: the core.
+/// PLL1, whose output P is the clock of the core.
 pub const CORE: Pll = Pll { m: 4, n: if SMPS { 400 } else { 480 }, divide: 2 };
-/// PLL2, output Q: the CAN controller.
+/// PLL2, whose output Q is the clock of the CAN controller.
 pub const CAN: Pll = Pll { m: 4, n: 170, divide: 4 };
-/// PLL3, output Q: both serial lines.
+/// PLL3, whose output Q is the clock of both serial lines.
 pub const SERIAL: Pll = Pll { m: 4, n: 180, divide: 3 };
 
 /// Core, Hz.

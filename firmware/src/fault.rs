@@ -77,13 +77,13 @@ impl LastWords {
     }
 }
 
-/// Origin of this start.
+/// Cause of this program start, and data of the previous program run.
 pub struct Boot {
     /// Cause of the start.
     pub cause: Cause,
-    /// Number of this start since power-on.
+    /// Number of this program start, counted since power-on.
     pub boots: u32,
-    /// `true` if power was off before this start.
+    /// `true` if the power was off before this start.
     pub lost_power: bool,
     /// Record of the failure that ended the previous program run, and its last tick if the flight record is valid.
     last_words: LastWords,
@@ -202,7 +202,7 @@ unsafe extern "C" {
 }
 
 extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
-    // Indices of words in the frame that the processor pushed: r0..r3, r12, lr, pc, xpsr.
+    // Indices of words in the stack frame that the processor pushed, which contains r0..r3, r12, lr, pc and xpsr.
     const LR: usize = 5;
     const PC: usize = 6;
     let (bottom, top) = (&raw const _stack_end as usize, &raw const _stack_start as usize);

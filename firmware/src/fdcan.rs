@@ -1,5 +1,5 @@
-//! The joint bus: FDCAN1 with dedicated buffers (J-10). Only the tick uses the joint bus, and the controller does not
-//! cause interrupts.
+//! Driver of the joint bus, which uses FDCAN1 with dedicated buffers (J-10). Only the tick uses the joint bus, and
+//! the controller does not cause interrupts.
 //!
 //! At most one frame is sent per tick. There are two transmit buffers, which are used alternately. If a frame is
 //! still unsent when the next tick runs, the tick cancels it. A transmission that has already begun is

@@ -1,9 +1,9 @@
-//! The flight record: all inputs and outputs of the last tick.
+//! The flight record, which contains all inputs and outputs of the last tick.
 //!
-//! The record is in memory that keeps its contents over a reset, under the symbol `FLIGHT`. Every tick writes its
-//! inputs before the controller runs, and its outputs afterwards. A tool that reads the record after every tick can run
-//! the same ticks on a PC, and must get identical bits. For host frames, the record contains only type, length and CRC.
-//! The bytes of the frames are known only to the host.
+//! The record is in memory that survives a reset, under the symbol `FLIGHT`. Every tick writes its inputs before the
+//! controller runs, and its outputs afterwards. A tool that reads the record after every tick can repeat these ticks on
+//! a PC, and must compute bit-identical outputs. For host frames, the record contains only type, length and CRC. The
+//! bytes of the frames are known only to the host.
 //!
 //! All numbers are little-endian, as in the processor's memory. The structures below define the layout and have no
 //! hidden padding. [`Flight::LAYOUT`] changes if the layout changes.
@@ -102,7 +102,7 @@ pub struct Flight {
     pub layout: u16,
     /// Size of the record, bytes.
     pub size: u16,
-    /// Progress of the tick: one of the `PHASE_` constants.
+    /// Progress of the tick, as one of the `PHASE_` constants.
     pub phase: u32,
     /// Cause of the start of this program, as the code of a [`crate::reset::Cause`].
     pub cause: u32,
@@ -143,7 +143,7 @@ pub struct Flight {
     pub status: u8,
     /// Frame that was sent on the joint bus.
     pub sent: FlightFrame,
-    /// Index of the current point; points are 1 ms apart.
+    /// Index of the current trajectory point; points are 1 ms apart.
     pub point: u32,
     /// Current error word.
     pub errors: u16,
@@ -159,7 +159,7 @@ pub struct Flight {
 const _: () = assert!(size_of::<Flight>() == 848 && core::mem::offset_of!(Flight, torque) == 800);
 
 impl Flight {
-    /// First word of a record: "JTCF".
+    /// First word of a record, which contains "JTCF".
     pub const MAGIC: u32 = u32::from_le_bytes(*b"JTCF");
     /// Version of the layout of the record.
     pub const LAYOUT: u16 = 3;

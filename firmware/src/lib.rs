@@ -1,8 +1,8 @@
 //! The parts of the firmware that do not depend on hardware: clock arithmetic, the memory layout of the CAN
 //! controller, the statuses for two serial lines, the causes of a reset, and the records that tools read.
 //!
-//! The program itself is in `main.rs` and its modules; it is built for the board only. This library is also built and
-//! tested on the PC with `cargo test --target x86_64-unknown-linux-gnu`.
+//! The program itself is in `main.rs` and its modules, and is built only for the board. This library is also built
+//! and tested on the PC with `cargo test --target x86_64-unknown-linux-gnu`.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
@@ -28,7 +28,7 @@ pub const BOARD: &str = match (
     ),
 };
 
-/// Rate of both serial lines, Bd: `OPENJTC_BAUD` at build time.
+/// Rate of both serial lines, Bd; set by `OPENJTC_BAUD` at build time.
 pub const BAUD: u32 = match u32::from_str_radix(env!("OPENJTC_BAUD"), 10) {
     Ok(baud) => baud,
     Err(_) => panic!("the build script checks it"),

@@ -1,5 +1,5 @@
-//! Two serial lines share one controller. A response record is sent on the line on which its frame arrived. The
-//! status on the other line does not contain the record (J-04).
+//! Statuses for the two serial lines of one controller. A response record is sent on the line on which its
+//! frame arrived. The status on the other line does not contain the record (J-04).
 use jtc_wire::{STATUS_LEN, crc16, field::status as field};
 
 /// Serial lines.

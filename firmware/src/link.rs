@@ -1,8 +1,9 @@
-//! Converts bytes to frames. Each line has its own parser, whose events go to the tick in batches, through one slot.
+//! Converts bytes to frames. Each serial line has its own parser, whose events are passed to the tick in batches,
+//! through one slot.
 //!
 //! A batch is a copy, so that a parser can accept more bytes while the tick executes a long frame in slices. If bytes
 //! arrive faster than the tick executes frames, the parser's buffer becomes full, then the ring. After that, bytes
-//! are lost. Stop and Pause are not lost, because the tick searches the received bytes for them itself.
+//! are lost. Stop and Pause are not lost, because the tick itself searches the received bytes for these commands.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -18,7 +19,7 @@ use crate::uart;
 
 /// Inter-byte timeout, µs. A frame ends if the line is silent for this time (J-03).
 pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
-/// Largest number of bytes passed to a parser at once.
+/// Largest number of bytes that are passed to a parser in one call.
 const CHUNK: usize = 1024;
 /// Largest number of passes of the loop before the links wait for the next tick.
 const ROUNDS: usize = 64;
@@ -87,7 +88,7 @@ impl SlotOut {
     }
 }
 
-/// A line and its parser.
+/// A serial line and its parser.
 pub struct Link {
     line: usize,
     uart: uart::Receiver,

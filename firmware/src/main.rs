@@ -4,8 +4,8 @@
 //! times per second. The tick owns the controller, the joint bus, the safety wires and the LEDs, and is never delayed
 //! by more than a few instructions. The *links* ([`link`]) run in the remaining time, take bytes from both serial lines
 //! and split them into frames. The links pass frames to the tick in batches, through one slot. The tick passes statuses
-//! directly to the DMA of the lines. A Stop or a Pause does not depend on the links or the slot: the tick searches the
-//! bytes that DMA has received for them. The links also write the stored arm ([`arm_store`]), one step per pass.
+//! directly to the DMA of the lines. Stop and Pause do not depend on the links or the slot, because the tick searches
+//! the received bytes for these commands. The links also write the stored arm ([`arm_store`]), one step per pass.
 //!
 //! All code that does not access hardware is in the library of this package and in `jtc-core`, and is tested on a PC.
 #![no_std]
@@ -34,7 +34,7 @@ mod summary;
 mod tick;
 mod uart;
 
-/// Identity of this firmware, at a fixed address.
+/// Version record of this firmware, at a fixed address.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".version")]
 #[used]

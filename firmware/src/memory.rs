@@ -12,7 +12,7 @@ use jtc_wire::{ANSWER_MAX, EventBatch, FRAME_MAX, RawPoint};
 use crate::arm_store;
 use crate::uart::RING;
 
-/// A value outside .data and .bss, so no code initialises it before [`take`].
+/// A value outside of .data and .bss, which is not initialised before [`take`] is called.
 #[repr(C, align(32))]
 struct Place<T>(UnsafeCell<MaybeUninit<T>>);
 
@@ -83,10 +83,10 @@ static BATCH: Place<EventBatch> = Place::new();
 /// Memory for the stored arm, and for the next arm to be stored.
 #[unsafe(link_section = ".axisram")]
 static ARMS: Place<[arm_store::Buffer; 2]> = Place::new();
-/// Buffers into which the lines' DMA writes; not cached.
+/// Buffers that the DMA of the serial lines writes; not cached.
 #[unsafe(link_section = ".sram1")]
 static RINGS: Place<[[u8; RING]; 2]> = Place::new();
-/// Buffers from which the lines' DMA reads; not cached.
+/// Buffers that the DMA of the serial lines reads; not cached.
 #[unsafe(link_section = ".sram1")]
 static STATUSES: Place<[[u8; ANSWER_MAX]; 2]> = Place::new();
 /// Buffers in which frames are assembled, one for each line.
@@ -143,7 +143,7 @@ const REGIONS: [(u32, u32, u32); 7] = [
     (0x0000_0000, 16, NO_ACCESS),
     // Memory below the stack, so that a stack overflow causes a fault at the store that overflows.
     (0x1FFC_0000, 18, NO_ACCESS),
-    // Memory that DMA reads and writes: normal memory, not cached.
+    // Memory that DMA reads and writes; the region is normal memory and not cached.
     (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     // Memory that the flight recorder writes.
     (0x3004_0000, 15, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),

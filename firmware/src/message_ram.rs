@@ -1,4 +1,4 @@
-//! The CAN controller's message memory: its filters and the position of each buffer (J-10).
+//! Layout of the CAN controller's message memory, with the filters and the position of each buffer (J-10).
 //!
 //! Each of the 21 possible answers of the nodes has a dedicated buffer. The buffers are in the order of the
 //! identifiers. The controller rejects all other frames. A buffer that was not read is not overwritten.
@@ -6,10 +6,10 @@ use jtc_bus::{MAX_LEN, NODES, id};
 
 /// Size of the message memory, bytes.
 pub const BYTES: usize = 10 * 1024;
-/// Number of receive buffers: answers of seven nodes to Move, ChangeFsm and ChangeMode.
+/// Number of receive buffers, which are for the answers of seven nodes to Move, ChangeFsm and ChangeMode.
 pub const RX: usize = 3 * NODES;
-/// Number of transmit buffers. One is for the frame of this tick, and one for the frame of the last tick while it is
-/// being cancelled.
+/// Number of transmit buffers. The two buffers are for the frame of this tick, and for the frame of the last tick
+/// while it is being cancelled.
 pub const TX: usize = 2;
 /// Number of words per buffer: two words for the header, and the other words for the payload.
 pub const BUFFER_WORDS: usize = 2 + MAX_LEN / 4;

@@ -15,7 +15,8 @@ const PIECE: usize = 2048;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// Result for the tick and for debuggers: length of the program in bytes (0 until all bytes are read), and CRC-32.
+/// Result for the tick and for debuggers, which consists of the length of the program in bytes (0 until all bytes are
+/// read) and its CRC-32.
 #[unsafe(no_mangle)]
 #[used]
 pub static PROGRAM: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];

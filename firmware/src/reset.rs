@@ -54,7 +54,7 @@ const POWER_ON: u32 = 1 << 23;
 const SOFTWARE: u32 = 1 << 24;
 const WATCHDOG: u32 = 1 << 26;
 
-/// Returns `true` if the memory has lost its contents, so that the data of the last program is invalid.
+/// Returns `true` if the memory has lost its contents, so that the data of the previous program run are invalid.
 pub const fn lost_power(rsr: u32) -> bool {
     rsr & (POWER_ON | BROWN_OUT) != 0
 }

@@ -1,6 +1,6 @@
 //! The tick, which is the interrupt of TIM7 with the highest priority, a thousand times per second. The tick owns the
-//! controller and all hardware that moves or stops the arm. The tick shares with the rest of the program only the
-//! slot and a summary for the log.
+//! controller and all hardware that moves or stops the arm. The tick shares only the slot and a summary for the log
+//! with the other parts of the program.
 use core::cell::Cell;
 use core::sync::atomic::Ordering;
 
@@ -61,7 +61,7 @@ pub struct Parts {
     pub lines: [Transmitter; lines::LINES],
     /// Watchdog that resets the processor if no tick completes in time.
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
-    /// The flight recorder, with the records from before this start.
+    /// The flight recorder, which contains the records from before this program start.
     pub recorder: FlightRecorder,
     /// Cause and data of this start.
     pub boot: Boot,
@@ -116,7 +116,7 @@ fn controller(points: &'static mut [RawPoint]) -> &'static mut Jtc {
     PLACE.init_with(|| Controller::new(Config::default(), points))
 }
 
-/// Starts the ticks. Not inlined, so that its stack is free again after it returns.
+/// Starts the ticks. Not inlined, so that the stack of this function is free again after it returns.
 #[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
@@ -161,7 +161,7 @@ pub fn start(parts: Parts) {
     pac::TIM7.sr().write(|w| w.set_uif(false));
     pac::TIM7.dier().write(|w| w.set_uie(true));
     interrupt::TIM7.set_priority(Priority::P0);
-    // By default the HAL's time driver has the same priority as the tick.
+    // By default, the interrupt of the HAL's time driver has the priority of the tick.
     interrupt::TIM5.set_priority(crate::clocks::LOW);
     // SAFETY: everything that the interrupt handler uses is initialised.
     unsafe { interrupt::TIM7.enable() };
@@ -341,7 +341,8 @@ fn collect<'a>(
     count
 }
 
-/// Sends a status on both lines. Only the line of the answered frame gets the response record (J-04).
+/// Sends a status on both lines. Only the status on the line of the answered frame contains the response record
+/// (J-04).
 fn send(lines: &mut [Transmitter; lines::LINES], record_line: Option<usize>, status: &[u8; STATUS_LEN]) {
     let other = if record_line.is_some() { lines::without_record(status) } else { *status };
     for (n, line) in lines.iter_mut().enumerate() {

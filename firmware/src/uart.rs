@@ -29,7 +29,7 @@ pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Number of bytes per ring, which is enough for about 21 ms at 15 MBd.
 pub const RING: usize = 32 * 1024;
 
-/// A USART and the streams of DMA1 that serve it.
+/// A USART and the streams of DMA1 that transfer its bytes.
 pub struct Line {
     usart: Usart,
     receive: Stream,

@@ -1,4 +1,4 @@
-//! Identity of this firmware: a record at a fixed address in flash, for tools that can only read the file or the
+//! Version record of this firmware at a fixed address in flash, for tools that can only read the file or the
 //! memory.
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
@@ -9,7 +9,8 @@ pub const ADDRESS: usize = 0x0800_0400;
 /// First bytes of the record.
 pub const MAGIC: [u8; 8] = *b"OPENJTC\0";
 
-/// The record, little-endian like all data of this processor. Texts in the record are padded with zeros.
+/// The version record, which is little-endian like all data of this processor. Texts in the record are padded with
+/// zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Version {
@@ -21,7 +22,7 @@ pub struct Version {
     pub size: u16,
     /// Version of the firmware, for example `0.1.0`.
     pub version: [u8; 12],
-    /// Board, spelled as its feature.
+    /// Name of the board, spelled as its cargo feature.
     pub board: [u8; 24],
     /// Commit of the source, followed by `+` if files were changed after the commit; or `not-in-a-repo`.
     pub build: [u8; 24],

@@ -23,7 +23,7 @@ const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 /// Figures by name.
 type Figures = BTreeMap<String, f64>;
 
-/// `arguments`: `tracking`, or `--json FILE`, `--quick`.
+/// Runs the command. `arguments` is `tracking`, or any of `--json FILE` and `--quick`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     if let Some(("tracking", rest)) = arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
         return tracking::main(rest);
@@ -140,7 +140,7 @@ impl Failed {
         self.0.push((figures, why));
     }
 
-    /// Returns the reason why this figure is missing, in one line.
+    /// Returns in one line the reason why this figure could not be measured.
     pub(crate) fn why(&self, figure: &str) -> Option<&str> {
         let (_, why) = self.0.iter().find(|(names, _)| names.iter().any(|name| figure.starts_with(name)))?;
         why.lines().map(str::trim).rfind(|line| !line.is_empty())

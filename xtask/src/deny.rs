@@ -145,7 +145,8 @@ fn sources(rules: &Table, lock: &Table) -> Vec<String> {
     packages.filter_map(elsewhere).collect()
 }
 
-/// Adds the dependencies of a manifest that have no version. A path dependency is one of the project's own crates.
+/// Adds the dependencies of a manifest that have no version. Path dependencies are not added, because they are the
+/// project's own crates.
 fn wildcards(table: &Table, found: &mut Vec<String>) {
     for (key, value) in table {
         let Some(inner) = value.as_table() else { continue };

@@ -26,7 +26,7 @@ use crate::shell::{self, Scratch};
 use packages::{Made, Release};
 use programs::PLATFORMS;
 
-/// `arguments`: `--out DIR`, `--quick`, `--made`, `--twice`, `--check`.
+/// Runs the command. `arguments` may contain `--out DIR`, `--quick`, `--made`, `--twice` and `--check`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let out = shell::option(&mut arguments, "--out")?;
@@ -149,8 +149,8 @@ fn empty(out: &Path) -> Result<()> {
     earlier.iter().try_for_each(|path| std::fs::remove_file(path).with_context(|| path.display().to_string()))
 }
 
-/// Makes the packages and archives twice from the existing programs in `folder`, with the same commit and the same images of the
-/// boards.
+/// Builds the packages and archives twice from the existing programs in `folder`. Both builds use one commit and one set of
+/// board images.
 fn assembled_twice(folder: &Path) -> Result<[Vec<Made>; 2]> {
     let (time, own) = (programs::time()?, programs::own()?);
     let mut images = images::build()?;

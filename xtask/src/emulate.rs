@@ -14,7 +14,7 @@ use crate::{firmware, python, size};
 /// measurement is reviewed.
 const FIGURES: &str = "docs/board-figures.txt";
 
-/// `arguments`: `--update`, or `--serial PATH` and arguments of the emulator itself.
+/// Runs the command. `arguments` is `--update`, or `--serial PATH` and arguments of the emulator itself.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     if arguments.iter().any(|a| a.starts_with("--serial")) {
         return live(arguments);

@@ -14,7 +14,7 @@ use crate::tally::{Counts, Outcome};
 /// Target for which the board's code is compiled.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The boards, by the names of the features that select them.
+/// Names of the boards, which are also the names of the features that select them.
 pub(crate) const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
 /// Functions that run at the priority of the tick. The second function wakes the links; it is the only function that the tick
@@ -78,8 +78,8 @@ pub(crate) fn build(board: &str) -> Result<PathBuf> {
 /// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest rate of J-01.
 const FAST: &str = "15000000";
 
-/// Builds the first board's program with the fastest lines, which tests need in addition to the programs that are flashed. This
-/// build has its own directory, so that the two builds do not invalidate each other.
+/// Builds the first board's program with the fastest lines, which tests need in addition to the programs that are flashed. The
+/// build uses a separate folder, so that it does not invalidate the build of the flashed programs.
 pub(crate) fn build_fast() -> Result<PathBuf> {
     add_target()?;
     let target = directory().join("fast");
@@ -90,7 +90,8 @@ pub(crate) fn build_fast() -> Result<PathBuf> {
     Ok(elf)
 }
 
-/// Returns the bytes of static data in each region, in the order of [`REGIONS`]: name, used bytes, size.
+/// Returns the bytes of static data in each region, in the order of [`REGIONS`]. Each entry contains name, used bytes
+/// and size.
 pub(crate) fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
     let bytes = std::fs::read(elf)?;
     let file = object::File::parse(&*bytes)?;
@@ -130,7 +131,7 @@ pub(crate) fn check(board: &str, elf: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Lints the board's code. Every `unsafe` block must be explained. Prints the number of these blocks.
+/// Lints the board's code. Every `unsafe` block must be explained. Prints the number of `unsafe` blocks.
 pub(crate) fn lints() -> Result<()> {
     add_target()?;
     for board in BOARDS {
@@ -148,7 +149,7 @@ pub(crate) fn lints() -> Result<()> {
     Ok(())
 }
 
-/// Tests, on this machine, the part of the firmware that needs no hardware.
+/// Tests the part of the firmware that needs no hardware on this computer.
 pub(crate) fn tests() -> Result<Outcome> {
     let host = shell::read(shell::command("rustc").args(["--print", "host-tuple"]))?;
     let mut cargo = shell::cargo(&["test", "--lib", "--target", host.trim()]);
@@ -161,7 +162,7 @@ pub(crate) fn tests() -> Result<Outcome> {
     Ok(Outcome::Counted(counts, String::new()))
 }
 
-/// `arguments`: names of boards. Without a name, all boards are built.
+/// Runs the command. `arguments` contains names of boards; if it is empty, all boards are built.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let boards: Vec<&str> = match arguments {
         [] => BOARDS.to_vec(),

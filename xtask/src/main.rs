@@ -1,4 +1,4 @@
-//! Command `cargo xtask`, which runs all tasks of the workspace. `cargo xtask help` lists them.
+//! Command `cargo xtask`, which runs all tasks of the workspace. `cargo xtask help` lists the tasks.
 #![forbid(unsafe_code)]
 
 mod bench;

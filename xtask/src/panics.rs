@@ -34,7 +34,7 @@ pub(crate) struct Report {
     pub functions: usize,
     /// Number of instructions of the reached functions.
     pub instructions: usize,
-    /// Calls and jumps through a register: function and address.
+    /// Calls and jumps through a register, each with function and address.
     pub indirect: Vec<String>,
     /// Call path to each instruction that panics or traps. A path lists the names of functions, each with the address of the branch
     /// that leaves the function, and finally the instruction.
@@ -128,7 +128,7 @@ struct Function {
 }
 
 struct Program<'a> {
-    /// Functions by their first address.
+    /// Functions of the program by their first address.
     functions: BTreeMap<u32, Function>,
     /// Executable sections, each with first address and bytes.
     sections: Vec<(u32, &'a [u8])>,

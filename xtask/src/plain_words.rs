@@ -33,7 +33,7 @@ struct Place {
     sentence: String,
 }
 
-/// `arguments`: `--update`, or the name of a part whose marks are printed.
+/// Runs the command. `arguments` is `--update`, or the name of a part whose marks are printed.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let update = shell::flag(&mut arguments, "--update");

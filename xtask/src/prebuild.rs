@@ -2,7 +2,7 @@
 //!
 //! Most tests spend their time waiting, for example for a serial line with a realistic speed, or for the end of a lease. The free
 //! processor time is used to build the boards' programs, the emulator and the Python package. A failed build is reported in the step
-//! that needs it, because that step runs the same build.
+//! that needs it, because that step repeats the build.
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, ensure};
 use crate::shell;
 use crate::{firmware, suite};
 
-/// Largest size of the controller with its trajectory, bytes: 432 000 for the points, and 40 KiB of the board's fast memory for the
-/// remaining data, including the stored arm. The receive buffers of 60 000 bytes are not included.
+/// Largest size of the controller with its trajectory, bytes. The points need 432 000 bytes, and the other data (including the
+/// stored arm) may use 40 KiB of the board's fast memory. The receive buffers of 60 000 bytes are not included.
 pub(crate) const LIMIT: u64 = 432_000 + 40 * 1024;
 
 /// Returns the size of the controller with memory for 12 000 points in the compiled program, bytes.

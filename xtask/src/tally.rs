@@ -49,7 +49,8 @@ impl Tally {
         self.only.as_ref().is_none_or(|only| title.contains(only))
     }
 
-    /// Runs a step under its heading. An error is reported and counted. After an error, the next step still runs.
+    /// Prints the heading of a step and runs the step. An error is reported and counted. After an error, the next
+    /// step still runs.
     pub(crate) fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
         if !self.wants(title) {
             return;

@@ -19,7 +19,7 @@ const BOARD_CRATES: [&str; 5] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-cor
 /// Largest permitted tracking error of each joint in the demo, mrad RMS.
 const RMS_LIMIT_MRAD: f64 = 2.0;
 
-/// `arguments`: `--quick`, `--only TEXT`.
+/// Runs the command. `arguments` may contain `--quick` and `--only TEXT`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let quick = shell::flag(&mut arguments, "--quick");

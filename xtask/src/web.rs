@@ -94,7 +94,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Installs Debian's browser if it is missing and this user may install it.
+/// Installs Debian's browser if it is missing and the user is permitted to install it.
 pub(crate) fn install_browser() -> Result<()> {
     if Path::new(BROWSER).exists() { Ok(()) } else { shell::apt_install(&["chromium"]) }
 }

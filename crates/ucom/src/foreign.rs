@@ -1,8 +1,9 @@
-//! Frames that are not of this protocol.
+//! Frames that do not belong to the UCoM protocol.
 
 use core::fmt;
 
-/// Reasons why a frame is not of this protocol. A foreign frame is counted and shown, but has no effect (D-02).
+/// Reasons why a frame does not belong to the UCoM protocol. A foreign frame is counted and shown, but has no effect
+/// (D-02).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
     /// 29-bit identifier.

@@ -84,12 +84,12 @@ pub struct Format {
     pub extended: bool,
     /// Remote frame.
     pub remote: bool,
-    /// CAN FD frame; otherwise a classic frame.
+    /// `true` for a CAN FD frame, `false` for a classic frame.
     pub fd: bool,
 }
 
 impl Format {
-    /// The only format of this protocol: a classic data frame with an 11-bit identifier (D-02).
+    /// The only valid format of the UCoM protocol, a classic data frame with an 11-bit identifier (D-02).
     pub const BUS: Self = Self { extended: false, remote: false, fd: false };
 }
 
@@ -106,7 +106,7 @@ impl Frame {
         }
     }
 
-    /// Creates a frame of this protocol. The creation cannot fail, because a [`Sequence`] is always valid.
+    /// Creates a frame of the UCoM protocol. The creation cannot fail, because a [`Sequence`] is always valid.
     pub const fn of(function: Function, sequence: Sequence, payload: Payload) -> Self {
         Self { id: function.id(sequence), payload }
     }

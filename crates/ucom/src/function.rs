@@ -4,8 +4,9 @@ use core::fmt;
 
 use crate::foreign::Foreign;
 
-/// Node address of a board: its position in the chain, 0..31. The manual calls this address the sequence number; this project also calls it
-/// "number". From the PC, address 0 means broadcast; from a board, address 0 means that the board has no number yet (D-04).
+/// Node address of a board, which is the board's position in the chain (0..31). The manual calls this address the sequence number; this
+/// project also calls it "number". From the PC, address 0 means broadcast; from a board, address 0 means that the board has no number yet
+/// (D-04).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(u8);
 
@@ -65,7 +66,7 @@ macro_rules! functions {
             /// All functions in the order of their numbers.
             pub const ALL: [Self; 28] = [$(Self::$variant),+];
 
-            /// Returns the name in the published list, such as `PC_RESET`.
+            /// Returns the name of the function in the published list, such as `PC_RESET`.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name),+ }
             }
@@ -75,7 +76,7 @@ macro_rules! functions {
                 match self { $(Self::$variant => Sender::$sender),+ }
             }
 
-            /// Returns the purpose as one sentence.
+            /// Returns the purpose of the function as one sentence.
             pub const fn doc(self) -> &'static str {
                 match self { $(Self::$variant => concat!($($doc),+).trim_ascii()),+ }
             }
@@ -235,7 +236,7 @@ mod tests {
         assert_eq!(Function::split(0x800), Err(Foreign::Malformed));
     }
 
-    /// D-00: names and numbers match the published list.
+    /// D-00: names and numbers of the functions match the published list.
     #[test]
     fn d00_names_are_those_of_the_list() {
         assert_eq!(Function::from_number(22).unwrap().name(), "MCA_DUMP_IO_DESCRIPTION");

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::profile::Endian;
 
-/// Bytes of a block: 8 frames of 8 bytes, 32 words (D-40).
+/// Number of bytes of a block, which consists of 8 frames of 8 bytes, or 32 words (D-40).
 pub const BLOCK_LEN: usize = 64;
 
 const MAGIC: u16 = 0x5543;
@@ -57,16 +57,16 @@ pub struct Header {
     pub program_id: u16,
     /// Flash date (D-45).
     pub date: u16,
-    /// Flash number of the board for which the image is made; [`Header::ANY_BOARD`] for every board.
+    /// Flash number of the board that the image is for; [`Header::ANY_BOARD`] for an image for every board.
     pub target: u16,
 }
 
 /// Reasons why a block is not a valid header (DSP_ERROR 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeaderError {
-    /// Word 0 has this value instead of 0x5543.
+    /// Word 0 of the block is this value instead of 0x5543.
     Magic(u16),
-    /// Word 1 has this value instead of 1.
+    /// Word 1 of the block is this value instead of 1.
     Version(u16),
     /// The sum of the 32 words of the header is this value instead of 0.
     Sum(u16),

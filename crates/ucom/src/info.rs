@@ -13,9 +13,9 @@ pub struct BoardInfo {
     pub sequence: u8,
     /// Status byte.
     pub status: Status,
-    /// Checksum of the application (D-44); 0xFFFF if the board has none.
+    /// Checksum of the application (D-44); 0xFFFF if the board has no application.
     pub program_id: u16,
-    /// Date of the application as a number (D-45); 0xFFFF if the board has none.
+    /// Date of the application as a number (D-45); 0xFFFF if the board has no application.
     pub date: u16,
 }
 
@@ -46,7 +46,7 @@ impl BoardInfo {
     }
 }
 
-/// First frame of the IO description: the numbers of inputs, outputs and parameters (D-36).
+/// First frame of the IO description, which contains the numbers of inputs, outputs and parameters (D-36).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Dimensions {
     /// Controller inputs.

@@ -19,9 +19,9 @@ use crate::profile::Profile;
 /// Reasons why a frame is not a message in the expected direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
-    /// The frame is not of this protocol (D-02).
+    /// The frame does not belong to the UCoM protocol (D-02).
     Foreign(Foreign),
-    /// The frame is a message that only the other side sends (D-04).
+    /// The frame is a message that only the opposite side sends (D-04).
     Direction(Function),
     /// The frame has fewer bytes than the message needs (D-12).
     TooShort {
@@ -32,8 +32,7 @@ pub enum DecodeError {
         /// Bytes that the message needs.
         need: u8,
     },
-    /// The length of the message is not one of its valid lengths (D-12). With `dlc.strict`, every length except the exact one is
-    /// invalid.
+    /// The length of the message is not one of its valid lengths (D-12). With `dlc.strict`, only the exact length is valid.
     Length {
         /// Function of the frame.
         function: Function,

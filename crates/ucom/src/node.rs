@@ -38,7 +38,7 @@ use crate::frame::Frame;
 use crate::function::Sequence;
 use crate::message::FromBoard;
 
-/// Phase of the board; the states S1 to S6 of the protocol page.
+/// Phase of the board, which corresponds to the states S1 to S6 of the protocol page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
     /// Boot phase, between the reset and the time at which the board begins to listen.
@@ -49,8 +49,8 @@ pub enum Phase {
     Idle,
     /// S3: the exloader runs and accepts program data.
     Programming,
-    /// S3x: like S3, but after an error. The board discards program data until PC_XRESET arrives or PROG changes from
-    /// 0 to 1.
+    /// S3x: the exloader runs, but an error has occurred while programming. The board discards program data until
+    /// PC_XRESET arrives or PROG changes from 0 to 1.
     Aborted,
     /// S4: the application is starting.
     Starting,

@@ -57,7 +57,7 @@ impl Profile {
         Err(ProfileError::Contradiction(contradiction))
     }
 
-    /// Returns the number that the PC uses for broadcasts; `None` if the profile has none (D-04).
+    /// Returns the number that the PC uses for broadcasts; `None` if the profile has no broadcast number (D-04).
     pub const fn broadcast_number(&self) -> Option<Sequence> {
         match self.addr_broadcast {
             Broadcast::Zero => Some(Sequence::ZERO),
@@ -66,8 +66,8 @@ impl Profile {
         }
     }
 
-    /// Returns the number that boards without a number listen to and use in their own frames: the broadcast number, or 0 if the profile has
-    /// none (D-04, D-06).
+    /// Returns the address that boards without a number use to receive and to send. The address is the broadcast number, or 0 if the
+    /// profile has no broadcast number (D-04, D-06).
     pub const fn unnumbered(&self) -> Sequence {
         match self.broadcast_number() {
             Some(number) => number,
@@ -75,7 +75,7 @@ impl Profile {
         }
     }
 
-    /// Returns `true` if a board can have this number.
+    /// Returns `true` if this number is valid for a board.
     pub const fn is_board(&self, number: Sequence) -> bool {
         let broadcast = match self.broadcast_number() {
             Some(broadcast) => broadcast.number() == number.number(),
@@ -90,7 +90,7 @@ impl Profile {
         Sequence::all().filter(move |number| profile.is_board(*number))
     }
 
-    /// Returns the value of a process word that has no type of its own (D-11).
+    /// Returns the value of a 16-bit process word that does not define its own type (D-11).
     pub const fn process_value(&self, word: u16) -> i32 {
         if self.pd_signed { word as i16 as i32 } else { word as i32 }
     }

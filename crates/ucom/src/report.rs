@@ -10,7 +10,7 @@ pub struct Report {
     pub k: u8,
     /// Sequence field of the identifier.
     pub id_field: Sequence,
-    /// Data byte: the low byte of the flash number, which distinguishes boards.
+    /// Data byte of the report, which contains the low byte of the flash number and distinguishes boards.
     pub ucom_id: u8,
 }
 
@@ -38,7 +38,7 @@ impl Report {
         }
     }
 
-    /// Returns `true` if identifier and data carry the same flash id, as they must in mode `flash7`.
+    /// Returns `true` if identifier and data contain equal flash ids, as mode `flash7` requires.
     pub const fn agrees(&self) -> bool {
         let by_data = Self::flash7(self.ucom_id as u16);
         by_data.k == self.k && by_data.id_field.number() == self.id_field.number()

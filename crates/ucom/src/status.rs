@@ -14,7 +14,7 @@ impl Status {
     pub const ASTART: Self = Self(0x40);
     /// The control loop is running. Shows the actual state; cannot be written.
     pub const MCARUN: Self = Self(0x20);
-    /// The exloader is running; always the opposite of MSTART. Shows the actual state; cannot be written.
+    /// The exloader is running. This bit is always the opposite of MSTART. Shows the actual state; cannot be written.
     pub const EXLRUN: Self = Self(0x10);
     /// The board has a sequence number.
     pub const INIT: Self = Self(0x08);

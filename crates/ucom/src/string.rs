@@ -70,15 +70,15 @@ pub enum Assembled<'a> {
     Partial,
     /// The string is complete. Trailing NULs are removed.
     Complete(Latin1<'a>),
-    /// The package is invalid and the string is dropped. Reasons: a header that does not have 2 bytes, a header with more packages than
-    /// `string.max` characters need, or a data package that is empty or exceeds the buffer.
+    /// The package is invalid and the string is dropped. A header is invalid if it does not have 2 bytes or announces more packages
+    /// than `string.max` characters need. A data package is invalid if it is empty or exceeds the buffer.
     Refused,
 }
 
 /// Assembles one string at a time. A receiver needs one assembler for each function of each board (D-14).
 ///
-/// The assembler cannot detect a lost package: it continues to wait for packages. [`StringAssembler::expired`] shows that no package
-/// arrived for 100 ms (`string.gap`); the next package then starts a new string.
+/// The assembler cannot detect a lost package: it continues to wait for packages. [`StringAssembler::expired`] returns `true` if no
+/// package has arrived for 100 ms (`string.gap`). In this case the next package starts a new string.
 #[derive(Clone, Debug)]
 pub struct StringAssembler<const N: usize = 512> {
     text: [u8; N],
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// C-4: lengths 0, 1, 7, 8, 9, 16, 512, a trailing NUL, and a character beyond ASCII.
+    /// C-4: strings of length 0, 1, 7, 8, 9, 16 and 512, a trailing NUL, and a character that is not ASCII.
     #[test]
     fn d13_c4_strings_of_all_lengths() {
         for profile in profiles() {
@@ -246,7 +246,8 @@ mod tests {
         assert_eq!(assembler.missing(), 1);
         assert!(!assembler.expired(199_998, &profile));
         assert!(assembler.expired(199_999, &profile));
-        // After the gap, the header of the repeated answer starts a new string. The assembler does not use it as the missing package.
+        // After the gap, the header of the repeated answer starts a new string. The assembler does not use the header
+        // as the missing package.
         assert_eq!(assembler.push(199_999, &header, &profile), Assembled::Partial);
         assert_eq!(assembler.missing(), 2);
     }

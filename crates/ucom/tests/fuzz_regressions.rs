@@ -1,4 +1,4 @@
-//! Runs the bodies of the fuzz targets on the stored inputs, on some handmade inputs, and on random ones.
+//! Runs the functions of the fuzz targets with the stored inputs, with some handmade inputs, and with random inputs.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};

@@ -49,7 +49,7 @@ fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
         let until = machine.now() + n * cycle;
         machine.run_until(until);
     };
-    // The tick marks the record with its inputs shortly before the step begins.
+    // The tick marks the flight record as filled with inputs shortly before the step begins.
     let phase = |machine: &Machine| machine.word(flight + 8);
     while phase(machine) != Some(1) {
         steps(machine, 10);
@@ -87,8 +87,8 @@ fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     Ok(lines)
 }
 
-/// Returns the executed instructions in order and without jumps, as input for an assembler. The machine runs an IT
-/// block in one step; all its instructions are included, because the hardware fetches them all.
+/// Returns the executed instructions in order and without jumps, as input for an assembler. The machine executes
+/// an IT block in one step. All instructions of the block are included, because the hardware fetches all of them.
 fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for at in trace {
@@ -106,8 +106,8 @@ fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, 
     Ok(lines)
 }
 
-/// Replaces the target of a branch by a nearby one. A call becomes a branch, because llvm-mca does not model calls and,
-/// according to its documentation, assumes 100 cycles for each.
+/// Replaces the target of a branch by a nearby address. A call becomes a branch, because llvm-mca does not model
+/// calls. According to its documentation, it assumes 100 cycles for each call.
 fn without_target(code: &str) -> String {
     let (name, operands) = code.split_once(' ').unwrap_or((code, ""));
     let name = match name {

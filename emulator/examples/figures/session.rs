@@ -135,7 +135,7 @@ impl Session {
         self.run_ms(200);
     }
 
-    /// Runs from power-on until every joint is enabled and holds its position.
+    /// Runs the board from power-on until every joint is enabled and holds its position.
     pub fn hold(&mut self) {
         self.until("the first tick", 50, |rig| rig.ticks > 0);
         self.run_ms(300);

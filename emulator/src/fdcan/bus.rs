@@ -143,8 +143,8 @@ impl Wire {
         self.on_wire.is_some()
     }
 
-    /// Returns the earliest time up to `now` at which a frame can start, if the controller could start its own frame at
-    /// `own`.
+    /// Returns the earliest time, not later than `now`, at which a frame can start. The controller could start its own
+    /// frame at `own`.
     pub fn start_time(&self, own: Time, now: Time) -> Option<Time> {
         let first = self.queue.iter().map(|q| q.ready).min().unwrap_or(NEVER).min(own);
         let start = first.max(self.free);

@@ -98,7 +98,7 @@ impl Fdcan {
         let open = before & (cccr::INIT | cccr::CCE) == cccr::INIT | cccr::CCE;
         let mut next = before;
         next = next & !(cccr::INIT | cccr::CSR | 0x8) | value & (cccr::INIT | cccr::CSR);
-        // CCE can be set only in INIT and is cleared with it.
+        // CCE can be set only while INIT is set, and is cleared together with INIT.
         next = next & !cccr::CCE | if before & cccr::INIT != 0 { value & cccr::CCE } else { 0 };
         if next & cccr::INIT == 0 {
             next &= !cccr::CCE;

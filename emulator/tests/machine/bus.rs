@@ -1,4 +1,4 @@
-//! FDCAN: dedicated buffers, order of transmission, acknowledgement, bus-off and recovery.
+//! Tests of FDCAN: dedicated buffers, order of transmission, acknowledgement, bus-off and recovery.
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -22,7 +22,7 @@ const TXBCR: u32 = FDCAN1 + 0xD4;
 const TXBTO: u32 = FDCAN1 + 0xD8;
 const TXBCF: u32 = FDCAN1 + 0xDC;
 const BUS_OFF: u32 = 0x80;
-/// Offsets in the message RAM: filters, receive buffers, transmit buffers.
+/// Offsets of filters, receive buffers and transmit buffers in the message RAM.
 const FILTERS: u32 = 0;
 const RX: u32 = 0x100;
 const TX: u32 = 0x800;

@@ -12,7 +12,7 @@ const MAIN: u32 = 0x0800_0400;
 /// Address of the first result word of programs.
 const RESULT: u32 = 0x2000_0000;
 
-/// Returns a flash image: the vector table, the main program, and handlers by exception number.
+/// Returns a flash image that contains the vector table, the main program, and handlers by exception number.
 fn image(main: &[u16], handlers: &[(usize, &[u16])]) -> Elf {
     let mut bytes = vec![0; 0x2000];
     let mut put = |at: usize, words: &[u16]| {

@@ -8,7 +8,7 @@ pub const FLIGHT_SIZE: usize = 848;
 /// Layout version that this module decodes.
 const LAYOUT: u16 = 3;
 
-/// A tick as the board recorded it.
+/// Inputs and outputs of a tick that the board has recorded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
     pub phase: u32,

@@ -1,6 +1,6 @@
-//! A board under test: the board's own ELF file, the simulated arm on its joint bus, and a host on each serial line. In
-//! parallel, the same controller runs on the PC (the shadow controller) with the inputs from the board's flight record.
-//! The outputs of both controllers must be equal.
+//! A board under test, with the board's own ELF file, a simulated arm on its joint bus, and a host on each serial line.
+//! In parallel, the same controller runs on the PC (the shadow controller) with the inputs from the board's flight
+//! record. The outputs of both controllers must be equal.
 //!
 //! Every millisecond of every test is checked: no tick is missing, the torques, the frame and the statuses are
 //! bit-identical to the outputs of the shadow controller, and the invariants of the simulator are true.
@@ -105,7 +105,7 @@ impl Rig {
         }
     }
 
-    /// Advances everything by one millisecond and makes all checks.
+    /// Advances the board, the arm and the hosts by one millisecond, and makes all checks.
     pub fn step(&mut self) {
         self.board.step();
         let ms = self.board.now_ms();
@@ -214,7 +214,7 @@ impl Rig {
         // The longest tick takes a third of a millisecond, when a model is received and all values that depend on
         // it are computed.
         for _ in 0..80 {
-            // A half-written record is not valid. A tick may also be due at this time.
+            // A half-written record is not valid. The start of a tick may also be due at this time.
             if !self.in_tick() {
                 let flight = self.read_flight()?;
                 let due = self.ticks > 0 && !self.may_hang && flight.tick == self.ticks;

@@ -1,4 +1,4 @@
-//! The shadow controller: the board's controller, run on the PC.
+//! The shadow controller, which is the board's controller code running on the PC.
 use jtc_core::recorder::{BLOCK_WORDS, Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, POINTS_MAX, Telemetry};
 use jtc_sim::{RECORDER_BLOCKS, Worked};
@@ -34,7 +34,7 @@ pub struct Shadow {
 pub struct Start {
     /// Cause of the start, as the code in the flight record.
     pub cause: u32,
-    /// Number of this start since power-on.
+    /// Number of this program start, counted since power-on.
     pub boots: u32,
     /// Version record of the firmware.
     pub version: Version,

@@ -13,7 +13,7 @@ pub fn wire(p: Peripherals) -> Board {
     // USART2: RS422
     transmit(p.PD5, 7);
     receive(p.PD6, 7);
-    // USART3: virtual serial port of the ST-LINK
+    // USART3 is the virtual serial port of the ST-LINK.
     transmit(p.PD8, 7);
     receive(p.PD9, 7);
 

@@ -2,7 +2,7 @@
 use embassy_stm32::gpio::{Input, Pin, Pull};
 use embassy_stm32::{Peri, pac};
 
-/// The pin, and the EXTI line of the same number that latches its falling edges.
+/// The pin, and the EXTI line with the pin's number, which latches falling edges of the pin.
 ///
 /// RM0399, EXTI: SYSCFG_EXTICR selects a pin for the line. A falling edge of the pin sets the line's bit in EXTI_C1PR1
 /// within nanoseconds, without the processor. The bit remains set until a 1 is written to it. The line is unmasked in
@@ -20,7 +20,7 @@ impl SafetyInput {
         let line = usize::from(pin.pin());
         let port = pin.port();
         let pin = Input::new(pin, Pull::Down);
-        // SYSCFG has a clock that must be enabled (RCC_APB4ENR); EXTI has none.
+        // The clock of SYSCFG must be enabled (RCC_APB4ENR); EXTI does not need a clock enable.
         pac::RCC.apb4enr().modify(|w| w.set_syscfgen(true));
         // The read of the register ensures that the clock is running.
         pac::RCC.apb4enr().read();

@@ -54,7 +54,7 @@ pub(crate) fn memory(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Makes a report in the same way as `jtc report`.
+/// Makes a report in the way of `jtc report`.
 fn report(path: &Path) -> Result<()> {
     let mut digest = Digest::new();
     let found = scan(path, |sample| digest.push(sample))?;

@@ -88,7 +88,7 @@ impl Bench {
         }
     }
 
-    /// Lets the PC and all boards send, then advances the time to the next event.
+    /// Sends the due frames of the PC and of all boards, and advances the time to the next event.
     fn step(&mut self) -> Result<()> {
         let now = self.now_us();
         self.chain.advance(now);

@@ -44,7 +44,7 @@ impl Pid {
 pub(crate) enum Phase {
     /// The drives are being configured and enabled.
     BringUp,
-    /// The arm is in position hold, for this number of ticks.
+    /// The arm is in position hold; the value is the number of ticks.
     Hold(u32),
     /// The arm follows the path; the value is the current millisecond of the path.
     Operate(u32),
@@ -153,7 +153,7 @@ impl Existing {
         self.pid = [Pid::default(); JOINTS];
     }
 
-    /// Sets the point of this millisecond. The points of the last two milliseconds are omitted.
+    /// Sets the commanded trajectory point of this millisecond. The points of the last two milliseconds are omitted.
     fn follow(&mut self, k: u32) {
         let end = (self.points.len() as u32 - 1) * self.step_ms;
         self.phase = Phase::Operate(k);

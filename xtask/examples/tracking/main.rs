@@ -11,10 +11,10 @@ use jtc_sim::{FrictionModel, LuGre, ModelError, SimConfig};
 
 use run::{Figures, Outcome, Path, Result};
 
-/// Number of random arms. Each figure is the median over these arms.
+/// Number of random arms. Each result is the median over these arms.
 const SEEDS: u64 = 10;
 
-/// Condition of a run.
+/// Condition under which both controllers are compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Condition {
     /// Heading of the condition on the page.
@@ -30,7 +30,7 @@ pub struct Condition {
     sign_width: f64,
     /// Relative errors of the masses and of the friction in the model that both controllers use.
     error: ModelError,
-    /// Mass at the flange that both controllers do not know, kg.
+    /// Mass at the flange that is missing in the models of both controllers, kg.
     mass: f64,
     /// Probability that a frame is not received.
     lost: f64,
@@ -139,8 +139,8 @@ impl Condition {
         world
     }
 
-    /// Returns the results of the existing control law and of our control law. Each figure is the median over the seeds whose run
-    /// reached the end of the path.
+    /// Returns the results of the existing control law and of our control law. Each result is the median over the seeds with
+    /// which the arm reached the end of the path.
     pub fn compare(&self, path: &Path) -> Result<[Runs; 2]> {
         let start = path.points.first().map(jtc_wire::RawPoint::position_rad).ok_or("an empty path")?;
         let (mut existing, mut ours) = (Vec::new(), Vec::new());
@@ -159,7 +159,7 @@ pub struct Runs {
     pub finished: usize,
     /// Medians over the runs that reached the end of the path.
     pub figures: Option<Figures>,
-    /// Reasons why the other runs ended.
+    /// Reasons why runs ended before the end of the path.
     pub errors: Vec<String>,
 }
 

@@ -175,7 +175,7 @@ fn reference(page: &mut String, all: &[Comparison]) {
     let _ = writeln!(page, "\nThe largest difference is {:.1} %.", 100.0 * most);
 }
 
-/// Returns the whole page.
+/// Returns the complete text of the page.
 pub(crate) fn text(all: &[Comparison]) -> String {
     let mut page = INTRODUCTION.to_owned();
     reference(&mut page, all);

@@ -37,7 +37,7 @@ fn recorded() -> Option<Vec<RawPoint>> {
     Some(points)
 }
 
-/// Returns the point in the middle between two points that are 20 ms apart. The position is interpolated with a cubic
+/// Returns the point halfway between two points that are 20 ms apart. The position is interpolated with a cubic
 /// polynomial.
 fn between(a: &RawPoint, b: &RawPoint) -> RawPoint {
     let mean = |a: &[i16; 6], b: &[i16; 6]| {

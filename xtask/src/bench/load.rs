@@ -4,7 +4,7 @@ use std::time::Instant;
 /// Largest share of one processor that other programs may use while figures are judged.
 pub(super) const OTHERS_MAX: f64 = 0.1;
 
-/// Processor times, to measure the load by other programs.
+/// Processor times, which are used to measure the load by other programs.
 pub(super) struct Load {
     began: Instant,
     /// Processor times, s, of all programs, and of this program with its child processes; `None` if the system does
@@ -32,7 +32,7 @@ fn busy() -> Option<(f64, f64)> {
     let sum = |fields: &[&str]| fields.iter().map(|field| field.parse::<f64>().ok()).sum::<Option<f64>>();
     let all = std::fs::read_to_string("/proc/stat").ok()?;
     let all: Vec<&str> = all.lines().next()?.split_whitespace().collect();
-    // All fields except the idle times: user, nice and system, then irq, softirq and steal.
+    // The sum includes all fields except the idle times: user, nice, system, irq, softirq and steal.
     let all = sum(all.get(1..4)?)? + sum(all.get(6..9)?)?;
     let own = std::fs::read_to_string("/proc/self/stat").ok()?;
     // Fields 14 to 17 of the line are utime, stime, cutime and cstime. The code counts fields after the name, because

@@ -59,7 +59,7 @@ fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     run(root.dpkg().args(["--verify", "jtc", "ucom"]))?;
     used(root)?;
     units(root)?;
-    // Creates files like those that an agent leaves.
+    // Creates files such as an agent creates during use.
     let state = root.path().join("var/lib/jtc/cell1");
     fs::create_dir_all(&state)?;
     fs::write(state.join("tokens.toml"), "")?;

@@ -43,7 +43,7 @@ pub(crate) struct Graph {
 pub(crate) enum Kind {
     /// Dependencies that become a part of a program, or generate a part of it during compilation.
     Shipped,
-    /// All dependencies, including those of build scripts and tests.
+    /// All dependencies, including the dependencies of build scripts and tests.
     All,
 }
 
@@ -65,7 +65,7 @@ pub(crate) fn shipped() -> Result<Graph> {
     Ok(graph)
 }
 
-/// Returns all dependencies of a manifest on these platforms, including those of tests.
+/// Returns all dependencies of a manifest on these platforms, including the dependencies of tests.
 pub(crate) fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
     let mut graph = Graph::default();
     for platform in platforms {

@@ -85,7 +85,7 @@ pub(super) fn name(image: &Image) -> String {
     format!("{}.bin", image.board)
 }
 
-/// Returns the list of images: file, board, SHA-256, address and size of each.
+/// Returns the list of images, with file, board, SHA-256, address and size of each image.
 pub(super) fn list(images: &[Image], version: &str) -> Result<String> {
     let images: Vec<_> = images
         .iter()

@@ -142,7 +142,8 @@ fn files(source: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Returns true for source code, because source files about licences can have names that begin in the same way.
+/// Returns true for source code, because source files about licences can have names that begin like the names of
+/// licence files.
 fn is_code(path: &Path) -> bool {
     path.extension()
         .is_some_and(|ending| ["rs", "py", "c", "h", "sh", "toml"].iter().any(|code| ending == *code))

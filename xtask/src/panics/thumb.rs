@@ -5,8 +5,8 @@
 pub(super) enum Flow {
     /// Branch to an address with B, `B<cc>`, CBZ, CBNZ or BL.
     Direct(u32),
-    /// Branch to a computed address with BX, BLX, or with MOV or LDR to the program counter. The address is known
-    /// only at run time.
+    /// Branch to a computed address with BX, BLX, or with MOV or LDR to the program counter. The target address
+    /// is known only at run time.
     Indirect(u8),
     /// MOVW, which sets the lower half of a register and clears the upper half.
     Low(u8, u16),

@@ -30,7 +30,7 @@ fn nightly(arguments: &[&str]) -> Command {
     rustup
 }
 
-/// `arguments`: a target, `--runs N`, `--keep`.
+/// Runs the command. `arguments` may contain a target, `--runs N` and `--keep`.
 pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let wanted = shell::option(&mut arguments, "--runs")?;

@@ -63,7 +63,7 @@ enum Which {
     Left,
 }
 
-/// `arguments`: `--package NAME`, `--survivors`, `--changed`, `--resume`, `--report`.
+/// Runs the command. `arguments` may contain `--package NAME`, `--survivors`, `--changed`, `--resume` and `--report`.
 pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let package = shell::option(&mut arguments, "--package")?;
@@ -191,7 +191,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Copies the outcomes of the mutants that were run again into the whole report.
+/// Copies the outcomes of the mutants that were run again into the complete report.
 fn update(whole: &mut Value, part: &Value) {
     let mut statuses = BTreeMap::new();
     for mutant in part["files"].as_object().into_iter().flatten().flat_map(|(_, file)| mutants(file)) {

@@ -20,12 +20,12 @@ use crate::report::Report;
 pub enum FromBoard {
     /// DSP_ERROR.
     Error(ErrorCode),
-    /// DSP_INITACK with the sequence number that the board accepted. The identifier must contain the same number
-    /// (D-24).
+    /// DSP_INITACK with the sequence number that the board accepted. The identifier must also contain this
+    /// sequence number (D-24).
     InitAck(u8),
     /// DSP_PROGFINISHED.
     ProgFinished,
-    /// A part of DSP_INFO: 8 bytes with the values of [`BoardInfo`](crate::BoardInfo), then a string.
+    /// A part of DSP_INFO, which consists of 8 bytes with the values of [`BoardInfo`](crate::BoardInfo) and a string.
     Info(Payload),
     /// DSP_READY: the board has accepted the block.
     Ready,
@@ -35,11 +35,11 @@ pub enum FromBoard {
     Report(Report),
     /// MCA_DSP_READY: the application is ready.
     McaReady,
-    /// A part of MCA_DUMP_IO_DESCRIPTION: 6 bytes of dimensions, then strings.
+    /// A part of MCA_DUMP_IO_DESCRIPTION, which consists of 6 bytes of dimensions and of strings.
     IoDescription(Payload),
-    /// MCA_ADMIN_DATA: the board's state.
+    /// MCA_ADMIN_DATA with the state of the board.
     Admin(Admin),
-    /// A part of MCA_DEBUG_MSG: a string.
+    /// A part of MCA_DEBUG_MSG, which contains a string.
     Debug(Payload),
     /// MCA_ALIVE of the board.
     Alive,
@@ -67,7 +67,8 @@ impl FromBoard {
         }
     }
 
-    /// Returns the frame that board `from` sends. A report has its own sequence field, so `from` is not used for it.
+    /// Returns the frame that board `from` sends. A report contains its own sequence field, so `from` is ignored for
+    /// reports.
     pub fn encode(&self, from: Sequence, profile: &Profile) -> Frame {
         let byte = |byte| Payload::of([byte, 0, 0, 0, 0, 0, 0, 0], 1);
         let (sequence, payload) = match *self {

@@ -60,7 +60,7 @@ fn d05_shared_functions() {
     assert_eq!(from("681#"), Ok(FromBoard::Alive));
 }
 
-/// D-04: each side reacts only to messages of the other side.
+/// D-04: the PC reacts only to messages of boards, and a board only to messages of the PC.
 #[test]
 fn d04_direction() {
     for function in Function::ALL {
@@ -79,7 +79,7 @@ fn d37_flags_other_than_0_and_1() {
     assert_eq!(to("601#02000000"), Err(DecodeError::Value(Function::Admin)));
 }
 
-/// The frames of the golden vectors decode to these messages.
+/// The frames of the golden vectors decode to the expected messages.
 #[test]
 fn d15_d24_golden_frames() {
     let profile = Profile::default();

@@ -36,10 +36,10 @@ impl NodeConfig {
     }
 }
 
-/// Counters of a board. The board does not send them on the bus.
+/// Counters of a board. The board does not send the counters on the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Frames that are not of this protocol (D-02).
+    /// Number of frames that do not belong to the UCoM protocol (D-02).
     pub foreign: u32,
     /// Messages to this board that the board did not answer because its state does not allow them.
     pub ignored: u32,

@@ -13,7 +13,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// Returns `true` if `other` lies inside this area and has at least one word.
+    /// Returns `true` if `other` is inside this area and contains at least one word.
     pub const fn holds(&self, other: Self) -> bool {
         let end = self.start as u64 + self.words as u64;
         other.words > 0 && other.start >= self.start && other.start as u64 + other.words as u64 <= end
@@ -27,7 +27,7 @@ pub enum FlashState {
     Ready,
     /// An operation is in progress.
     Busy,
-    /// The last operation failed. The flash stays in this state until the next operation starts.
+    /// The last operation failed. The flash remains in this state until the next operation starts.
     Failed,
 }
 
@@ -41,8 +41,8 @@ pub const RECORD_LEN: usize = 16;
 /// Flash of the board, and the RAM into which an exloader can be loaded.
 ///
 /// The methods `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when the operation is complete. The
-/// node starts no operation while another is in progress. Implementations MUST keep the validity record outside the application area.
-/// Erasing the area must not change the record, and erasing the record must not change the area.
+/// node does not start an operation while another operation is in progress. Implementations MUST keep the validity record outside the
+/// application area. Erasing the area must not change the record, and erasing the record must not change the area.
 pub trait Flash {
     /// Returns the area for applications in a memory; `None` if the board has no such memory.
     fn area(&self, memory: Memory) -> Option<Area>;
@@ -56,7 +56,7 @@ pub trait Flash {
     /// Starts to write up to 64 bytes in wire order, beginning at a word address. The number of bytes is even.
     fn write(&mut self, now_us: u64, memory: Memory, address: u32, data: &[u8]) -> Result<(), FlashError>;
 
-    /// Reads bytes from a word address on, in the order in which they were written.
+    /// Reads bytes, beginning at a word address, in the order in which they were written.
     fn read(&self, memory: Memory, address: u32, data: &mut [u8]) -> Result<(), FlashError>;
 
     /// Returns the stored validity record. If no record was written, the bytes are arbitrary.
@@ -124,13 +124,15 @@ pub trait Application {
     /// Returns the initial value of an input. The value applies until the input is set.
     fn initial_ci(&self, index: u16) -> u16;
 
-    /// Returns the buffer for received inputs, one word for each input. The words take effect at [`Application::latch_ci`].
+    /// Returns the buffer for received inputs, one word for each input. The received inputs take effect at
+    /// [`Application::latch_ci`].
     fn ci(&mut self) -> &mut [u16];
 
-    /// Makes the inputs in [`Application::ci`] take effect together.
+    /// Applies all inputs in [`Application::ci`] at the same time.
     fn latch_ci(&mut self);
 
-    /// Returns the buffer for received parameters. The words take effect with the next control cycle (D-35).
+    /// Returns the buffer for received parameters. The received parameters take effect in the next control cycle
+    /// (D-35).
     fn par(&mut self) -> &mut [u16];
 
     /// Takes a snapshot of the outputs for [`Application::so`].

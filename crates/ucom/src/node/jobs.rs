@@ -56,8 +56,8 @@ impl Jobs {
         self.info = self.info.or(Some(Place::First));
     }
 
-    /// Like `ask_info`, but sends no frame of the answer before `due_us`. At that time, the request with the same identifier has left
-    /// the bus (D-05).
+    /// Requests the IO description, like `ask_info` for DSP_INFO. The board does not send a frame of the answer before `due_us`. At
+    /// that time, the request with the same identifier has left the bus (D-05).
     pub(super) fn ask_dump_io(&mut self, due_us: u64) {
         if let Some(Place::String { .. }) = self.dump_io {
             self.dump_io_again = Some(due_us);

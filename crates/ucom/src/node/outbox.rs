@@ -23,7 +23,7 @@ pub(super) struct Outbox {
     pub block_taken: bool,
     /// DSP_PROGFINISHED.
     pub finished: bool,
-    /// Due time of each report, and the index of its next frame.
+    /// Due time of each report, and the index of the next frame of the report.
     pub reports: [Option<(u64, u8)>; REPORTS],
     /// `true` if a report is due after the boot.
     pub report_after_boot: bool,

@@ -7,11 +7,11 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::{HeaderForm, Plan};
 use crate::program::{Checksum, Digest};
 
-/// Bytes of flash read back in one step. The limit ensures that a step is short.
+/// Number of bytes that are read back from flash in one step. The limit ensures that a step is short.
 const VERIFY_STEP: usize = 1024;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Returns `true` if the flash holds a valid application.
+    /// Returns `true` if the flash contains a valid application.
     pub fn has_application(&self) -> bool {
         self.record.is_some()
     }
@@ -32,7 +32,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
         if !self.prog {
             // Program data that are sent by broadcast are for a group of boards (D-46). A board outside the group
-            // ignores them.
+            // ignores these program data.
             if !is_broadcast {
                 self.abort(ErrorCode::MemProtected);
             }
@@ -55,7 +55,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Checks for a pause that is too long, and performs one step of the work in progress.
+    /// Checks if the pause between two frames is too long, and performs one step of the work in progress.
     pub(super) fn program_timers(&mut self) {
         let programming = &self.programming;
         let pause = u64::from(self.config.profile.prog_frame_timeout) * 1000;
@@ -126,7 +126,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Parses a header (D-41). Refuses headers that this board cannot accept.
+    /// Parses a header (D-41). Rejects headers that this board cannot accept.
     fn take_header(&mut self) -> Result<(), ErrorCode> {
         let endian = self.config.profile.prog_endian;
         let header = Header::parse(&self.programming.block, endian).map_err(|_| ErrorCode::Data)?;
@@ -186,7 +186,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
         let digest = Digest::new(profile.prog_checksum, profile.prog_endian);
         self.programming.cycle = Some(Cycle { header, area, memory, writes, done: 0, digest });
-        // RAM is not erased, and the application in flash stays valid.
+        // RAM is not erased, and the application in flash remains valid.
         if writes && memory != Memory::Ram {
             self.programming.work = Work::ClearRecord;
         }
@@ -275,8 +275,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Ok(())
     }
 
-    /// Returns the new record. With images for program and data memory, it describes the program memory, although data memory is written
-    /// last.
+    /// Returns the new record. For images for program and data memory, the record describes the program memory, although data memory is
+    /// written last.
     fn new_record(&self) -> Option<Record> {
         let header = match self.config.profile.prog_plan {
             Plan::PmemXmem => self.programming.first?,

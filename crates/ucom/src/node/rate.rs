@@ -51,7 +51,8 @@ mod tests {
         assert!(!RateLimit::<10>::new().allow(0, 0));
     }
 
-    /// Section 9: an event 1 s ago is outside the second, an event 999 999 µs ago is inside. More than `N` events are never allowed.
+    /// Section 9: an event that occurred 1 s ago is not counted, and an event that occurred 999 999 µs ago is
+    /// counted. More than `N` events are never allowed.
     #[test]
     fn a_second_is_a_second() {
         let mut limit = RateLimit::<2>::new();

@@ -19,8 +19,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.outbox.push_report(self.after_ms(wait));
     }
 
-    /// Queues MCA_ADMIN_DATA as an answer. The answer waits until the PC's frame with the same identifier has left the bus (D-05). If an
-    /// unsolicited report is waiting, the answer replaces it.
+    /// Queues MCA_ADMIN_DATA as an answer. The answer waits until the PC's frame with the same identifier has left the bus (D-05). If
+    /// MCA_ADMIN_DATA without a request is already waiting, the answer replaces it.
     pub(super) fn answer_admin(&mut self) {
         self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }

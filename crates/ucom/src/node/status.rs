@@ -81,7 +81,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Handles PC_SETSTATUS: applies the formula literally, then the restrictions of the board (D-22).
+    /// Handles PC_SETSTATUS: applies the published formula, and then the restrictions of the board (D-22).
     pub(super) fn set_status(&mut self, mask: u8, value: u8) {
         let old = self.status();
         let new = old.set(mask, value);

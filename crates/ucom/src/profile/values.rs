@@ -114,7 +114,7 @@ words! {
 words! {
     /// Block before the data of a cycle (D-41).
     pub enum HeaderForm {
-        /// The header block of this project.
+        /// The header block that this project defines.
         V1 = "v1",
         /// No header. The first block contains data, and the length is configured in the board.
         None = "none",

@@ -9,7 +9,7 @@ use super::bus::{Bus, MS, frames, sorted};
 const FIVE: [u16; 5] = [0x21, 0x42, 0x63, 0x04, 0x7F];
 const FIVE_REPORTS: &str = "404#04 441#21 482#42 4C3#63 4DF#7F";
 
-/// D-T1, D-07: one report from each board within 500 ms.
+/// D-T1, D-07: each board sends one report within 500 ms.
 #[test]
 fn d_t1_reset_reports() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -200,7 +200,7 @@ fn d_t12_inputs_beyond_the_dimension() {
     assert_eq!(bus.boards[0].application.par, [0, 0, 7]);
 }
 
-/// D-T13, D-50: without the PC's heartbeat the board stops, and only a start command starts it again.
+/// D-T13, D-50: without the PC's heartbeat the board stops, and only a start command starts the application again.
 #[test]
 fn d_t13_pc_lost() {
     let mut bus = Bus::started();
@@ -254,7 +254,7 @@ fn d_t14_alive_for_a_minute() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-T15, D-37, D-12: the PC sends flags other than 0 and 1, and a frame that is too short.
+/// D-T15, D-37, D-12: a board ignores flags other than 0 and 1, and reports a frame that is too short.
 #[test]
 fn d_t15_bad_flags() {
     let mut bus = Bus::started();

@@ -20,8 +20,8 @@ fn texts(received: &[Frame]) -> Vec<String> {
     texts
 }
 
-/// D-05: answers on shared identifiers come 2 ms after the request, messages without a request after 1 to 8 ms.
-/// Boards do not all send at the same time.
+/// D-05: on shared identifiers, a board sends an answer 2 ms after the request, and a message without a request
+/// after 1 to 8 ms. Different boards send at different times.
 #[test]
 fn d05_shared_identifiers() {
     let mut delays = std::collections::BTreeSet::new();
@@ -63,7 +63,7 @@ fn d33_outputs() {
     }
 }
 
-/// D-33: if the bus is too busy for the outputs, the board skips them. The queue stays bounded.
+/// D-33: if the bus is too busy for the outputs, the board skips them. The length of the queue remains limited.
 #[test]
 fn d33_outputs_on_a_blocked_bus() {
     let mut bus = Bus::running();
@@ -146,7 +146,7 @@ fn d50_text_when_the_pc_is_lost() {
     assert!(received.contains(&frames("601#00000100")[0]));
 }
 
-/// A board sends its heartbeat every second as long as the application is up. D-51 is the reaction of the PC.
+/// A board sends its heartbeat every second while the application is running. D-51 is the reaction of the PC.
 #[test]
 fn d51_heartbeat_of_the_board() {
     let mut bus = Bus::started();
@@ -157,7 +157,7 @@ fn d51_heartbeat_of_the_board() {
     assert_eq!(bus.take(), []);
 }
 
-/// Section 9: a board sends the same code at most ten times a second. Other codes are not delayed.
+/// Section 9: a board sends an error code at most ten times per second. Other codes are not delayed.
 #[test]
 fn d34_error_rate() {
     let mut bus = Bus::started();
@@ -322,8 +322,8 @@ fn d14_info_survives_the_application() {
     assert!(received.iter().all(|frame| frame.id() == first.id()));
 }
 
-/// D-14, D-36: a second request during a dump of the inputs leads to one further dump after the first. Without inputs
-/// there is no dump.
+/// D-14, D-36: a second request during a dump of the inputs causes one further dump after the first dump. If the
+/// application has no inputs, the board does not send a dump.
 #[test]
 fn d14_dump_of_inputs_twice() {
     for (dimension, packages) in [(0, 0), (3, 1), (7, 3)] {

@@ -102,7 +102,7 @@ impl Bus {
         bus
     }
 
-    /// Gives the next board its number.
+    /// Assigns a number to the next board of the chain.
     pub(super) fn number(&mut self, number: u8) {
         self.send(&format!("{:03X}#", 0x280 + u16::from(number)));
         self.run(5);
@@ -203,7 +203,7 @@ impl Bus {
         }
     }
 
-    /// Returns the frames received since the last `take`.
+    /// Returns the frames that were received since the last call of `take`.
     pub(super) fn take(&mut self) -> Vec<Frame> {
         std::mem::take(&mut self.received).into_iter().map(|(_, frame)| frame).collect()
     }
@@ -270,7 +270,7 @@ pub(super) fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
     }
 }
 
-/// Returns all blocks of both cycles, headers included.
+/// Returns all blocks of both cycles, including the headers.
 pub(super) fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
     let mut all = Vec::new();
     for cycle in 1..=2 {

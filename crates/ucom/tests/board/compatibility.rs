@@ -1,4 +1,5 @@
-//! Boards that follow another reading of the protocol description, selected by the keys of their profile.
+//! Tests of boards that use another interpretation of the protocol description, selected by the keys of their
+//! profile.
 
 use ucom::profile::{AliveMode, Broadcast, Endian, ReportMode};
 use ucom::{Profile, Sequence, Status};
@@ -28,7 +29,7 @@ fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     let numbers = |auto: bool, blind: bool| {
         let mut bus = Bus::new(&[0x21, 0x42, 0x63], with(|p| p.chain_auto_opinit = auto));
         bus.number(1);
-        // INITACK(2) is lost on the way to the PC.
+        // The PC does not receive INITACK(2).
         bus.ask("282#", 20);
         if blind {
             bus.ask("282#", 20);
@@ -43,7 +44,7 @@ fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     assert_eq!(numbers(true, true), [1, 2, 2]);
 }
 
-/// D-23: a board that forgets its number at PC_XRESET can get it again.
+/// D-23: a board that loses its number at PC_XRESET can get this number again.
 #[test]
 fn d23_xreset_forgets_the_number() {
     let mut bus = Bus::new(&[0x21], with(|p| p.xreset_keeps_init = false));
@@ -53,7 +54,7 @@ fn d23_xreset_forgets_the_number() {
     assert_eq!(bus.info(1), None);
     assert_eq!(bus.ask("281#", 20), frames("0C1#01"));
     assert_eq!(bus.status(1), 0x1D);
-    // D-25: the new number does not start the application in the middle of an update.
+    // D-25: the new number does not start the application during an update.
     bus.boards[0].store.autostart = true;
     bus.send("041#");
     bus.ask("281#", 2000);

@@ -1,4 +1,4 @@
-//! The state table, row by row: each event is tested in each state.
+//! Tests of the state table, in which each event is tested in each state.
 
 use ucom::node::Phase;
 use ucom::{Frame, Profile, Sequence, Status};
@@ -279,7 +279,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
     }
 }
 
-/// D-36: dumps are sent only while the application is up, and never after a broadcast request.
+/// D-36: dumps are sent only while the application is running, and never after a broadcast request.
 #[test]
 fn d36_dumps_in_every_state() {
     for phase in STATES {
@@ -295,7 +295,7 @@ fn d36_dumps_in_every_state() {
     }
 }
 
-/// D-26: a board that reboots by itself reports this once.
+/// D-26: a board that reboots without a command reports the reboot once.
 #[test]
 fn d26_spontaneous_report() {
     for phase in STATES {
@@ -359,8 +359,8 @@ fn d24_no_acknowledge_without_a_number() {
     assert!(board.next_deadline() > now, "nothing to do");
 }
 
-/// D-24: the board's number is removed while its acknowledgement is in the CAN controller, and the PC gives
-/// another number. When the old acknowledgement is sent, the board does not get the new number yet.
+/// D-24: the board's number is removed while its acknowledgement is in the CAN controller, and the PC
+/// assigns another number. When the old acknowledgement is sent, the board does not get the new number yet.
 #[test]
 fn d24_acknowledge_of_a_forgotten_number() {
     let mut bus = in_state(Idle);

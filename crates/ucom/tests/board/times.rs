@@ -47,7 +47,7 @@ fn d07_boot_time() {
     }
 }
 
-/// While the flash is busy, a booting board checks its state every millisecond.
+/// While the flash is busy, a booting board checks the flash state every millisecond.
 #[test]
 fn boot_waits_for_the_flash() {
     let (mut board, now) = board(Bus::initialised());
@@ -165,7 +165,7 @@ fn d50_heartbeat_of_the_pc() {
     board.receive(now, &frame("680#"));
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
-    // A heartbeat after exactly this time is too late.
+    // A heartbeat exactly 1500 ms after the last heartbeat is too late.
     board.receive(now + 1500 * MS, &frame("680#"));
     assert_eq!(board.phase(), Phase::Ready);
 }
@@ -342,8 +342,8 @@ fn d44_steps_after_the_last_block() {
     assert_eq!(waits, [400, 500, 0, 0, 0, 500, 500]);
 }
 
-/// D-05: the random delays come from Marsaglia's xorshift32, which has no short cycle. A seed that would make its
-/// state 0 is replaced by 1.
+/// D-05: the random delays come from Marsaglia's xorshift32, which has no short cycle. If a seed would set the
+/// generator's state to 0, the state is set to 1.
 #[test]
 fn d05_random_delays() {
     // The published sequence of random numbers that begins at state 1.

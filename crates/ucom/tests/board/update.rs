@@ -148,7 +148,7 @@ fn d43_frame_before_ready_has_left() {
     assert_eq!(bus.take(), frames("181# 081#04"));
 }
 
-/// D-44: the Program ID is computed from the flash as well, not only from the received data.
+/// D-44: the board computes the Program ID from the received data and also from the flash.
 #[test]
 fn d44_flash_is_read_back() {
     let image = small();
@@ -253,7 +253,7 @@ fn d40_program_then_data_memory() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, first.program_id);
 }
 
-/// D-41: without header blocks the board knows the length and computes the Program ID by itself.
+/// D-41: without header blocks the board uses its configured length and computes the Program ID itself.
 #[test]
 fn d41_no_header() {
     let profile = Profile { prog_header: HeaderForm::None, ..Profile::default() };

@@ -8,7 +8,7 @@ use ucom_sim::memory::MemoryFlash;
 use super::bus::{Board, Bus, blocks, frames, header, image};
 use super::update::{data as data_blocks, small, update};
 
-/// A board with number 1 whose images have no header blocks and are as long as `small`.
+/// Returns a board with number 1, for images without header blocks that are as long as `small`.
 fn headerless(plan: Plan) -> Bus {
     headerless_in(MemoryFlash::default(), plan, 100)
 }
@@ -106,7 +106,8 @@ fn d43_silence_lasts_until_programming_is_enabled_again() {
     assert_eq!(bus.block(&all[0], 5), frames("181#"));
 }
 
-/// D-40, D-41: headers that a board accepts in the first cycle of each plan, and the error codes for refused headers.
+/// D-40, D-41: headers that a board accepts in the first cycle of each plan, and the error codes for headers that it
+/// refuses.
 #[test]
 fn d41_headers_of_the_first_cycle() {
     let (program, data, ram) = (0, 1, 0x10);

@@ -1,4 +1,4 @@
-//! Main loop: board, terminal and real-time clock.
+//! Main loop of the program, which connects the board, the terminal and the real-time clock.
 use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -136,9 +136,9 @@ impl Live {
         }
     }
 
-    /// Pauses virtual time briefly while bytes of a frame may still be on their way through the operating system,
-    /// because the board would measure the delay as a gap. Does not pause while host bytes still wait for
-    /// transmission. Returns `true` after a pause.
+    /// Pauses virtual time briefly while the operating system may still delay bytes of a frame, because the board
+    /// would measure the delay as a gap. Does not pause while host bytes still wait for transmission. Returns
+    /// `true` after a pause.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
         if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
             return Ok(false);

@@ -111,7 +111,7 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Returns bank 2 as an earlier run saved it, or an empty bank if the file does not exist.
+/// Returns bank 2 from the file of an earlier session, or an empty bank if the file does not exist.
 fn kept(path: &Path) -> Result<Bank2, String> {
     match std::fs::read(path) {
         Ok(bytes) if bytes.len() == BANK2_SIZE as usize => Ok(Bank2::from_bytes(&bytes)),

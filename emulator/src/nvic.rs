@@ -45,7 +45,7 @@ pub struct Nvic {
     active: [bool; EXCEPTIONS],
     level: [bool; EXCEPTIONS],
     priority: [u8; EXCEPTIONS],
-    /// Pending and enabled exceptions, unordered.
+    /// Exceptions that are pending and enabled, in any order.
     waiting: Vec<usize>,
     /// AIRCR.PRIGROUP.
     pub prigroup: u32,

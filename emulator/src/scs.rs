@@ -23,7 +23,7 @@ pub struct SysTick {
     load: u32,
     /// Cycle count at which VAL had the reload value.
     start: u64,
-    /// Cycle count of the next wrap.
+    /// Cycle count at which SysTick reloads next.
     wrap: u64,
     wrapped: bool,
 }

@@ -106,7 +106,7 @@ fn j22_pulses_shorter_than_a_tick_are_seen() {
     }
 }
 
-/// Data about how a program ended.
+/// Data about a program that ended with a reset.
 struct End {
     /// Time of the fault or of the last tick.
     begin: Time,

@@ -1,5 +1,5 @@
-//! Whole sessions with a host and an arm, in virtual time. In every tick, a controller on the PC must
-//! compute values that are bit-identical to the values of the board (`rig`).
+//! Complete sessions with a host and an arm, in virtual time. In every tick, a controller on the PC
+//! must compute values that are bit-identical to the values of the board (`rig`).
 mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};

@@ -14,7 +14,8 @@ use jtc_core::slots::{SLOTS, WORD, Word};
 
 use crate::memory;
 
-/// Sectors of the slots. The Cortex-M4 starts in the first sector of the bank, which is never modified.
+/// Flash sectors of the slots for the stored arm. The Cortex-M4 starts in the first sector of the bank, which is
+/// never modified.
 const SECTORS: [u8; SLOTS] = [6, 7];
 const SECTOR_BYTES: u32 = 128 * 1024;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];

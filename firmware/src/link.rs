@@ -1,5 +1,5 @@
-//! Converts bytes to frames. Each serial line has its own parser, whose events are passed to the tick in batches,
-//! through one slot.
+//! The links, which convert received bytes to frames. Each serial line has its own parser, whose events are
+//! passed to the tick in batches, through one slot.
 //!
 //! A batch is a copy, so that a parser can accept more bytes while the tick executes a long frame in slices. If bytes
 //! arrive faster than the tick executes frames, the parser's buffer becomes full, then the ring. After that, bytes
@@ -69,7 +69,7 @@ impl SlotIn {
 }
 
 impl SlotOut {
-    /// Returns the batch until all of its events are done.
+    /// Returns the batch until all of its events are processed.
     pub fn batch(&mut self) -> Option<&EventBatch> {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| FULL.borrow(cs).take());
@@ -77,7 +77,7 @@ impl SlotOut {
         self.0.as_deref()
     }
 
-    /// Marks the oldest `count` events as done.
+    /// Marks the oldest `count` events as processed.
     pub fn done(&mut self, count: usize) {
         if let Some(batch) = &mut self.0 {
             batch.done(count);

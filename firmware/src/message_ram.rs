@@ -16,11 +16,11 @@ pub const BUFFER_WORDS: usize = 2 + MAX_LEN / 4;
 /// Code of a 24-byte payload in RXESC and TXESC.
 pub const SIZE_CODE: u8 = 4;
 
-/// First word of the filters.
+/// Index of the first word of the filters.
 pub const FILTERS: usize = 0;
-/// First word of the receive buffers.
+/// Index of the first word of the receive buffers.
 pub const RX_BUFFERS: usize = FILTERS + RX;
-/// First word of the transmit buffers.
+/// Index of the first word of the transmit buffers.
 pub const TX_BUFFERS: usize = RX_BUFFERS + RX * BUFFER_WORDS;
 /// Number of words of the message memory that are used.
 pub const END: usize = TX_BUFFERS + TX * BUFFER_WORDS;

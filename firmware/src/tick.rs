@@ -47,7 +47,7 @@ const LINKS_SILENT_RESET: u32 = 200;
 
 /// Parts of the firmware that a tick needs.
 pub struct Parts {
-    /// Memory of the trajectory.
+    /// Memory for the trajectory.
     pub points: &'static mut [RawPoint],
     /// Joint bus.
     pub can: Fdcan,
@@ -105,7 +105,7 @@ impl Links {
     }
 }
 
-/// The tick's own data. The interrupt takes the data out while it runs.
+/// Data that only the tick uses. The interrupt takes the data out while it runs.
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
 /// Creates the controller in its static memory. Not inlined, because the controller is large and is created on the

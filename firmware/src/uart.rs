@@ -65,7 +65,7 @@ impl Line {
 #[derive(Clone, Copy)]
 struct Stream {
     registers: St,
-    /// Register that clears the flags of the stream, and the flags.
+    /// Register that clears the flags of the stream, and bit mask of these flags.
     clear: Reg<Ixr, W>,
     flags: Ixr,
     multiplexer: Reg<Ccr, RW>,
@@ -226,7 +226,7 @@ impl Lookahead {
     }
 }
 
-/// The receiving half of a line.
+/// Receiver of a serial line.
 pub struct Receiver {
     usart: Usart,
     ring: Ring,
@@ -270,7 +270,7 @@ impl Receiver {
     }
 }
 
-/// The sending half of a line.
+/// Transmitter of a serial line.
 pub struct Transmitter {
     stream: Stream,
     /// Buffer for transmission, which DMA reads while the stream runs.

@@ -4,9 +4,9 @@ use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 use crate::{BAUD, BOARD, clock};
 
-/// Address of the record.
+/// Address of the version record.
 pub const ADDRESS: usize = 0x0800_0400;
-/// First bytes of the record.
+/// First bytes of the version record.
 pub const MAGIC: [u8; 8] = *b"OPENJTC\0";
 
 /// The version record, which is little-endian like all data of this processor. Texts in the record are padded with

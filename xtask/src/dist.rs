@@ -53,7 +53,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes all files of a release in an empty folder. Returns the parts that were omitted, with the reasons.
+/// Creates all files of a release in an empty folder. Returns the parts that were omitted, with the reasons.
 fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     let mut left_out = Vec::new();
     empty(out)?;

@@ -152,7 +152,8 @@ fn compare(kept: &Path, text: &str) -> Result<()> {
 }
 
 /// Returns the lines that are equal in every build. The latency of an interrupt depends on the exact time of bytes
-/// relative to ticks, so it is not compared here. The program that measures the latency compares it with its limit.
+/// relative to ticks, so this function removes the latency. The program that measures the latency compares it with
+/// its limit.
 fn lasting(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.lines().filter(|line| !line.contains("interrupts are masked"));
     lines.map(|line| line.split(", begins at most").next().unwrap_or_default())

@@ -20,7 +20,7 @@ const FIRST_LINES: &str = "import openjtc\n\
         print(run)\n    \
         assert run.outcome == 'finished' and run._repr_html_().startswith('<iframe')\n";
 
-/// Returns the folder of the wheel.
+/// Returns the folder that contains the wheel.
 fn wheels() -> PathBuf {
     shell::target().join("wheels")
 }
@@ -71,7 +71,7 @@ pub(crate) fn steps(tally: &mut Tally) {
     });
 }
 
-/// Tests the wheel as on a computer with only Python.
+/// Tests the wheel as on a computer without other tools than Python.
 fn fresh(wheel: &Path) -> Result<()> {
     let scratch = Scratch::new("fresh-python")?;
     let environment = scratch.path().join("environment");

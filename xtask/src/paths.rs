@@ -13,7 +13,7 @@ fn cargo_home() -> PathBuf {
         .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))
 }
 
-/// Returns the folders, each with its replacement name. Later entries have priority.
+/// Returns the folders, each with its replacement name. A later entry has priority over an earlier entry.
 pub(crate) fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut folders = vec![
         (shell::root().to_owned(), "openjtc"),

@@ -126,8 +126,8 @@ fn places() -> Result<Vec<Place>> {
     Ok(places)
 }
 
-/// Returns the name of the crate. For files outside of crates, returns the name of the folder, or `pages` for files
-/// at the root.
+/// Returns the name of the crate that contains a file. For files outside of crates, returns the name of the folder,
+/// or `pages` for files at the root.
 fn part(path: &Path) -> String {
     let mut folders = path.iter().map(|folder| folder.to_string_lossy());
     let first = folders.next().unwrap_or_default();

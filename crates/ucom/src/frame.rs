@@ -1,4 +1,4 @@
-//! A frame of the bus.
+//! A frame of the CAN bus.
 
 use core::fmt;
 use core::str::FromStr;
@@ -53,7 +53,7 @@ impl Payload {
         self.data
     }
 
-    /// Returns the number of bytes, 0..8, which is the DLC.
+    /// Returns the number of data bytes (0..8), which equals the DLC.
     pub const fn len(&self) -> u8 {
         self.len
     }
@@ -124,12 +124,12 @@ impl Frame {
         frame.address().map(|_| frame)
     }
 
-    /// Returns the identifier, 11 bits.
+    /// Returns the 11-bit identifier.
     pub const fn id(&self) -> u16 {
         self.id
     }
 
-    /// Returns function and sequence number in the identifier (D-01).
+    /// Returns the function and the sequence number that the identifier contains (D-01).
     pub const fn address(&self) -> Result<(Function, Sequence), Foreign> {
         Function::split(self.id)
     }
@@ -144,7 +144,7 @@ impl Frame {
         self.payload
     }
 
-    /// Returns the length code, 0..8.
+    /// Returns the data length code (DLC), 0..8.
     pub const fn dlc(&self) -> u8 {
         self.payload.len
     }

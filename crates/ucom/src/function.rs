@@ -13,7 +13,7 @@ pub struct Sequence(u8);
 impl Sequence {
     /// Number 0.
     pub const ZERO: Self = Self(0);
-    /// The highest number, 31.
+    /// The highest sequence number, 31.
     pub const MAX: Self = Self(31);
 
     /// Creates a number. Returns `None` for values above 31 instead of masking the value silently (D-01).
@@ -26,12 +26,12 @@ impl Sequence {
         Self(number & 0x1F)
     }
 
-    /// Returns the number, 0..31.
+    /// Returns the sequence number, 0..31.
     pub const fn number(self) -> u8 {
         self.0
     }
 
-    /// Returns all numbers, 0 to 31.
+    /// Returns all sequence numbers, 0 to 31.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..32).map(Self)
     }
@@ -57,7 +57,7 @@ pub enum Sender {
 
 macro_rules! functions {
     ($($(#[doc = $doc:literal])+ $variant:ident = $number:literal, $name:literal, $sender:ident;)+) => {
-        /// A function of the protocol, the upper five bits of the identifier.
+        /// Function of a message, which is encoded in the upper five bits of the identifier.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[repr(u8)]
         pub enum Function { $($(#[doc = $doc])+ $variant = $number),+ }
@@ -149,7 +149,7 @@ impl Function {
         if number < 28 { Some(Self::ALL[number as usize]) } else { None }
     }
 
-    /// Returns the number, 0..27.
+    /// Returns the number of the function, 0..27.
     pub const fn number(self) -> u8 {
         self as u8
     }

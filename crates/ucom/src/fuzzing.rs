@@ -1,4 +1,4 @@
-//! Bodies of the fuzz targets.
+//! Functions that the fuzz targets call.
 
 use crate::{Frame, FromBoard, Profile, ToBoard};
 

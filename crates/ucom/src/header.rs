@@ -1,4 +1,4 @@
-//! The header block, the first block of each cycle (D-41).
+//! The header block, which is the first block of each cycle (D-41).
 
 use core::fmt;
 
@@ -17,7 +17,7 @@ pub enum Memory {
     Program,
     /// Data flash.
     Data,
-    /// RAM, for an exloader.
+    /// RAM, which is used for an exloader.
     Ram,
 }
 
@@ -178,7 +178,7 @@ mod tests {
     fn d41_another_version_is_refused() {
         let header = Header { cycle: 1, memory: 0, address: 0, length: 1, program_id: 0, date: 0, target: 0 };
         let mut block = header.build(Endian::Little);
-        // Version 2 with a correct sum.
+        // The header has version 2 and a correct sum.
         (block[2], block[62]) = (2, block[62].wrapping_sub(1));
         assert_ne!(block[62], 0xFF, "no borrow");
         assert_eq!(Header::parse(&block, Endian::Little), Err(HeaderError::Version(2)));

@@ -25,7 +25,7 @@ impl BoardInfo {
         !(self.program_id == 0xFFFF && self.date == 0xFFFF)
     }
 
-    /// Returns the 8 bytes.
+    /// Returns the 8 bytes of the frame.
     pub const fn payload(&self, endian: Endian) -> Payload {
         let [f0, f1] = endian.bytes(self.flash_number);
         let [p0, p1] = endian.bytes(self.program_id);
@@ -58,7 +58,7 @@ pub struct Dimensions {
 }
 
 impl Dimensions {
-    /// Returns the 6 bytes.
+    /// Returns the 6 bytes of the frame.
     pub const fn payload(&self, endian: Endian) -> Payload {
         let [c0, c1] = endian.bytes(self.ci);
         let [s0, s1] = endian.bytes(self.so);

@@ -23,13 +23,13 @@ pub enum DecodeError {
     Foreign(Foreign),
     /// The frame is a message that only the opposite side sends (D-04).
     Direction(Function),
-    /// The frame has fewer bytes than the message needs (D-12).
+    /// The frame contains fewer bytes than the message needs (D-12).
     TooShort {
         /// Function of the frame.
         function: Function,
         /// Bytes received.
         len: u8,
-        /// Bytes that the message needs.
+        /// Number of bytes that the message needs.
         need: u8,
     },
     /// The length of the message is not one of its valid lengths (D-12). With `dlc.strict`, only the exact length is valid.

@@ -197,7 +197,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 
     /// Reports that the CAN controller stopped trying to send the frame of the last [`Node::poll`] (bus-off). The node offers an
-    /// INITACK again; other frames are lost. DSP_ERROR 6 follows when the bus works again.
+    /// INITACK again; other frames are lost. The board sends DSP_ERROR 6 when the bus works again.
     pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {
@@ -232,7 +232,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         &self.config
     }
 
-    /// Returns the counters, which begin at [`Node::new`].
+    /// Returns the counters, which count since [`Node::new`].
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }

@@ -22,12 +22,12 @@ words! {
 words! {
     /// Encoding of the flash date in 16 bits (D-45), key `prog.date`.
     pub enum DateForm {
-        /// `(year − 1980) << 9 | month << 5 | day`, 1980 to 2107.
+        /// The date is `(year − 1980) << 9 | month << 5 | day`, for the years 1980 to 2107.
         Fat = "fat",
-        /// Days since 2000-01-01, up to 2179.
+        /// The date is the number of days since 2000-01-01, up to the year 2179.
         Days2000 = "days2000",
-        /// Four decimal digits, YYMM, 2000 to 2099. The day is not stored, so a decoded date is the first day of the
-        /// month.
+        /// The date is four decimal digits YYMM, for the years 2000 to 2099. The day is not stored, so a decoded
+        /// date is the first day of the month.
         Bcd = "bcd",
         /// A raw number that this tool does not interpret as a date.
         Raw = "raw",
@@ -202,7 +202,7 @@ mod tests {
         (0..1000).map(|i| (37 * i + 11) as u8).collect()
     }
 
-    /// The Program IDs and the block count on the protocol page.
+    /// The test checks the Program IDs and the block count on the protocol page.
     #[test]
     fn d44_program_id_golden() {
         assert_eq!(checksum(Checksum::Crc16, Endian::Little, b"123456789"), 0x29B1);
@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(DateForm::Days2000.encode(1999, 12, 31), None);
     }
 
-    /// All four digits must be decimal, and the last two must be a month.
+    /// All four digits must be decimal, and the last two digits must be a valid month.
     #[test]
     fn d45_bcd_takes_decimal_digits_only() {
         for date in 0..=u16::MAX {
@@ -279,8 +279,8 @@ mod tests {
         }
     }
 
-    /// Compares with a calendar that counts day by day. Each 16-bit value is one day later than the previous value; the last
-    /// value means 2179-06-05.
+    /// The test compares the dates with a calendar that counts day by day. Each 16-bit value is one day later than the
+    /// previous value; the last value means 2179-06-05.
     #[test]
     fn d45_days_in_a_row() {
         let (mut year, mut month, mut day) = (2000, 1, 1);

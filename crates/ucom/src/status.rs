@@ -27,7 +27,7 @@ impl Status {
     /// Bits that show the actual state and cannot be written.
     pub const MIRRORS: Self = Self(0x31);
 
-    /// Names of the bits, bit 7 first.
+    /// Names of the status bits, beginning with bit 7.
     pub const NAMES: [(&'static str, Self); 8] = [
         ("MSTART", Self::MSTART),
         ("ASTART", Self::ASTART),
@@ -55,7 +55,8 @@ impl Status {
         if on { Self(self.0 | bits.0) } else { Self(self.0 & !bits.0) }
     }
 
-    /// Applies the published formula of PC_SETSTATUS literally: `(old & ~mask) | value`. The second operand is not masked (D-22).
+    /// Applies the published formula of PC_SETSTATUS literally: `(old & ~mask) | value`. The value is not masked
+    /// (D-22).
     #[must_use]
     pub const fn set(self, mask: u8, value: u8) -> Self {
         Self((self.0 & !mask) | value)

@@ -38,7 +38,7 @@ pub fn string_package(text: &[u8], i: u16, profile: &Profile) -> Option<Payload>
     Payload::new(rest.get(..8).unwrap_or(rest)).filter(|payload| !payload.is_empty())
 }
 
-/// The packages of a string, header first.
+/// The packages of a string, beginning with the header.
 #[derive(Clone, Debug)]
 pub struct StringPackages<'a> {
     text: &'a [u8],
@@ -63,7 +63,7 @@ impl Iterator for StringPackages<'_> {
     }
 }
 
-/// Effect of a package on the string in progress.
+/// Result of adding a package to the string in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Assembled<'a> {
     /// More packages follow.

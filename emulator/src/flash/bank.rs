@@ -12,7 +12,7 @@ pub const WORD: usize = 32;
 const WORDS: usize = BANK2_SIZE as usize / WORD;
 /// Number of words per sector.
 const SECTOR_WORDS: usize = 128 * 1024 / WORD;
-/// State of a word.
+/// State of a flash word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
     /// All bits of the word are 1, and the word can be programmed.

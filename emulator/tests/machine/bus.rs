@@ -42,8 +42,8 @@ impl CanPeers for Listener {
     }
 }
 
-/// Returns a machine whose FDCAN1 runs at 1 and 5 Mbit/s from a PLL2 of 85 MHz, with two filters for receive buffers 0
-/// and 1 and two transmit buffers. `prescaler` is the prescaler of the nominal phase.
+/// Returns a machine whose FDCAN1 runs at 1 and 5 Mbit/s from a PLL2 of 85 MHz. FDCAN1 has two filters for receive
+/// buffers 0 and 1, and two transmit buffers. `prescaler` is the prescaler of the nominal phase.
 fn with_prescaler(prescaler: u32, peers: Option<Listener>) -> Machine {
     let mut machine = machine(SLEEP, &[]);
     let rcc = 0x5802_4400;

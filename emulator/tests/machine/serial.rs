@@ -114,7 +114,7 @@ fn a_dma_ring_takes_a_stream_and_wraps() {
     machine.chip().usarts[1].host_write(start, &(1..=19).collect::<Vec<u8>>());
     machine.run_until(start + 4 * 10 * MICROSECOND + MICROSECOND);
     assert_eq!(machine.memory(RING, 4).unwrap(), [1, 2, 3, 4]);
-    // Half of the transfers are done. The interrupt line remains high, because the flag is never cleared.
+    // Half of the DMA transfers are complete. The interrupt line remains high, because the flag is never cleared.
     assert!(machine.chip().observers.latencies[FIRST_LINE + 12].entries > 0);
     machine.run_until(start + MILLISECOND);
     assert_eq!(machine.memory(RING, 8).unwrap(), [17, 18, 19, 12, 13, 14, 15, 16]);

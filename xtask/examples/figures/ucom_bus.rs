@@ -25,7 +25,7 @@ struct Bench {
     tool: MemberId,
     boards: Vec<MemberId>,
     chain: ChainSim,
-    /// All frames in the order of the bus.
+    /// All frames in their order on the bus.
     received: Vec<CanFrame>,
     /// Time at which the last frame of program data ended on the bus. The next field is the total time until the boards answered
     /// frames of program data, ns.
@@ -33,7 +33,7 @@ struct Bench {
     turn_round_ns: u64,
 }
 
-/// Cost and outcome of a procedure.
+/// Duration and result of a procedure.
 struct Cost {
     seconds: f64,
     busy_seconds: f64,

@@ -6,7 +6,7 @@ use jtc_host::port::sim::SimPort;
 use jtc_sim::{Operator, SimConfig, World, host};
 use jtc_wire::{ExecCommand, RawPoint};
 
-/// Result with an error of any type.
+/// Result type for errors of any type.
 pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// Returns a session with a controller in HoldPos that uses its default parameters.

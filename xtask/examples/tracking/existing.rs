@@ -13,12 +13,12 @@ use jtc_wire::RawPoint;
 const GAIN: f64 = 1.3;
 /// Duration of a tick, s.
 const DT: f64 = 0.001;
-/// Number of errors in the mean for the derivative.
+/// Number of errors whose mean is used for the derivative.
 const WINDOW: usize = 5;
 /// Number of ticks in position hold before the motion.
 const SETTLE: u32 = 2_000;
 
-/// PID controller. After a reset the errors of the last ticks are zero.
+/// PID controller. After a reset, the stored errors of the last ticks are zero.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pid {
     errors: [f64; WINDOW],

@@ -1,4 +1,4 @@
-//! Paths of the comparison.
+//! Paths along which both controllers are compared.
 use jtc_host::example;
 use jtc_wire::RawPoint;
 

@@ -21,7 +21,7 @@ pub struct Path {
 /// RMS values over the path, for each joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Figures {
-    /// Commanded minus true position at the time when the command begins to act, mrad.
+    /// Commanded minus true position at the time when the command takes effect, mrad.
     pub true_error: [f64; JOINTS],
     /// Position error that the controller calculates, mrad.
     pub own_error: [f64; JOINTS],

@@ -2,7 +2,7 @@
 use super::{Failed, Figures};
 use crate::size;
 
-/// Target of a figure.
+/// Target value of a performance figure.
 #[derive(Clone, Copy)]
 enum Target {
     /// Our value must be at most factor × anchor.
@@ -19,8 +19,8 @@ enum Target {
 struct Row {
     title: &'static str,
     ours: &'static str,
-    /// Anchors of the figure. The figure is compared with the smallest anchor. The table also lists anchors that
-    /// could not be measured.
+    /// Anchors (reference values) of the figure. The figure is compared with the smallest anchor. The table also
+    /// lists anchors that could not be measured.
     anchors: &'static [&'static str],
     target: Target,
     unit: &'static str,

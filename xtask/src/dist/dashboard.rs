@@ -7,13 +7,13 @@ use crate::shell::root;
 /// Libraries whose scripts are part of the built files. Other entries of web/package.json are used only by the build and the tests.
 const NAMES: [&str; 4] = ["clsx", "svelte", "three", "uplot"];
 
-/// Library of the dashboard.
+/// JavaScript library of the dashboard.
 pub(super) struct Library {
-    /// Name in the registry npm.
+    /// Name of the library in the npm registry.
     pub name: String,
-    /// Version in the lock file.
+    /// Version of the library in the lock file.
     pub version: String,
-    /// Licence, as an SPDX identifier.
+    /// Licence of the library, as an SPDX identifier.
     pub licence: String,
     /// Text of the library's licence.
     pub text: String,

@@ -6,16 +6,16 @@ use serde_json::json;
 use super::tree::{Tree, sha256};
 use crate::firmware;
 
-/// First address of flash.
+/// First address of the flash.
 const FLASH: u64 = 0x0800_0000;
 /// Number of bytes from the start of flash to the stored arm, which an image must not overwrite. The stored arm is in the last two
-/// sectors of bank 2. The few words for the second core of an H745 are at the start of bank 2, so the images of these boards contain a
-/// gap of erased flash.
+/// sectors of bank 2. The words for the second core of an H745 are at the start of bank 2. The images for H745 boards therefore
+/// contain a gap of erased flash.
 const ROOM: u64 = (2048 - 2 * 128) * 1024;
 /// Value of erased flash bytes.
 const ERASED: u8 = 0xff;
 
-/// Program of a board.
+/// Flash image of a board's program.
 pub(super) struct Image {
     /// Name of the board.
     pub board: &'static str,

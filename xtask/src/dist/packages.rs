@@ -38,7 +38,7 @@ pub(super) struct Release {
     pub images: Vec<Image>,
 }
 
-/// File of a release.
+/// File that belongs to a release.
 pub(super) struct Made {
     /// Name.
     pub name: String,

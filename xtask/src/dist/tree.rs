@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn sums_are_those_that_the_standard_names() {
-        // FIPS 180-2, appendix B.1.
+        // The expected value is from FIPS 180-2, appendix B.1.
         assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
     }
 }

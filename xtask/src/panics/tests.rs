@@ -74,7 +74,7 @@ fn what_is_not_called_does_not_count() {
 }
 
 /// Returns the report for a program whose `tick`, at 0 to 8, contains a return and then two halfwords of data or code.
-/// The panic is at 8.
+/// The panicking function is at address 8.
 fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);

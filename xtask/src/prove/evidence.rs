@@ -41,7 +41,7 @@ fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))>
 /// Mutant, identified by the file, the source line without indentation, and the change, but not by a line number.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Named {
-    /// Path from the root of the workspace.
+    /// Path of the source file, relative to the root of the workspace.
     pub file: String,
     /// Source line in which the mutant begins.
     pub line: String,

@@ -82,7 +82,7 @@ fn install() -> Result<()> {
 
 /// Returns the folders of found inputs and kept inputs, and the folder of regressions if it exists.
 fn directories(target: &str) -> Result<Vec<String>> {
-    // Found inputs accumulate in the build folder, outside git. Kept inputs are in git.
+    // Found inputs accumulate in the build folder, outside git. Kept inputs are stored in git.
     let mut directories = vec![format!("fuzz/target/corpus/{target}"), format!("fuzz/corpus/{target}")];
     for directory in &directories {
         let path = root().join(directory);

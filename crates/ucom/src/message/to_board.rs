@@ -69,7 +69,7 @@ impl ToBoard {
         }
     }
 
-    /// Returns the frame to a board.
+    /// Returns the frame that carries the message to a board.
     pub fn encode(&self, to: Sequence, profile: &Profile) -> Frame {
         let payload = match *self {
             Self::SetStatus { mask, value } => Payload::of([mask, value, 0, 0, 0, 0, 0, 0], 2),

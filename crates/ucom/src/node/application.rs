@@ -32,7 +32,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.send_admin_unasked();
     }
 
-    /// Starts the control loop. From now on the PC must send heartbeats (D-50).
+    /// Starts the control loop. While the loop runs, the PC must send heartbeats (D-50).
     pub(super) fn run_loop(&mut self) {
         if self.app != App::Up {
             return;
@@ -120,7 +120,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// Copies the words of a package. Returns `true` if the package starts inside the buffer.
+/// Copies the words of a package into the buffer. Returns `true` if the package starts inside the buffer.
 fn put(package: &BufferPackage, buffer: &mut [u16], dimension: usize) -> bool {
     let len = buffer.len().min(dimension);
     buffer.get_mut(..len).is_some_and(|buffer| package.apply(buffer).is_ok())

@@ -9,13 +9,13 @@ pub struct NodeConfig {
     pub flash_number: u16,
     /// Compatibility profile of this board.
     pub profile: Profile,
-    /// Seed of the board's random numbers, which are used for the back-off of D-05.
+    /// Seed of the board's random numbers, which are used for the random delays of D-05.
     pub seed: u32,
     /// Time from a reset until the board listens, µs; at most 200 000 µs (D-07).
     pub boot_us: u64,
     /// Shortest time from the last frame of a block to the board's answer, µs.
     pub block_us: u64,
-    /// Time between control cycles, µs.
+    /// Time between two control cycles, µs.
     pub control_period_us: u64,
     /// Length of an image in words, used if `prog.header` is `none`; 0 means the whole area.
     pub headerless_words: u32,

@@ -71,7 +71,7 @@ pub trait Flash {
 
 /// The init pins of the chain (section 5 of the protocol).
 pub trait Pins {
-    /// Returns the level of the incoming pin, which is strapped active on the first board.
+    /// Returns the level of the incoming pin, which is permanently active on the first board.
     fn init_in(&self) -> bool;
 
     /// Drives the outgoing pin. After power-up, the outgoing pin MUST be inactive without a call of this method.
@@ -103,8 +103,8 @@ pub enum Text {
     Par(u16),
 }
 
-/// The program in the application area. Its methods are called only between [`Application::start`] and [`Application::stop`]. The
-/// exception is [`Application::outputs`] with `false`.
+/// The program in the application area. Its methods are called only between [`Application::start`] and [`Application::stop`].
+/// Only [`Application::outputs`] with `false` may also be called at other times.
 pub trait Application {
     /// Starts the program.
     fn start(&mut self, now_us: u64);

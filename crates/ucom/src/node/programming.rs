@@ -25,7 +25,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.error(code);
     }
 
-    /// Handles PC_PROG, which carries an eighth of a block.
+    /// Handles PC_PROG, which carries 8 bytes of a block.
     pub(super) fn program(&mut self, data: [u8; 8], is_broadcast: bool) {
         if self.programming.discard {
             return;
@@ -143,7 +143,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if self.programming.work == Work::ClearRecord { Ok(()) } else { self.block_taken() }
     }
 
-    /// Returns the header for a board whose images have none. The length is the configured length, but at most the length of the area.
+    /// Returns the header for a board whose images have no header block. The length is the configured length, but at
+    /// most the length of the area.
     fn header_by_itself(&self) -> Option<Header> {
         let cycle = self.programming.number;
         let memory = match (self.config.profile.prog_plan, cycle) {
@@ -275,8 +276,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Ok(())
     }
 
-    /// Returns the new record. For images for program and data memory, the record describes the program memory, although data memory is
-    /// written last.
+    /// Returns the validity record of the new application. For images for program and data memory, the record describes the program
+    /// memory, although data memory is written last.
     fn new_record(&self) -> Option<Record> {
         let header = match self.config.profile.prog_plan {
             Plan::PmemXmem => self.programming.first?,

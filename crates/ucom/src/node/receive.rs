@@ -64,8 +64,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Sends DSP_ERROR 7 (D-12), but not for messages that the board ignores anyway. A board without a number does not send DSP_ERROR 7,
-    /// because all boards without a number would send it at the same time with the same identifier (D-06).
+    /// Sends DSP_ERROR 7 (D-12), but not for messages that the board ignores anyway. A board without a number does not send DSP_ERROR 7.
+    /// All boards without a number would send this error at the same time with the same identifier (D-06).
     fn wrong_length(&mut self, function: Function, to: Sequence) {
         self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);
         let served = matches!(self.app, App::Up | App::Running);

@@ -1,4 +1,4 @@
-//! The order in which frames are sent.
+//! The order in which a board sends its frames.
 
 use super::{Application, Flash, Node, Pins, Store};
 use crate::frame::Frame;

@@ -1,4 +1,4 @@
-//! Actions that are due as time passes.
+//! Actions that a board executes when their due time is reached.
 
 use super::{App, Application, Flash, FlashState, Node, Pins, Store};
 use crate::error_code::ErrorCode;

@@ -1,4 +1,4 @@
-//! The keys. Each line of the table has field, default, range, rule and meaning.
+//! The keys. Each line of the table contains field, default, range, rule and meaning of a key.
 
 use core::fmt;
 
@@ -33,7 +33,7 @@ pub struct Key {
 }
 
 impl Key {
-    /// Returns the value in a profile, for display.
+    /// Returns the value of the key in a profile, as text for display.
     pub fn value<'a>(&'a self, profile: &'a Profile) -> impl fmt::Display + 'a {
         struct Shown<'a>(&'a Key, &'a Profile);
         impl fmt::Display for Shown<'_> {
@@ -71,7 +71,7 @@ macro_rules! keys {
             pub const DEFAULT: Self = Self { $($field: $value),+ };
         }
 
-        /// Every key, in the order of files and help.
+        /// All keys, in the order that files and help use.
         pub static KEYS: &[Key] = &[$(Key {
             name: $name,
             default: $default,

@@ -21,7 +21,7 @@ macro_rules! words {
             /// All values.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
-            /// Returns the word in files.
+            /// Returns the word that profile files use.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
             }
@@ -56,7 +56,7 @@ words! {
 }
 
 impl Endian {
-    /// Returns the two bytes of a word.
+    /// Returns the two bytes of a 16-bit word.
     pub const fn bytes(self, word: u16) -> [u8; 2] {
         match self {
             Self::Little => word.to_le_bytes(),
@@ -64,7 +64,7 @@ impl Endian {
         }
     }
 
-    /// Returns the word of two bytes.
+    /// Returns the 16-bit word that consists of two bytes.
     pub const fn word(self, bytes: [u8; 2]) -> u16 {
         match self {
             Self::Little => u16::from_le_bytes(bytes),

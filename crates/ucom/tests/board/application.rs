@@ -146,7 +146,7 @@ fn d50_text_when_the_pc_is_lost() {
     assert!(received.contains(&frames("601#00000100")[0]));
 }
 
-/// A board sends its heartbeat every second while the application is running. D-51 is the reaction of the PC.
+/// A board sends its heartbeat every second while the application is running. D-51 defines the reaction of the PC.
 #[test]
 fn d51_heartbeat_of_the_board() {
     let mut bus = Bus::started();
@@ -157,7 +157,7 @@ fn d51_heartbeat_of_the_board() {
     assert_eq!(bus.take(), []);
 }
 
-/// Section 9: a board sends an error code at most ten times per second. Other codes are not delayed.
+/// Section 9: a board sends an error code at most ten times per second. This limit does not delay other error codes.
 #[test]
 fn d34_error_rate() {
     let mut bus = Bus::started();

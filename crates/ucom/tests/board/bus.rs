@@ -247,7 +247,7 @@ impl Bus {
     }
 }
 
-/// Frames in candump's form, separated by blanks.
+/// Parses frames in candump's form that are separated by blanks.
 pub(super) fn frames(text: &str) -> Vec<Frame> {
     text.split_whitespace().map(|frame| frame.parse().unwrap()).collect()
 }

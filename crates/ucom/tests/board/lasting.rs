@@ -1,4 +1,4 @@
-//! Use of the board's non-volatile memory.
+//! Tests of how the board uses its non-volatile memory.
 
 use ucom::Frame;
 use ucom::node::{Node, NodeConfig, Store};

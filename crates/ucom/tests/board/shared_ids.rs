@@ -53,7 +53,8 @@ proptest! {
         }
         bus.run(50);
         for (at, frame) in &bus.received {
-            // A dump begins with the dimensions. The remaining frames of a dump in progress follow at once (D-14).
+            // A dump of the IO description begins with the dimensions. The remaining frames of a dump in progress
+            // follow at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());

@@ -5,7 +5,7 @@ use ucom::{Frame, Profile, Sequence, Status};
 
 use super::bus::{Bus, blocks, frames, image};
 
-/// The columns of the table. S3x (`Aborted`) and S4 (`Starting`) are separate columns here.
+/// The columns of the state table. S3x (`Aborted`) and S4 (`Starting`) are separate columns here.
 const STATES: [Phase; 7] = [
     Phase::Uninitialised,
     Phase::Idle,
@@ -42,7 +42,7 @@ fn in_state(phase: Phase) -> Bus {
     bus
 }
 
-/// Result of an event.
+/// State and frames of a board after an event.
 struct Seen {
     phase: Phase,
     /// Frames sent within 9 ms, before the first transfer of the outputs.
@@ -360,7 +360,8 @@ fn d24_no_acknowledge_without_a_number() {
 }
 
 /// D-24: the board's number is removed while its acknowledgement is in the CAN controller, and the PC
-/// assigns another number. When the old acknowledgement is sent, the board does not get the new number yet.
+/// assigns another number. When the old acknowledgement is sent, the board does not accept the new number
+/// yet.
 #[test]
 fn d24_acknowledge_of_a_forgotten_number() {
     let mut bus = in_state(Idle);

@@ -228,7 +228,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     let (mut waiting, now) = board(bus);
     waiting.sent(now, &frame("081#07"));
     assert_eq!((waiting.next_deadline(), waiting.poll(now)), (0, Some(acknowledge)));
-    // The test also covers the two answers of a transfer.
+    // The test also checks the two answers of a transfer.
     let (whole, last) = last_block();
     let first = super::bus::blocks(&[1; 64], &ucom::Profile::default())[0];
     for (mut bus, data, expected) in [(programming(), first, "181#"), (whole, last, "101#")] {

@@ -6,7 +6,7 @@ use can_link::CanFrame;
 
 use crate::clock::{MICROSECOND, NEVER, Time, from_ns};
 
-/// Durations of a bit on the bus.
+/// Duration of a bit in the nominal phase on the bus.
 pub const NOMINAL_BIT: Time = MICROSECOND;
 /// Total duration of an error flag, its echo, the delimiter and the intermission.
 pub const ERROR_FRAME: Time = 20 * NOMINAL_BIT;

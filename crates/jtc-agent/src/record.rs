@@ -1,8 +1,8 @@
 //! Records every motion of any client. The recorder is itself a client of the agent, with read-only access.
 //!
-//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the line, [`Recorder`] follows the statuses. A thread follows the
-//! statuses and another one writes, so a slow disk delays only the writer. Neither thread delays the line. If the queue between them is
-//! full, samples are dropped, and the recording contains the number of dropped samples.
+//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the line, [`Recorder`] follows the statuses. One thread follows the
+//! statuses and another thread writes the recordings, so a slow disk delays only the writer. Neither thread delays the serial line. If the
+//! queue between them is full, samples are dropped, and the recording contains the number of dropped samples.
 mod disk;
 mod motion;
 mod retention;
@@ -34,13 +34,13 @@ pub use disk::{Notice, Notify};
 
 /// Largest number of frames that wait for the follower.
 const SEEN_MAX: usize = 256;
-/// Largest number of statuses that wait while the controller is asked for its identity.
+/// Largest number of statuses that wait while the recorder requests the identity of the controller.
 const ARRIVED_MAX: usize = 1 << 12;
 /// Longest wait for a status before the end condition is checked.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time without a command after which the line is quiet enough to ask the controller for its identity.
+/// Time without a command after which the recorder may request the identity of the controller.
 const QUIET: Duration = Duration::from_millis(300);
-/// Time after which a controller that did not answer is asked again.
+/// Time after which the request is repeated if the controller did not answer.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
 /// Longest wait for the disk at the end.
 const LAST_WORDS: Duration = Duration::from_secs(5);
@@ -51,22 +51,22 @@ const NAME: &str = "recorder of the agent";
 enum Seen {
     /// A Trajectory frame.
     Segment(Vec<u8>),
-    /// Answer to such a frame; `true` if it was accepted.
+    /// Answer to a frame that recordings need; `true` if the controller accepted the frame.
     Answered(bool),
-    /// Jog, with its time of the line.
+    /// Jog frame and its time on the serial line.
     Jog(Duration),
-    /// Frame that may change the arm, with its time of the line.
+    /// Frame that may change the arm, and its time on the serial line.
     Change(Duration),
 }
 
-/// Passes events of the line to the recorder. Never waits.
+/// Receiver that passes events of the serial line to the recorder. Never waits.
 pub struct Witness {
     seen: SyncSender<Seen>,
     missed: Arc<AtomicBool>,
 }
 
 impl Witness {
-    /// Takes an event of the line.
+    /// Processes an event of the serial line.
     pub fn see(&self, now: Duration, event: &LineEvent) {
         let seen = match event {
             LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => Seen::Segment(bytes.clone()),
@@ -93,7 +93,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens or creates the directory; recordings use at most `limit` bytes of it.
+    /// Opens or creates the directory; all recordings together use at most `limit` bytes.
     ///
     /// # Errors
     ///
@@ -105,12 +105,12 @@ impl Prepared {
         Ok(Self { retention: Retention::open(dir, limit)?, witness, seen, missed })
     }
 
-    /// Returns the witness for the observer of the line's owner. Later calls return `None`.
+    /// Returns the witness that the owner of the line calls for each event. Returns `None` at later calls.
     pub fn witness(&mut self) -> Option<Witness> {
         self.witness.take()
     }
 
-    /// Begins to record the motions on `line`; `source` is its name.
+    /// Begins to record the motions on `line`; `source` is the name of the line.
     ///
     /// # Errors
     ///
@@ -146,7 +146,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Ends the current recording and waits, for a limited time, until it is written.
+    /// Ends the current recording and waits, for a limited time, until the recording is written.
     pub fn end(self) {}
 }
 
@@ -169,8 +169,8 @@ struct Identity {
 }
 
 impl Identity {
-    /// Returns the identity that is used for a device that does not report its own. A controller with the hash of the
-    /// built-in arm does not need to be asked for its arm.
+    /// Returns the identity that is used for a device that does not report its own. A controller with the hash of the built-in arm has the
+    /// built-in arm, so the recorder does not request the arm.
     fn built_in() -> Self {
         let arm = Arm::avena();
         Self { delay_ticks: arm.config().delay_ticks, hash: arm.hash().ok().flatten(), arm, device: None }
@@ -179,7 +179,7 @@ impl Identity {
 
 /// Possible change of the arm.
 struct Doubt {
-    /// Time of the line since which the arm is uncertain.
+    /// Time on the serial line since which the arm is uncertain.
     since: Duration,
     asked: Option<Duration>,
 }
@@ -187,7 +187,7 @@ struct Doubt {
 /// Recording in progress.
 struct Reel {
     trajectory: Option<Arc<Trajectory>>,
-    /// Clock of the recording, which begins with the first status.
+    /// Clock of the recording. It starts at the first status.
     clock: Option<StatusClock>,
 }
 
@@ -207,7 +207,7 @@ struct Following {
     reel: Option<Reel>,
 }
 
-/// Connects a client with read-only access. Returns its session, and the queue of its received statuses.
+/// Connects a client with read-only access. Returns the session of this client and the queue of received statuses.
 fn connect(line: &Line) -> (Session<ClientPort>, Arrived) {
     let introduction = Introduction { name: NAME.into(), role: Role::Viewer, policy: Policy::Continue };
     let mut session = Session::new(line.connect(introduction));
@@ -274,7 +274,7 @@ impl Following {
         }
     }
 
-    /// Takes a status. If the controller has started again, it may have another arm, and it has no trajectory.
+    /// Takes a status. If the controller has restarted, it contains no trajectory and may have another arm.
     fn look_at(&mut self, now: Duration, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.upload.forget();
@@ -282,8 +282,8 @@ impl Following {
         }
     }
 
-    /// Asks for the identity of the controller if it is uncertain and the line is quiet. Asks as rarely as possible,
-    /// because host supervision takes each question as a sign of life of the host (J-59).
+    /// Requests the identity of the controller if the identity is uncertain and no commands are sent. Sends as few requests as possible,
+    /// because each request tells host supervision that the host is alive (J-59).
     fn resolve_doubt(&mut self, session: &mut Session<ClientPort>) {
         let now = session.now();
         let due = self.doubt.as_ref().is_some_and(|doubt| {
@@ -295,7 +295,7 @@ impl Following {
         }
     }
 
-    /// Asks for the identity of the controller, and for its arm if it has changed.
+    /// Requests the identity of the controller, and the arm if the arm has changed.
     fn ask(&mut self, session: &mut Session<ClientPort>) {
         let asked = Some(session.now());
         if let Some(doubt) = &mut self.doubt {

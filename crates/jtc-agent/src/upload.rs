@@ -1,4 +1,4 @@
-//! Trajectory of the controller, rebuilt from the frames that were sent to it.
+//! Trajectory of the controller, reassembled from the frames that were sent to the controller.
 use std::sync::Arc;
 
 use jtc_host::{Point, Trajectory};
@@ -9,7 +9,7 @@ use crate::line::LineEvent;
 /// Largest number of points that a controller accepts (J-30).
 const POINTS_MAX: usize = 12_000;
 
-/// Received segments, in their order.
+/// Points of the received segments, in order.
 #[derive(Clone, Default)]
 struct Assembly {
     number: u16,
@@ -17,7 +17,7 @@ struct Assembly {
     segments: u16,
     /// Number of received segments.
     taken: u16,
-    /// Number of points before the last segment. Used if the segment is sent again.
+    /// Number of points before the last segment. This number is used if the last segment is sent again.
     before_last: usize,
     points: Vec<Point>,
 }
@@ -26,13 +26,13 @@ struct Assembly {
 #[derive(Default)]
 pub(crate) struct Upload {
     current: Option<Assembly>,
-    /// New upload. If its first segment is refused, the previous upload stays valid.
+    /// New upload. Next upload. If the controller refuses its first segment, the previous upload stays valid.
     next: Option<Assembly>,
     whole: Option<Arc<Trajectory>>,
 }
 
 impl Upload {
-    /// Returns `true` if an event belongs to an upload.
+    /// Returns `true` if the event belongs to an upload of a trajectory.
     pub(crate) fn is_of(event: &LineEvent) -> bool {
         match event {
             LineEvent::Sent { frame_type, .. } => *frame_type == FrameType::Trajectory,
@@ -41,7 +41,7 @@ impl Upload {
         }
     }
 
-    /// Takes an event of the line.
+    /// Processes an event of the serial line.
     pub(crate) fn see(&mut self, event: &LineEvent) {
         match event {
             LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => self.sent(bytes),
@@ -54,15 +54,14 @@ impl Upload {
         }
     }
 
-    /// Returns `true` if a Trajectory frame was accepted; `None` if this is not the answer to an undamaged Trajectory
-    /// frame.
+    /// Returns `true` if a Trajectory frame was accepted; `None` if the response does not belong to an undamaged Trajectory frame.
     pub(crate) fn answer(response: &Response) -> Option<bool> {
         let whole =
             response.frame_type == FrameType::Trajectory as u8 && response.status == FrameStatus::NoError;
         whole.then_some(response.data == DataStatus::NoError)
     }
 
-    /// Takes a Trajectory frame that was sent to the controller.
+    /// Processes a Trajectory frame that was sent to the controller.
     pub(crate) fn sent(&mut self, frame: &[u8]) {
         let Some(Ok(Command::Trajectory(segment))) = FrameRef::new_checked(frame).map(Command::parse) else {
             return;
@@ -81,7 +80,7 @@ impl Upload {
             return;
         }
         if segment.segment.checked_add(1) == Some(assembly.taken) {
-            // The record of the segment was lost, so the segment was sent again.
+            // The response record of the segment was lost, so the client sent the segment again.
             assembly.points.truncate(assembly.before_last);
         } else if segment.segment == assembly.taken && assembly.taken < assembly.segments {
             assembly.taken += 1;
@@ -95,8 +94,8 @@ impl Upload {
         self.whole = None;
     }
 
-    /// Takes the answer to a Trajectory frame. Records come in the order of the frames, so the first record after a
-    /// first segment belongs to it.
+    /// Processes the answer to a Trajectory frame. Response records arrive in the order of the frames, so the first record after a first
+    /// segment belongs to that segment.
     pub(crate) fn answered(&mut self, accepted: bool) {
         if let Some(next) = self.next.take() {
             self.whole = None;
@@ -111,11 +110,11 @@ impl Upload {
         *self = Self::default();
     }
 
-    /// Returns the controller's trajectory, if all its segments were seen. `executes`: the controller runs the
-    /// trajectory, so it must be complete.
+    /// Returns the controller's trajectory, if all segments of the trajectory were received. If `executes` is true, the controller executes
+    /// the trajectory, so the trajectory must be complete.
     pub(crate) fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
         if executes {
-            // The record of the first segment was lost.
+            // The response record of the first segment was lost.
             self.answered(true);
         }
         let current = self.current.as_ref().filter(|c| c.taken == c.segments && c.points.len() >= 2)?;
@@ -153,7 +152,7 @@ mod tests {
             assert_eq!(upload.trajectory(false), None);
             upload.sent(frame);
             if i == 1 {
-                // The record was lost.
+                // The response record was lost.
                 upload.sent(frame);
             }
             upload.answered(true);
@@ -178,7 +177,7 @@ mod tests {
         }
         upload.answered(true);
         upload.answered(true);
-        // Frames in flight together: the first is refused, and so are those after it.
+        // Several frames are sent before the first answer. The controller refuses the first frame and all frames after it.
         for frame in &new {
             upload.sent(frame);
         }

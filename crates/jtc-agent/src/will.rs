@@ -1,7 +1,7 @@
-//! Last will of a killed agent: a small file with the client whose policy applies. The file exists while the arm moves.
-//! The next agent at the same port reads it before it serves any client.
+//! Last will of a killed agent. The will is a small file that names the client whose policy applies. The file exists while the arm moves.
+//! The next agent at the same port reads the file before it serves a client.
 //!
-//! A separate thread writes the file, so neither a Stop nor the line waits for the disk.
+//! A separate thread writes the file, so the disk does not delay a Stop or other frames.
 mod apply;
 mod file;
 mod keeper;

@@ -1,5 +1,5 @@
-//! docs/openapi.json is equal to the description that an agent serves. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite
-//! description::` writes it.
+//! The file docs/openapi.json is equal to the description that an agent serves. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite
+//! description::` writes this file.
 use std::path::Path;
 
 use host_kit::{Action, FrontEnd};
@@ -19,7 +19,7 @@ fn the_description_in_the_docs_is_that_of_the_code() {
     );
 }
 
-/// Each next step in an error refers to a request, or to a command if the API has no such request.
+/// The suggested next step in each error names a request, or a command if the API has no request for this step.
 #[test]
 fn each_request_of_a_next_step_exists() {
     let description: Value = serde_json::from_str(&jtc_agent::api::description()).expect("JSON");

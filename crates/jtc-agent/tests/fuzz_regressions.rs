@@ -1,4 +1,4 @@
-//! Runs the body of the fuzz target with the kept inputs and with random inputs.
+//! Runs the body of the fuzz target with the stored inputs and with random inputs.
 use jtc_agent::modbus::fuzzing::modbus_stream;
 use proptest::prelude::*;
 
@@ -7,13 +7,13 @@ fn kept_inputs() {
     test_kit::run_kept_inputs(&[("modbus_stream", modbus_stream)]);
 }
 
-/// A request with its header.
+/// Returns a Modbus request with its header.
 fn request(pdu: Vec<u8>) -> Vec<u8> {
     let len = (pdu.len() + 1) as u16;
     [&[0xAB, 0xCD, 0, 0][..], &len.to_be_bytes(), &[7], &pdu].concat()
 }
 
-/// Random requests, mostly with addresses of the device and a correct length.
+/// Returns random requests. Most have addresses of the device and a correct length.
 fn requests() -> impl Strategy<Value = Vec<u8>> {
     let any_request = prop::collection::vec(any::<u8>(), 1..20);
     let write =

@@ -1,4 +1,5 @@
-//! Many clients on one line: which client receives a record, which client may command, and how soon a Stop is sent.
+//! Many clients on one serial line. The tests check which client receives a response record, which client may send commands, and how soon a
+//! Stop is sent.
 use crate::board;
 
 use std::time::Duration;
@@ -53,7 +54,7 @@ proptest! {
         board.run_ms(100);
         let at = board.frames.iter().find(|(_, t, _)| *t == Some(FrameType::TrajSetExecStatus)).expect("it came").0;
         prop_assert!(at - asked <= Duration::from_millis(40), "{:?}", at - asked);
-        // No further frame of the upload arrives, and its sender is told the reason.
+        // No further frame of the upload arrives, and its sender receives the reason.
         board.run_ms(6_000);
         let behind = board.frames.iter().filter(|(t, kind, _)| *t > at && kind.is_some()).count();
         prop_assert_eq!(behind, 0);
@@ -63,13 +64,13 @@ proptest! {
         let refused = records.iter().filter(|r| r.data == DataStatus::NotAllowed).count();
         prop_assert_eq!(refused, 4 - after);
         prop_assert!(denied.len() == refused && denied.iter().all(|why| why.contains("bob has stopped")));
-        // The client that stopped the arm receives the record of its Stop.
+        // The client that stopped the arm receives the response record of its Stop.
         let (records, _) = board.take(other);
         prop_assert!(records.len() == 1 && records[0].accepted());
     }
 
-    /// The operating system may accept bytes late. At most 256 bytes are queued there, and the silence before a Stop is long enough to
-    /// separate it from the abandoned frame.
+    /// The operating system may accept bytes late. At most 256 bytes wait in the operating system, and the pause before a Stop separates
+    /// the Stop from the interrupted frame.
     #[test]
     fn j04_j05_a_stop_in_an_upload_on_a_busy_computer_is_a_frame_of_its_own(
         after_us in 0u64..400_000, points in 20usize..1666, held_up_us in prop::collection::vec(0u64..15_000, 0..20),
@@ -82,8 +83,8 @@ proptest! {
         board.run_ms(after_us / 1000);
         board.send(bob, &STOP);
         board.run_ms(100);
-        // If a delay of the operating system interrupts a frame, the board sends more than one error record. A Stop is sent again if
-        // such a record may belong to it. Each Stop arrives as a complete frame.
+        // If the operating system delays the bytes of a frame, the board sends more than one error record. The Stop is sent again if an
+        // error record may belong to the Stop. Each Stop arrives as a complete frame.
         let stops = board.written.iter().filter(|(_, bytes)| bytes.ends_with(&STOP)).count();
         prop_assert!(stops >= 1);
         prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), stops);
@@ -99,7 +100,7 @@ proptest! {
         let asks = [FrameType::GetInfo, FrameType::TrajSetExecStatus];
         let mut sent = [Vec::new(), Vec::new(), Vec::new()];
         for (client, kind) in frames {
-            // All clients send questions. Only the first client also sends commands.
+            // All clients send read requests. Only the first client also sends commands.
             let frame: Vec<u8> = match (client, kind) {
                 (_, 0) => fixed::GET_INFO.to_vec(),
                 (_, 1) => fixed::get_arm(256).to_vec(),
@@ -112,7 +113,7 @@ proptest! {
             board.send(clients[client], &frame);
             board.run_ms(seed_ms);
         }
-        // A request for a frame waits until the frame of the previous request has arrived. This board never sends it.
+        // A request for a frame waits until the frame of the previous request has arrived. This board never sends the requested frame.
         board.run_ms(60 * 520 + 2000);
         for (client, sent) in clients.iter().zip(&sent) {
             let (records, denied) = board.take(*client);
@@ -173,7 +174,7 @@ fn one_client_commands_and_all_see_who() {
         assert!(denied.len() == 1 && denied[0].contains(why), "{denied:?}");
     }
     assert_eq!(board.arrived(FrameType::GripperControl), 0);
-    // When the holder releases the lease, the waiting client gets it.
+    // When the lease holder releases the lease, the waiting client receives the lease.
     let now = board.now();
     board.line.want_lease(b, now).expect("somebody has it");
     assert!(board.take(a).1.contains(&"bob wants it".to_owned()));
@@ -248,7 +249,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert_eq!(board.arrived(FrameType::GripperControl), 1, "it moves nothing");
-    // A program that ignores the refusal repeats the command, and sends an upload. No frame is written.
+    // A program that ignores the refusal repeats the command, and sends an upload. No frame is sent to the controller.
     for _ in 0..20 {
         board.run_ms(400);
         board.send(a, &EXECUTE);
@@ -267,7 +268,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.send(a, &EXECUTE);
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 2);
-    // A client's frames from before its own Stop begin no motion either.
+    // Frames that a client sent before its own Stop do not start a motion either.
     let before = board.frames.len();
     board.send(a, &segment(1600));
     board.run_ms(50);
@@ -277,7 +278,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(200);
     let sent: Vec<u8> = board.frames[before..].iter().filter(|f| f.1.is_some()).map(|f| f.2[4]).collect();
     assert_eq!(sent, [1]);
-    // After its own Stop the client may start again at once.
+    // The client that sent the Stop may start a motion again at once.
     board.send(a, &STOP);
     board.send(a, &EXECUTE);
     board.run_ms(100);
@@ -308,8 +309,8 @@ fn a_client_that_sends_without_end_is_put_out() {
     assert_eq!(board.line.take_deliveries(a), None);
 }
 
-/// The controller begins Teaching only in position hold, and refuses a Stop until then. Without the end of Teaching, the arm
-/// would become compliant after the Stop.
+/// The controller begins Teaching only in position hold, and refuses a Stop until then. If Teaching were not ended, the arm would become
+/// compliant after the Stop.
 #[test]
 fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     for damaged in [0, 10] {
@@ -328,7 +329,7 @@ fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
         board.run_ms(1_000);
         assert_eq!(board.arrived(FrameType::TeachingModeDisable), 1);
         assert!(board.line.is_idle());
-        // A Stop also ends Teaching that is on. After Teaching it sends no further end of Teaching.
+        // A Stop also ends Teaching if Teaching is active. When Teaching has ended, the line does not send the end of Teaching again.
         board.status.state = ControllerState::Teaching.into();
         board.run_ms(100);
         board.send(b, &STOP);
@@ -342,7 +343,7 @@ fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     }
 }
 
-/// A client that disconnects from an arm at rest causes no hold-off for the other clients.
+/// If a client disconnects while the arm is at rest, the other clients have no hold-off.
 #[test]
 fn a_policy_where_nothing_moves_stops_nobody_else() {
     for (state, moves, sent) in [
@@ -372,8 +373,8 @@ fn a_policy_where_nothing_moves_stops_nobody_else() {
     }
 }
 
-/// After its lease has lapsed, a client with the policy Continue takes the lease again for its upload. With the policy
-/// Pause the upload ends.
+/// A client with the policy Continue takes the lease again for its upload after the lease has lapsed. With the policy Pause the upload
+/// ends.
 #[test]
 fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
     for (policy, arrived) in [(Policy::Continue, 4), (Policy::Pause, 0)] {
@@ -388,7 +389,7 @@ fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
         board.run_ms(9_000);
         assert_eq!(board.arrived(FrameType::Trajectory), arrived, "{policy:?}");
         assert!(board.line.lease().is_none());
-        // With the policy Pause, later commands of this client do not take the lease again either.
+        // With the policy Pause, later commands of this client also do not take the lease again.
         board.send(a, &fixed::gripper_control(true));
         assert_eq!(board.line.lease().is_some(), policy == Policy::Continue);
         let now = board.now();
@@ -414,7 +415,7 @@ fn a_client_that_sends_too_much_can_stop_the_arm_all_the_same() {
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
 }
 
-/// A jog key that was held down during a Stop must be released before it moves the arm again.
+/// If a jog key is pressed during a Stop, the user must release the key before it can move the arm again.
 #[test]
 fn who_goes_on_asking_for_a_jog_behind_a_stop_does_not_get_it() {
     let mut board = Board::new(115_200);
@@ -440,7 +441,7 @@ fn j04_a_stop_that_the_line_damages_is_sent_again_for_whoever_asked() {
     board.run_ms(2_000);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert!(board.line.is_idle());
-    // Many requests of both kinds: the last command on the line is a Stop, and all requesters receive a record.
+    // Many clients request a Stop or a Pause. The last command on the serial line is a Stop, and each client receives a response record.
     for _ in 0..100 {
         board.send(viewer, &PAUSE);
     }
@@ -515,7 +516,7 @@ fn a_stop_is_not_given_up_while_the_device_is_away() {
     assert!(board.line.is_idle());
 }
 
-/// After a Stop, a motion begins only if it was requested after that Stop, however late its frame arrives.
+/// After a Stop, a motion begins only if it was requested after that Stop. The arrival time of its frame does not matter.
 #[test]
 fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     let mut board = Board::new(115_200);
@@ -532,7 +533,7 @@ fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before, "it was asked for before the Stop");
     let (_, denied) = board.take(anna);
     assert!(denied.iter().any(|why| why.contains("bob has stopped")), "{denied:?}");
-    // After a new request the Execute is sent. The client's own Pause does not revoke that request.
+    // After a new request the Execute is sent. A Pause of the same client does not cancel the request.
     ask(&mut board, anna).expect("it is long ago");
     board.send(anna, &EXECUTE);
     board.run_ms(1_000);
@@ -557,7 +558,7 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     board.line.halt_for(Some(anna), "anna", ExecCommand::Pause, now);
     board.run_ms(100);
     assert!(ask(&mut board, anna).is_err(), "bob's counts");
-    // The hold-off of three seconds also applies to a client that connects again.
+    // The hold-off of three seconds also applies to a client that reconnects.
     board.line.leave(anna, now);
     let again = operator(&mut board, "anna");
     assert!(ask(&mut board, again).is_err(), "bob's counts");
@@ -569,8 +570,8 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     ask(&mut board, again).expect("it is over");
 }
 
-/// A client whose policy has ended its motion begins no other motion without a new request, even if another client has resumed the first
-/// motion meanwhile.
+/// If the policy of a client has ended its motion, the client needs a new request for the next motion. This also applies if another client
+/// has resumed the first motion.
 #[test]
 fn a_lease_that_lapsed_with_a_pause_is_not_taken_again_by_what_waits() {
     let mut board = Board::new(115_200);
@@ -616,7 +617,7 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     let denied = board.line.want_lease(carl, now).expect_err("bob was first").to_string();
     assert!(denied.contains("bob") && denied.contains("anna"), "{denied}");
     assert_eq!(board.line.lease().and_then(|lease| lease.wanted_by), Some(bob));
-    // The waiting client disconnects.
+    // The client that waits for the lease disconnects.
     board.line.leave(bob, now);
     board.line.want_lease(carl, now).expect("nobody waits any more");
     // A client without a connection to the line keeps its place in the queue by sending requests.
@@ -665,13 +666,13 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
         }
         let asked = board.frames.iter().filter(|(_, kind, _)| *kind == Some(FrameType::GetInfo));
         let shown = asked.map(|(at, ..)| at.saturating_sub(silent_from)).max().unwrap_or_default();
-        // A frame that is being written when half of the timeout passes is still sent completely.
+        // A frame that is being written when half of the timeout passes is sent completely.
         let limit = Duration::from_millis(timeout_ms / 2 + 20);
         assert!(shown <= limit, "{timeout_ms} ms, every {every_ms} ms: a frame came after {shown:?}");
     }
 }
 
-/// While the arm moves under host supervision, only frames of the lease holder show the controller that its host is alive.
+/// While host supervision is active and the arm moves, only frames of the lease holder show the controller that its host is alive.
 #[test]
 fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
     use ControllerState::{HoldPos, Operate, Teaching};
@@ -713,7 +714,7 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         board.take(bob);
         let before = board.arrived(FrameType::GetInfo);
         let (mut asked, mut own) = (0, 0);
-        // The board never returns the requested frame, and each request waits for it: the requests take longer than 3 s.
+        // The board never returns the requested frame, and each request waits for the frame, so the requests take longer than 3 s.
         for ms in (0..13_000).step_by(250) {
             if every_ms > 0 && ms % every_ms == 0 {
                 board.send(anna, &fixed::get_settings(0));

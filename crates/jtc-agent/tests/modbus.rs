@@ -1,4 +1,5 @@
-//! PLCs with a simulated arm: which requests begin a motion, which connection commands, and which addresses may connect.
+//! PLCs with a simulated arm. The tests check which requests start a motion, which connection may send commands, and which addresses may
+//! connect.
 use std::io::{Read as _, Write as _};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
@@ -30,7 +31,7 @@ struct Cell {
     plc: Arc<Plc>,
     _server: Server,
     address: SocketAddr,
-    /// Frames that change something.
+    /// Classes of the sent frames that change the state of the controller.
     sent: Arc<Mutex<Vec<FrameClass>>>,
 }
 
@@ -39,7 +40,7 @@ impl Cell {
         Self::with_faults(allowed, Vec::new())
     }
 
-    /// Starts a cell whose arm has these faults.
+    /// Starts a cell whose arm simulates these faults.
     fn with_faults(allowed: &[&str], faults: Vec<Fault>) -> Self {
         let arm = Arm::avena();
         let config = SimConfig { baud: Some(921_600), ..SimConfig::new(arm.config(), &arm.parameters()) };
@@ -143,7 +144,7 @@ impl Client {
     }
 }
 
-/// Returns a request that writes all holding registers: trajectory 3 with approach.
+/// Returns a request that writes all holding registers for trajectory 3 with approach.
 fn order(command: Command, sequence: u16) -> Vec<u8> {
     let values = [1000, 1, 3, 100, 1, 1, command as u16, sequence];
     [16, 0, 0, 0, 8, 16]
@@ -155,15 +156,15 @@ fn order(command: Command, sequence: u16) -> Vec<u8> {
 const PRESS: [u8; 5] = [5, 0, 0, 0xFF, 0];
 const LET_GO: [u8; 5] = [5, 0, 0, 0, 0];
 
-/// The Stop follows the start immediately: in the same packet, as a coil that is 1 for a moment, or as the next command.
+/// The Stop follows the start immediately. It is sent in the same packet, as a coil that is briefly 1, or as the next command.
 #[test]
 fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     let cell = Cell::start(&[]);
     let mut client = cell.connect();
     cell.recover(&mut client);
     drop(client);
-    // Passes the requests to the PLC object directly. So the command begins only after all requests have arrived, which is the latest
-    // possible time.
+    // Passes the requests to the PLC object directly. The command therefore begins only after all requests have arrived, which is the
+    // latest possible time.
     let connection = plc::Connection { number: 1000, peer: (IpAddr::from(HERE), 5).into() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime");
     let acknowledged = || {
@@ -198,7 +199,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     }
     cell.plc.left(&connection);
     let mut client = cell.connect();
-    // Start, Stop coil on and Stop coil off in one packet.
+    // One packet contains the start, Stop coil on and Stop coil off.
     for _ in 0..3 {
         let start = order(Command::Start, client.next());
         client.send(&[&start, &PRESS, &LET_GO]);
@@ -211,7 +212,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     }
     let executed = cell.jobs.list().into_iter().filter(|job| job.done.summary.is_some());
     assert_eq!(executed.count(), 0);
-    // After its own Stop the PLC needs no hold-off.
+    // The hold-off does not apply to the PLC that sent the Stop.
     assert_eq!(client.command(Command::Start), Outcome::Done);
     until("a motion", || {
         client.input(1);
@@ -220,7 +221,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     client.ask(&PRESS);
 }
 
-/// A PLC with another address cannot write while the lease of the first PLC lasts, and it never uses values that the first one has written.
+/// A PLC with another address cannot write while the first PLC has the lease. It never uses values that the first PLC has written.
 #[test]
 fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_defaults() {
     let cell = Cell::start(&["127.0.0.0/8"]);
@@ -240,7 +241,7 @@ fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_default
     assert!(begun.elapsed() > Duration::from_secs(1), "{:?}", begun.elapsed());
     let read = |at: usize| cell.plc.respond(&there, &[3, 0, at as u8, 0, 1])[3];
     assert_eq!((read(holding::SPEED), read(holding::TRAJECTORY)), (100, 5));
-    // A commanding PLC without a lease keeps its turn for the time of its watchdog, or until it disconnects.
+    // A PLC that commands without a lease keeps the right to command for its watchdog time, or until it disconnects.
     let here = plc::Connection { number: 1001, peer: (IpAddr::from(HERE), 5).into() };
     assert_eq!(cell.plc.respond(&there, &[6, 0, holding::WATCHDOG as u8, 0xEA, 0x60])[0], 6);
     assert_eq!(cell.plc.respond(&here, &[6, 0, 2, 0, 1]), [0x86, 6]);
@@ -262,7 +263,7 @@ fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing(
     for other in &mut others[1..] {
         other.input(0);
     }
-    // The commanding connection is still open, although it was silent for as long as the closed one.
+    // The commanding connection is still open, although it was silent for as long as the closed connection.
     assert_eq!(cell.connect().input(0), 1);
     assert!(others[0].response().is_none());
     assert_eq!(first.input(0), 1);
@@ -279,7 +280,7 @@ fn a_connection_that_holds_the_arm_by_a_coil_does_not_give_way() {
     let cell = Cell::start(&[]);
     let mut clients: Vec<Client> = (0..8).map(|_| cell.connect()).collect();
     let silence = || std::thread::sleep(Duration::from_millis(2100));
-    // The coils of the first seven connections keep them open, so the last connection is closed.
+    // The first seven connections stay open because their coils are 1, so the last connection is closed.
     for (n, client) in clients.iter_mut().enumerate() {
         client.input(0);
         assert_eq!(if n < 7 { client.ask(&PRESS) } else { PRESS.to_vec() }, PRESS);
@@ -288,7 +289,7 @@ fn a_connection_that_holds_the_arm_by_a_coil_does_not_give_way() {
     let mut ninth = cell.connect();
     assert_eq!(ninth.input(0), 1);
     assert!(clients.pop().expect("the last").response().is_none());
-    // If coils of all connections hold the arm, no new connection is accepted until one coil is 0 again.
+    // If all connections keep the arm stopped with a coil, no new connection is accepted until one coil is 0 again.
     assert_eq!(ninth.ask(&PRESS), PRESS);
     silence();
     assert!(is_refused(cell.connect()));
@@ -321,7 +322,7 @@ fn without_a_controller_a_stop_fails_and_nothing_else_is_done() {
     }
 }
 
-/// Random requests that write.
+/// Returns random write requests.
 fn requests() -> impl Strategy<Value = Vec<u8>> {
     let values = prop::collection::vec(prop_oneof![0..15_u16, 690..720_u16, any::<u16>()], 1..9);
     let written = (0..10_u16, values.clone()).prop_map(|(at, values)| {
@@ -335,7 +336,7 @@ fn requests() -> impl Strategy<Value = Vec<u8>> {
     });
     let bytes = (0..24_u8, prop::collection::vec(any::<u8>(), 0..30))
         .prop_map(|(function, rest)| [vec![function], rest].concat());
-    // The requests write no coils, because the test would count the Stop of a coil as a sent command.
+    // The requests do not write coils, because the test would count the Stop of a coil as a sent command.
     prop_oneof![4 => written, 4 => single, 2 => bytes]
         .prop_filter("no coil", |pdu| pdu[0] != 5 && pdu[0] != 15)
 }
@@ -357,8 +358,8 @@ fn is_next(pdu: &[u8]) -> bool {
     u16::from_be_bytes(value) == FIRST + 1
 }
 
-/// A status does not contain the cause of a held stop, so the agent asks the controller for it. After an encoder jump the arm executes no
-/// motion, even when the errors were cleared.
+/// A status does not contain the cause of a held stop, so the agent requests the cause from the controller. After an encoder jump the arm
+/// does not execute a motion, even if the errors were cleared.
 #[test]
 fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
     // The jump occurs long after the drives were enabled.
@@ -383,7 +384,7 @@ fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
     assert_eq!((client.input(20), client.input(21)), (33, 3));
 }
 
-/// Without the next sequence number, no write of a PLC sends a frame to the controller, begins a job or takes the lease.
+/// A write of a PLC without the next sequence number does not send a frame to the controller, begin a job or take the lease.
 #[test]
 fn nothing_goes_to_the_controller_without_the_next_number() {
     let cell = Cell::start(&[]);

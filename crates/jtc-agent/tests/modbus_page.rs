@@ -1,5 +1,5 @@
-//! The tables of docs/modbus.md are equal to the tables of the code. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite
-//! modbus_page::` writes them.
+//! The tables of docs/modbus.md are equal to the tables of the code. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite modbus_page::`
+//! writes the tables of the page.
 use std::path::Path;
 
 const BEGIN: &str = "<!-- map begin -->\n";

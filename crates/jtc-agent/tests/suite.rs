@@ -1,4 +1,5 @@
-//! All tests of the crate in one program, with each file as a module. The program links as fast as a single test would.
+//! Test program with all tests of the crate. Each file is a module. Linking this program takes as long as linking the program of a single
+//! test.
 mod board;
 mod description;
 mod fuzz_regressions;

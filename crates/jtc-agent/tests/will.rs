@@ -1,4 +1,4 @@
-//! Policy that applies to the motion after the agent was killed.
+//! Tests of the policy that applies to a motion after the agent was killed.
 use crate::board;
 
 use std::time::Duration;
@@ -44,11 +44,11 @@ fn a_will_is_there_from_the_upload_to_rest_and_is_that_of_who_commands() {
     board.line.set_policy(anna, Policy::Continue);
     board.run_ms(20);
     assert_eq!(wills(&mut board), [will("anna", Policy::Continue, Moves::Motion)]);
-    // While no status is received, the arm may still be moving, so the will stays.
+    // While no status is received, the arm may still be moving, so the will is kept.
     board.deaf_until = board.now() + Duration::from_secs(3);
     board.run_ms(3_500);
     assert_eq!(wills(&mut board), []);
-    // The will stays after its client has disconnected. When another client takes the lease, the policy of that client applies.
+    // The will is kept after its client has disconnected. When another client takes the lease, the policy of that client applies.
     let now = board.now();
     board.line.leave(anna, now);
     let bob = board.join("bob", Role::Operator, Policy::Pause);
@@ -81,7 +81,7 @@ fn teaching_has_a_will_before_it_shows_and_an_upload_that_leads_nowhere_none_aft
     assert_eq!(wills(&mut board), [will("anna", Policy::Pause, Moves::Upload), None]);
 }
 
-/// A Stop that the controller has not confirmed replaces a weaker policy in the will, so that the next agent sends it.
+/// If the controller has not confirmed a Stop, the Stop replaces a weaker policy in the will, so that the next agent sends the Stop.
 #[test]
 fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
     let mut board = Board::new(115_200);
@@ -94,7 +94,7 @@ fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
     let now = board.now();
     board.line.halt_for(None, "the desk", ExecCommand::Stop, now);
     board.run_ms(900);
-    // The owner also calls this without received bytes.
+    // The owner of the line also calls this method if no bytes were received.
     let now = board.now();
     board.line.from_device(&[], now);
     assert_eq!(wills(&mut board), [will("the desk", Policy::Stop, Moves::Motion)]);
@@ -126,7 +126,7 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
             "{policy:?} {state:?} {trajectory:?}"
         );
         board.run_ms(300);
-        // A hold-off begins only if a command was sent to a moving arm. A motion that continues keeps the applied will.
+        // A hold-off begins only if a command was sent to a moving arm. The applied will stays valid while the motion continues.
         let sent = matches!(applied, Applied::Sent(_));
         assert_eq!(board.line.last_halt(), u64::from(sent));
         assert_eq!(
@@ -139,8 +139,7 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
     }
 }
 
-/// Without a status the agent cannot know that the arm is at rest. So the applied will stays in the file for the next
-/// agent.
+/// Without a status the agent cannot know that the arm is at rest. The applied will therefore stays in the file for the next agent.
 #[test]
 fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     for policy in [Policy::Continue, Policy::Pause, Policy::Stop] {
@@ -160,7 +159,7 @@ fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     }
 }
 
-/// If the controller refuses Teaching, no will is left.
+/// If the controller refuses Teaching, the agent does not leave a will.
 #[test]
 fn teaching_that_is_refused_leaves_no_will() {
     let mut board = Board::new(115_200);

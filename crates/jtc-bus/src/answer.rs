@@ -1,10 +1,10 @@
-//! Frames that nodes send: see [`Answer`].
+//! Frames that nodes send. See [`Answer`].
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE, from_i16, from_i32, to_i16, to_i32};
 use crate::{GRIPPER, NODES, NodeState, id};
 
-/// Positions in the payloads of answers to Move.
+/// Byte offsets in the payloads of answers to Move.
 mod field {
     /// Position, i32.
     pub(super) const POSITION: usize = 0;
@@ -18,7 +18,7 @@ mod field {
     pub(super) const MC_OCCURRED: usize = 11;
     pub(super) const ERRORS: usize = 12;
     pub(super) const WARNINGS: usize = 13;
-    /// Present only in payloads of 20 bytes.
+    /// Motor temperature, which is present only in payloads of 20 bytes.
     pub(super) const MOTOR_TEMPERATURE: usize = 16;
     pub(super) const PUMP: usize = 0;
     pub(super) const PRESSURE1: usize = 1;
@@ -27,18 +27,18 @@ mod field {
     pub(super) const LONG_LEN: usize = 20;
 }
 
-/// A joint's answer to Move (0x200+n): 16 bytes, or 20 bytes from new drives.
+/// Answer of a joint to Move (0x200+n). It has 16 bytes, or 20 bytes from new drives.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct JointReport {
     /// Position, rad.
     pub position: f64,
     /// Velocity, rad/s.
     pub velocity: f64,
-    /// Torque, N·m, with the same sign as the command (J-16).
+    /// Torque, N·m. Its sign is the sign of the commanded torque (J-16).
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: u8,
-    /// State byte of the node as sent.
+    /// State byte that the node sent.
     pub state: NodeState,
     /// Present motor-control faults.
     pub mc_current: u8,
@@ -52,16 +52,16 @@ pub struct JointReport {
     pub motor_temperature: Option<u8>,
 }
 
-/// The gripper's answer to Move (0x206).
+/// Answer of the gripper to Move (0x206).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct GripperReport {
-    /// The pump is running (measured).
+    /// Measured state of the pump; `true` if the pump is running.
     pub pump: bool,
-    /// The first vacuum level is reached.
+    /// `true` if the first vacuum level is reached.
     pub pressure1: bool,
-    /// The second vacuum level is reached.
+    /// `true` if the second vacuum level is reached.
     pub pressure2: bool,
-    /// State byte of the node as sent.
+    /// State byte that the node sent.
     pub state: NodeState,
     /// Error bits.
     pub errors: u8,
@@ -69,7 +69,7 @@ pub struct GripperReport {
     pub warnings: u8,
 }
 
-/// Answer of a node. The controller uses `parse`, nodes use `emit`.
+/// Answer of a node. The controller uses `parse`, and nodes use `emit`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
     /// Answer of a joint to Move, 0x200+n.
@@ -92,7 +92,7 @@ pub enum Answer {
     Mode {
         /// Node number, 0..6.
         node: u8,
-        /// The configuration was accepted.
+        /// `true` if the node has accepted the configuration.
         accepted: bool,
     },
 }
@@ -106,7 +106,8 @@ impl Answer {
         }
     }
 
-    /// Parses an answer on the controller. Inlined: otherwise a report is stored by bytes and copied by words, for which a PC must wait.
+    /// Decodes the frame of an answer. The controller uses this function. The function is inlined. Otherwise a report is stored by bytes
+    /// and copied by words, which stalls the processor of a PC.
     #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);
@@ -133,7 +134,8 @@ impl Answer {
         }
     }
 
-    /// Returns the frame of the answer on a node. A joint report has 20 bytes if it has a motor temperature, otherwise 16. Values saturate.
+    /// Returns the frame of the answer. Nodes use this function. A joint report has 20 bytes if it has a motor temperature, otherwise 16.
+    /// Values saturate.
     ///
     /// A node number that does not exist is sent as 15, and the controller ignores it.
     pub fn emit(&self, scale: Scale) -> Frame {

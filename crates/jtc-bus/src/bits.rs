@@ -1,4 +1,4 @@
-//! Bits of words. Each word is a table with bit, name, text and meaning.
+//! Bits of words. Bit words of the bus. Each word is a table with bit, name, text and meaning.
 
 /// Declares words of bits. A row of a word has the meaning (as documentation), the name of the mask, the bit and its text.
 ///
@@ -39,9 +39,9 @@ bit_words! {
 
     /// Error bits of a node.
     error: u8 {
-        /// Position encoder failed (oldest drives).
+        /// Position encoder failed (reported only by the oldest drives).
         POSITION_ENCODER = 0, "position encoder";
-        /// Motor-control fault. The motor-control bits show which one.
+        /// Motor-control fault. The motor-control bits show which motor-control fault occurred.
         MOTOR_CONTROL = 1, "motor-control fault";
         /// Joint over-speed.
         OVER_SPEED = 2, "over-speed";
@@ -49,7 +49,7 @@ bit_words! {
         HARDWARE = 3, "hardware fault of the gate driver";
     }
 
-    /// Motor-control fault bits of a joint (present, and occurred).
+    /// Motor-control fault bits of a joint (present faults, and faults that have occurred).
     motor_control: u8 {
         /// The current loop took too long.
         FOC_DURATION = 0, "current loop took too long";
@@ -69,17 +69,17 @@ bit_words! {
         SOFTWARE = 7, "software error";
     }
 
-    /// Configuration bits of a node, sent with ChangeMode.
+    /// Configuration bits of a node, which the controller sends with ChangeMode.
     config: u8 {
-        /// Keep to the working area.
+        /// Limits the motion to the working area.
         WORKING_AREA = 0, "working area";
-        /// Switches the absolute encoder on. Without it the position reads 0.
+        /// Switches the absolute encoder on. Without this encoder, the reported position is 0.
         ABSOLUTE_ENCODER = 1, "absolute encoder";
-        /// React to the safety line.
+        /// Lets the node react to the safety line.
         SAFETY_LINE = 2, "safety line";
         /// Watch the bus.
         BUS_WATCHDOG = 3, "bus watchdog";
-        /// Trips on over-speed. A configuration without this bit switches the trip off.
+        /// Trips on over-speed. Switches the over-speed trip on; if the bit is 0, the trip is off.
         OVER_SPEED_TRIP = 4, "over-speed trip";
         with
         /// Default of a joint, 0x17.
@@ -89,7 +89,7 @@ bit_words! {
     }
 }
 
-/// Texts of the set bits, separated by commas; `-` if no bit is set, `bit N` for a bit without a text.
+/// Texts of the set bits, separated by commas. The text is `-` if no bit is set, and `bit N` for a bit without a text.
 ///
 /// ```
 /// use jtc_bus::{Bits, warning};
@@ -100,7 +100,7 @@ bit_words! {
 pub struct Bits<'a>(pub u32, pub &'a [&'a str]);
 
 impl<'a> Bits<'a> {
-    /// Returns the number and the text of each set bit; the text is empty if the list has none.
+    /// Returns the number and the text of each set bit; the text is empty if the list has no text for the bit.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &'a str)> + use<'a> {
         let (word, names) = (self.0, self.1);
         (0..u32::BITS)

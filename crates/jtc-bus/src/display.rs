@@ -5,7 +5,7 @@ use core::fmt::{Display, Formatter, Result};
 use crate::{Answer, Bits, Frame, GRIPPER, GripperReport, Joint, JointReport, Request, Scale, Target};
 use crate::{config, error, id, motor_control, warning};
 
-/// A decoded frame of the bus as text. A frame that cannot be decoded is shown with the reason and its bytes.
+/// Text of a decoded frame of the bus. A frame that cannot be decoded is shown with the reason and its bytes.
 ///
 /// ```
 /// use jtc_bus::{Decoded, Request, Scale};
@@ -105,7 +105,7 @@ impl Display for Request {
     }
 }
 
-/// A node by its number on the bus.
+/// Number of a node on the bus, for display.
 struct Node(u8);
 
 impl Display for Node {

@@ -10,23 +10,23 @@ const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
 const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
 /// Bits of the stuff count with its parity, sent before the checksum.
 const STUFF_COUNT_BITS: u32 = 4;
-/// The delimiter after the checksum. The bit rate changes within this bit, and also within the bit at which the rate rises. Both changes
-/// are at the same share of the bit, so one of the two bits is counted as a nominal bit and the other as a data bit.
+/// The delimiter after the checksum. The bit rate falls within this bit, and it rises within an earlier bit (BRS). Both changes occur at
+/// the same fraction of the bit, so one of the two bits is counted as a nominal bit and the other bit as a data bit.
 const CRC_DELIMITER_BITS: u32 = 1;
 
-/// Returns the time from the start of the frame until the next frame may start, in ns, at the rates in [`timing`](crate::timing). It
+/// Returns the time from the start of the frame until the next frame may start, in ns, at the rates in [`timing`](crate::timing). The time
 /// includes the intermission.
 ///
-/// The result is exact: it includes the stuff bits of this payload. It does not include repetitions and error frames.
+/// The result is exact, because it includes the stuff bits of this payload. The result does not include repetitions and error frames.
 pub fn duration_ns(frame: &Frame) -> u32 {
     let mut stuffer = Stuffer::default();
-    // Bits before the data phase: start, identifier, RRS, IDE, FDF, reserved, BRS.
+    // The bits before the data phase are start, identifier, RRS, IDE, FDF, reserved and BRS.
     stuffer.push(0, 1);
     stuffer.push(u32::from(frame.id), 11);
     stuffer.push(0b00101, 5);
     let nominal = stuffer.bits + TAIL_BITS;
     let before = stuffer.bits;
-    // Data phase: ESI and length code.
+    // The data phase begins with ESI and the length code.
     stuffer.push(u32::from(frame.dlc()), 5);
     for byte in frame.data() {
         stuffer.push(u32::from(*byte), 8);
@@ -38,7 +38,7 @@ pub fn duration_ns(frame: &Frame) -> u32 {
     nominal * NOMINAL_NS + data * DATA_NS
 }
 
-/// Counts bits as they are sent: after five equal bits, a bit of the other value is sent.
+/// Counter of the sent bits. After five equal bits, a stuff bit of the opposite value is sent.
 #[derive(Default)]
 struct Stuffer {
     bits: u32,
@@ -49,7 +49,8 @@ struct Stuffer {
 impl Stuffer {
     fn push(&mut self, value: u32, width: u32) {
         for at in (0..width).rev() {
-            // The stuff bit is sent before the next bit. After the last bit of the payload it is replaced by the fixed stuff bit.
+            // The stuff bit is sent before the next bit. After the last bit of the payload, the fixed stuff bit is sent instead of this
+            // stuff bit.
             if self.run == 5 {
                 self.bits += 1;
                 self.last = self.last.map(|bit| !bit);
@@ -69,18 +70,19 @@ mod tests {
 
     #[test]
     fn j10_a_frame_without_stuff_bits() {
-        // 17 + 12 nominal bits; ESI, length, 8 bytes, 4 + 17 checksum bits, 6 fixed stuff bits, delimiter.
+        // The frame has 17 + 12 nominal bits. Its data bits are ESI, length, 8 bytes, 4 + 17 checksum bits, 6 fixed stuff bits and
+        // delimiter.
         let frame = Frame::new(0x555, &[0x55; 8]).unwrap();
         assert_eq!(duration_ns(&frame), 29_000 + (1 + 4 + 64 + 21 + 6 + 1) * 200);
-        // A frame of 20 bytes has the longer checksum: 4 + 21 bits, 7 fixed stuff bits.
+        // A frame of 20 bytes has the longer checksum, with 4 + 21 bits and 7 fixed stuff bits.
         let frame = Frame::new(0x555, &[0x55; 20]).unwrap();
         assert_eq!(duration_ns(&frame), 29_000 + (1 + 4 + 160 + 25 + 7 + 1) * 200);
     }
 
     #[test]
     fn j10_stuff_bits_are_those_of_the_payload() {
-        // Start and id: 12 zeros with RRS and IDE make 14, two stuff bits. FDF 1, reserved 0, BRS 1. ESI 0,
-        // length 1010, then 128 zeros after the 0 of the length: 129 zeros, 25 stuff bits.
+        // Start and identifier are 12 zeros. With RRS and IDE, these are 14 zeros and need two stuff bits. FDF is 1, the reserved bit is 0,
+        // and BRS is 1. ESI is 0 and the length is 1010. The last 0 of the length and the 128 zeros of the payload need 25 stuff bits.
         let frame = Frame::new(0x000, &[0; 16]).unwrap();
         assert_eq!(duration_ns(&frame), (29 + 2) * 1_000 + (1 + 4 + 128 + 21 + 6 + 1 + 25) * 200);
     }

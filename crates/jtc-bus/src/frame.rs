@@ -1,15 +1,15 @@
-//! A frame of the bus, and the reasons why a frame cannot be decoded.
+//! Frames of the bus, and the reasons why a frame cannot be decoded.
 
 use crate::id;
 
 /// Longest payload of this bus, bytes.
 pub const MAX_LEN: usize = 24;
 
-/// A CAN FD frame of this bus: 11-bit id, bit rate switch, at most 24 bytes.
+/// CAN FD frame of this bus, with an 11-bit identifier, bit rate switch and at most 24 bytes.
 ///
 /// The payload has a length that CAN FD can send: 0..8, 12, 16, 20 or 24 bytes.
 ///
-/// The frame is aligned, so that it is copied by words.
+/// The frame is aligned in memory, so that it is copied by words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(align(4))]
 pub struct Frame {
@@ -19,7 +19,7 @@ pub struct Frame {
     data: [u8; MAX_LEN],
 }
 
-/// The format of a received frame, for drivers that receive every frame of a bus.
+/// Format of a received frame, for drivers that receive all frames of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
     /// `true` for a 29-bit identifier.
@@ -51,11 +51,12 @@ impl Frame {
         Some(frame)
     }
 
-    /// Creates a frame from a received one. Other protocols may use the same bus.
+    /// Creates a frame from the identifier, format and data of a received frame. Other protocols may use the same bus.
     ///
     /// # Errors
     ///
-    /// Returns [`FrameError::WrongFormat`] for a frame with another format than the frames of this bus. Count such frames (J-15).
+    /// Returns [`FrameError::WrongFormat`] if the format of the frame is not the format of this bus. The caller should count frames with a
+    /// wrong format (J-15).
     pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, FrameError> {
         let wrong = FrameError::WrongFormat { id, len: data.len().min(255) as u8 };
         if format != Format::BUS {
@@ -65,7 +66,7 @@ impl Frame {
         Self::new(short, data).ok_or(wrong)
     }
 
-    /// Creates a frame of zeros, for the encoders of this crate. `LEN` must be a valid length in CAN FD.
+    /// Creates a frame of zeros, for the encoders of this crate. `LEN` must be a valid payload length of CAN FD.
     pub(crate) fn zeroed<const LEN: usize>(id: u16) -> Self {
         const { assert!(LEN <= MAX_LEN && dlc_of(LEN).is_some()) }
         Self { id: id & 0x7FF, len: LEN as u8, data: [0; MAX_LEN] }
@@ -78,7 +79,7 @@ impl Frame {
         }
     }
 
-    /// Returns the bytes at a position. Bytes after the payload are 0, as in the receive buffer of a node.
+    /// Returns `N` bytes of the payload from offset `at`. Bytes after the payload are 0, as in the receive buffer of a node.
     #[inline]
     pub(crate) fn get<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
@@ -153,7 +154,7 @@ const fn dlc_of(len: usize) -> Option<u8> {
     }
 }
 
-/// Returns the payload length for a length code, or `None` if it is above 24 bytes.
+/// Returns the payload length for a length code, or `None` if the length is above 24 bytes.
 const fn len_of(dlc: u8) -> Option<usize> {
     match dlc {
         0..=8 => Some(dlc as usize),
@@ -165,7 +166,7 @@ const fn len_of(dlc: u8) -> Option<usize> {
     }
 }
 
-/// Reason why a frame cannot be decoded. Such a frame is counted and ignored (J-15).
+/// Reason why a frame cannot be decoded. The controller counts and ignores frames that it cannot decode (J-15).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// This protocol does not use the identifier.

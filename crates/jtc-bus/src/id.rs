@@ -1,29 +1,29 @@
-//! Identifiers of the bus: `R U cccc nnnn` (J-11).
+//! Identifiers of the bus. Their bits are `R U cccc nnnn` (J-11).
 //!
-//! Bit 9 marks a response and bit 8 a unicast frame. Bits 7..4 are the command, and bits 3..0 the node. A node answers with the identifier
-//! of the request, its own number, and bit 9 set.
+//! Bit 9 marks a response and bit 8 a unicast frame. Bits 7..4 are the command, and bits 3..0 the node. The identifier of an answer is the
+//! identifier of the request with bit 9 set and the number of the node.
 
-/// Bit 9: a node's response.
+/// Bit 9, which is set in the response of a node.
 pub const RESPONSE: u16 = 0x200;
-/// Bit 8: addressed to one node.
+/// Bit 8, which is set if the frame is addressed to one node.
 pub const UNICAST: u16 = 0x100;
 
-/// Torques and pump, broadcast.
+/// Broadcast with the torques and the state of the pump.
 pub const MOVE: u16 = 0x000;
 /// Requested states, broadcast.
 pub const CHANGE_FSM: u16 = 0x010;
-/// Reset of every node, broadcast, without an answer.
+/// Broadcast that resets every node. Nodes do not answer.
 pub const RESET_ALL: u16 = 0x0A0;
-/// Working mode and configuration bits, broadcast.
+/// Broadcast with the working mode and configuration bits.
 pub const CHANGE_MODE: u16 = 0x0F0;
-/// Reset of node 0. The identifiers of the other nodes follow. There is no answer.
+/// Reset of node 0. The identifiers for nodes 1..6 are the next numbers. The node does not answer.
 pub const RESET: u16 = RESET_ALL | UNICAST;
 
-/// Answer of node 0 to Move. The identifiers of the other nodes follow.
+/// Answer of node 0 to Move. The identifiers of nodes 1..6 are the next numbers.
 pub const MOVE_ANSWER: u16 = answer(MOVE, 0);
-/// Answer of node 0 to ChangeFsm. The identifiers of the other nodes follow.
+/// Answer of node 0 to ChangeFsm. The identifiers of nodes 1..6 are the next numbers.
 pub const FSM_ANSWER: u16 = answer(CHANGE_FSM, 0);
-/// Answer of node 0 to ChangeMode. The identifiers of the other nodes follow.
+/// Answer of node 0 to ChangeMode. The identifiers of nodes 1..6 are the next numbers.
 pub const MODE_ANSWER: u16 = answer(CHANGE_MODE, 0);
 
 /// Returns the id of the answer of `node` (0..6) to a request.
@@ -31,7 +31,7 @@ pub const fn answer(request: u16, node: u8) -> u16 {
     request | on_wire(node) | RESPONSE
 }
 
-/// Returns the identifier without its node: `R U cccc 0000`.
+/// Returns the identifier without the node number (`R U cccc 0000`).
 pub const fn command(id: u16) -> u16 {
     id & !0x00F
 }
@@ -41,8 +41,8 @@ pub const fn node(id: u16) -> u8 {
     (id & 0x00F) as u8
 }
 
-/// Returns the node bits for a node number. A number that does not exist becomes 15, which is not used by any node, so that it never
-/// becomes the number of another node.
+/// Returns the node bits of the identifier for a node number. Returns 15 for an invalid number. No node has number 15, so the frame does
+/// not reach a wrong node.
 pub(crate) const fn on_wire(node: u8) -> u16 {
     if (node as usize) < crate::NODES { node as u16 } else { 0x00F }
 }

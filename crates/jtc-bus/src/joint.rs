@@ -1,10 +1,10 @@
-//! Numbers of the joints: counted from 1 for people, from 0 on the bus.
+//! Numbers of the joints. Users count joints from 1; the bus counts nodes from 0.
 use core::fmt;
 
 use crate::JOINTS;
 
 /// A joint of the arm. Texts, JSON values and files count joints from 1, starting at the base. On the bus and in arrays the number is one
-/// lower: joint 1 is node 0 and index 0. A joint is printed as `joint 3`.
+/// lower, so joint 1 is node 0 and index 0. A joint is printed as `joint 3`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Joint(u8);
 
@@ -22,7 +22,7 @@ impl Joint {
         Self::ALL.get(index).copied()
     }
 
-    /// Returns the number for people, 1..6.
+    /// Returns the number that users see, 1..6.
     pub const fn number(self) -> u8 {
         self.0 + 1
     }

@@ -1,33 +1,33 @@
-//! Frames that the controller sends: see [`Request`].
+//! Frames that the controller sends. See [`Request`].
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{TORQUE_FULL_SCALE, to_i16};
 use crate::{GRIPPER, JOINTS, NODES, NodeState, id};
 
-/// Positions in the payloads of requests.
+/// Byte offsets in the payloads of requests.
 mod field {
-    /// Move: two bytes per joint from here.
+    /// Start of the torques in Move, two bytes per joint.
     pub(super) const TORQUE: usize = 0;
     /// Move: pump.
     pub(super) const PUMP: usize = 12;
-    /// ChangeMode: mode and configuration bits per joint from here.
+    /// Start of the mode and configuration bytes of the joints in ChangeMode.
     pub(super) const MODE: usize = 0;
-    /// ChangeMode: configuration bits of the gripper.
+    /// Offset of the configuration bits of the gripper in ChangeMode.
     pub(super) const GRIPPER_CONFIG: usize = 13;
     pub(super) const MOVE_LEN: usize = 16;
     pub(super) const FSM_LEN: usize = 7;
     pub(super) const MODE_LEN: usize = 16;
 }
 
-/// A state that the controller can request from a node. The controller sends no other values (J-16), because some drives take any other
-/// value, such as their own state, as a command to move.
+/// State that the controller can request from a node. The controller does not send other values (J-16), because some drives interpret any
+/// other value, such as their own state, as a command to move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Target {
-    /// Keep the present state.
+    /// The node keeps its present state.
     #[default]
     NoChange = 0,
-    /// Init. In Fault this also acknowledges the faults.
+    /// Init. State Init. In Fault, this request also acknowledges the faults.
     Init = NodeState::INIT.code(),
     /// Ready to operate, with the motor off.
     Ready = NodeState::READY.code(),
@@ -39,7 +39,7 @@ impl Target {
     /// Returns the target for a byte in the wire format.
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match NodeState::new(byte) {
-            // Start cannot be requested. Its byte means that no change is requested.
+            // Start cannot be requested. In a request, the byte of Start means that no change is requested.
             NodeState::START => Some(Self::NoChange),
             NodeState::INIT => Some(Self::Init),
             NodeState::READY => Some(Self::Ready),
@@ -49,14 +49,14 @@ impl Target {
     }
 }
 
-/// Request of the controller. The controller uses `emit`, nodes use `parse`.
+/// Request of the controller. The controller uses `emit`, and nodes use `parse`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// 0x000: torque of each joint and the pump. A torque saturates when it is encoded (J-13); NaN is encoded as 0.
+    /// 0x000: torque of each joint and the pump. Encoding limits each torque to its range (J-13) and converts NaN to 0.
     Move {
         /// Torque at the joint, N·m.
         torque: [f64; JOINTS],
-        /// `true`: vacuum pump on.
+        /// `true` switches the vacuum pump on.
         pump: bool,
     },
     /// 0x010: requested state of each node (J-16).
@@ -66,7 +66,7 @@ pub enum Request {
     },
     /// 0x0F0: mode (1: torque) and configuration bits of each joint, configuration bits of the gripper.
     ChangeMode {
-        /// Mode: 0 none, 1 torque, 2 speed.
+        /// Mode of each joint: 0 for none, 1 for torque, 2 for speed.
         mode: [u8; JOINTS],
         /// Configuration bits of each joint, see [`config`](crate::config).
         config: [u8; JOINTS],
@@ -75,7 +75,7 @@ pub enum Request {
     },
     /// 0x0A0: reset of every node.
     ResetAll,
-    /// 0x1A0 + node, 0..6: reset of one node. A node that does not exist is sent as 15, which is not used by any node.
+    /// 0x1A0 + node, 0..6: reset of one node. An invalid node number is sent as 15, which no node has.
     Reset(u8),
 }
 
@@ -114,13 +114,13 @@ impl Request {
         }
     }
 
-    /// Parses a request on a node or in a bus monitor.
+    /// Decodes the frame of a request. Nodes and bus monitors use this function.
     pub fn parse(frame: &Frame) -> Result<Request, FrameError> {
         match frame.id {
             id::MOVE => {
                 frame.need(field::MOVE_LEN as u8)?;
                 let torque = core::array::from_fn(|joint| {
-                    // The order of the operations is the same as in the drives. The tick of the controller does not parse requests.
+                    // The operations have the same order as in the drives. The tick of the controller does not parse requests.
                     let raw = i16::from_be_bytes(frame.get(field::TORQUE + 2 * joint));
                     f64::from(raw) * TORQUE_FULL_SCALE / f64::from(i16::MAX)
                 });
@@ -152,7 +152,7 @@ impl Request {
         }
     }
 
-    /// Returns true if nodes answer this request. Resets are not answered.
+    /// Returns `true` if nodes answer this request. Nodes do not answer resets.
     pub const fn is_answered(&self) -> bool {
         !matches!(self, Self::ResetAll | Self::Reset(_))
     }

@@ -1,22 +1,24 @@
-//! Scaling between physical values and the integers of the drives. Every encoder saturates (J-13).
+//! Scaling between physical values and the integers of the drives. Every encoding function limits the value to the range of the integer
+//! (J-13).
 
-/// Position at the largest 32-bit value, rad.
+/// Position that the largest 32-bit value represents, rad.
 #[expect(clippy::approx_constant, reason = "the drives' number, which is not π")]
 pub const POSITION_FULL_SCALE: f64 = 3.141592;
-/// Torque at the largest 16-bit value, N·m.
+/// Torque that the largest 16-bit value represents, N·m.
 pub const TORQUE_FULL_SCALE: f64 = 360.0;
 
-/// Full scales of the values of the drives (J-11). The scales of position (3.141592) and torque (360) are constants of the protocol.
+/// Full-scale values of the quantities that drives report (J-11). The scales of position (3.141592) and torque (360) are constants of the
+/// protocol.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Velocity at 32767, rad/s: 2.0, or 6.283185 on older drives.
+    /// Velocity that the integer 32767 represents, rad/s; 2.0, or 6.283185 on older drives.
     pub velocity: f64,
 }
 
 impl Scale {
-    /// Scale of current drives.
+    /// Scale of drives of the current generation.
     pub const CURRENT: Self = Self { velocity: 2.0 };
-    /// Scale of older drives.
+    /// Scale of drives of the older generation.
     #[expect(clippy::approx_constant, reason = "the drives' number, which is not 2π")]
     pub const OLDER: Self = Self { velocity: 6.283185 };
 }
@@ -38,8 +40,8 @@ pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }
 
-/// Returns the value of a 16-bit number. The quotient is computed first, because it is the same for every answer of a tick. On the board a
-/// division takes as long as seven multiplications.
+/// Returns the physical value of a 16-bit integer. The quotient is computed first, because its value is the same for every answer of a
+/// tick. On the board a division takes as long as seven multiplications.
 #[inline]
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
     f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))
@@ -50,8 +52,9 @@ pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
     f64::from(i32::from_be_bytes(bytes)) * (full_scale / f64::from(i32::MAX))
 }
 
-/// Returns `value` in units of the last bit, moved by half a unit away from zero. So the cast rounds, although it truncates; it turns NaN
-/// into 0. An invalid full scale (0, NaN) gives a saturated value or 0, never a value with the opposite sign.
+/// Returns `value` in units of the last bit, increased in magnitude by half a unit. With the added half unit, the truncating cast rounds to
+/// the nearest integer. The cast converts NaN to 0. An invalid full scale (0, NaN) results in the limit value or 0, but never in a value
+/// with the opposite sign.
 fn nearest(value: f64, full_scale: f64, max: f64) -> f64 {
     let raw = value * (max / full_scale.abs());
     (raw + 0.5_f64.copysign(raw)).clamp(-max, max)

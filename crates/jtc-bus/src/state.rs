@@ -1,7 +1,7 @@
 //! States that nodes report.
 use core::fmt;
 
-/// State of a node, one byte. The states depend on the generation of the drive.
+/// State of a node, as one byte. The states depend on the generation of the drive.
 ///
 /// ```
 /// use jtc_bus::NodeState;
@@ -16,11 +16,11 @@ pub struct NodeState(u8);
 impl NodeState {
     /// Start.
     pub const START: Self = Self(0);
-    /// Init: motor off, waiting for its configuration.
+    /// Init. The motor is off, and the node waits for its configuration.
     pub const INIT: Self = Self(1);
-    /// Ready to operate: motor off, configured.
+    /// Ready to operate. The motor is off, and the node is configured.
     pub const READY: Self = Self(2);
-    /// Operation enabled: follows its command.
+    /// Operation enabled. The node follows its command.
     pub const ENABLED: Self = Self(3);
     /// Transition from Start to Init.
     pub const START_TO_INIT: Self = Self(10);
@@ -35,28 +35,28 @@ impl NodeState {
     /// Fault.
     pub const FAULT: Self = Self(255);
 
-    /// Returns the state of this byte.
+    /// Returns the state that a byte represents.
     pub const fn new(code: u8) -> Self {
         Self(code)
     }
 
-    /// Returns the byte on the bus.
+    /// Returns the byte that represents the state on the bus.
     pub const fn code(self) -> u8 {
         self.0
     }
 
-    /// Returns the name that is used in manuals and in a status.
+    /// Returns the name of the state in manuals and statuses.
     pub const fn name(self) -> &'static str {
         self.texts().0
     }
 
-    /// Returns a description of the node's activity, for a bus log.
+    /// Returns a description of the activity of the node, for a bus log.
     pub const fn description(self) -> &'static str {
         self.texts().1
     }
 
-    /// Returns name and description. The meaning of 14, 15 and 16 depends on the generation of the drive, so the text says only that the
-    /// node is between two states.
+    /// Returns the name and the description of the state. The meaning of the states 14, 15 and 16 depends on the generation of the drive.
+    /// The text therefore says only that the node is between two states.
     const fn texts(self) -> (&'static str, &'static str) {
         match self {
             Self::START => ("Start", "start"),
@@ -77,7 +77,7 @@ impl NodeState {
         }
     }
 
-    /// Returns true in Start, in Init, and in the transition between them.
+    /// Returns `true` in Start, in Init, and in the transition from Start to Init.
     pub const fn is_starting(self) -> bool {
         matches!(self, Self::START | Self::INIT | Self::START_TO_INIT)
     }

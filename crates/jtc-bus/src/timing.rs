@@ -1,6 +1,6 @@
-//! Bit timing of the bus (J-10), in the terms of a Bosch M_CAN (the FDCAN of the STM32).
+//! Bit timing of the bus (J-10), with the register names of a Bosch M_CAN (the FDCAN of the STM32).
 //!
-//! Both phases have 17 time quanta with the sample point after the 13th. The kernel clock is 85 MHz.
+//! A bit has 17 time quanta in both phases, with the sample point after the 13th quantum. The kernel clock is 85 MHz.
 
 /// Kernel clock of the CAN controller, Hz.
 pub const KERNEL_CLOCK_HZ: u32 = 85_000_000;
@@ -14,12 +14,12 @@ pub struct BitTiming {
     pub segment1: u8,
     /// Quanta after the sample point.
     pub segment2: u8,
-    /// Highest number of quanta by which a resynchronisation may shift the bit.
+    /// Highest number of quanta by which a resynchronisation may lengthen or shorten the bit.
     pub jump_width: u8,
 }
 
 impl BitTiming {
-    /// Returns the time quanta in a bit: the synchronisation quantum and both segments.
+    /// Returns the number of time quanta in a bit, which is the synchronisation quantum plus both segments.
     pub const fn quanta(&self) -> u32 {
         1 + self.segment1 as u32 + self.segment2 as u32
     }
@@ -29,7 +29,7 @@ impl BitTiming {
         clock_hz / (self.prescaler as u32 * self.quanta())
     }
 
-    /// Returns the quanta up to the sample point.
+    /// Returns the number of quanta from the start of the bit to the sample point.
     pub const fn sample_point(&self) -> u32 {
         1 + self.segment1 as u32
     }
@@ -47,12 +47,12 @@ impl BitTiming {
 pub const NOMINAL_BIT_RATE: u32 = 1_000_000;
 /// Bit rate in the data phase, bit/s.
 pub const DATA_BIT_RATE: u32 = 5_000_000;
-/// Timing outside the data phase.
+/// Bit timing outside the data phase.
 pub const NOMINAL: BitTiming = BitTiming::at(NOMINAL_BIT_RATE);
-/// Timing in the data phase.
+/// Bit timing in the data phase.
 pub const DATA: BitTiming = BitTiming::at(DATA_BIT_RATE);
-/// Transmitter delay compensation: distance from the measured loop delay to the secondary sample point, in kernel clock periods. With this
-/// offset the secondary sample point is at the sample point of the receivers.
+/// Offset of the transmitter delay compensation: time from the measured loop delay to the secondary sample point, in kernel clock periods.
+/// With this offset the secondary sample point is at the sample point of the receivers.
 pub const TDC_OFFSET: u8 = {
     // The hardware supports compensation only with prescalers 1 and 2.
     assert!(DATA.prescaler <= 2);

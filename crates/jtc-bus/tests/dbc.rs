@@ -1,4 +1,4 @@
-//! Compares `joint-bus.dbc` with the code: the file must decode the values that the code has encoded.
+//! Compares `joint-bus.dbc` with the code. The file must decode the values that the code has encoded.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -13,7 +13,8 @@ use proptest::prelude::*;
 static DBC: LazyLock<Dbc> =
     LazyLock::new(|| Dbc::try_from(include_str!("../joint-bus.dbc")).expect("the file is a DBC"));
 
-/// Returns the bits of a signal, highest first. A big-endian signal begins at its highest bit and continues with bit 7 of the next byte.
+/// Returns the bits of a signal, highest bit first. A big-endian signal begins at its highest bit and continues with bit 7 of the next
+/// byte.
 fn bits_of(signal: &Signal) -> impl Iterator<Item = usize> {
     assert_eq!(signal.byte_order, ByteOrder::BigEndian);
     let (byte, bit) = (signal.start_bit as usize / 8, signal.start_bit as usize % 8);
@@ -187,7 +188,7 @@ fn j11_the_file_has_the_frames_of_this_bus_and_no_others() {
 #[test]
 fn j10_every_frame_is_can_fd() {
     for message in &DBC.messages {
-        // Value 14 means standard CAN FD.
+        // The attribute value 14 means standard CAN FD.
         let is_fd = DBC.attribute_values_message.iter().any(|attribute| {
             attribute.message_id == message.id
                 && attribute.name == "VFrameFormat"

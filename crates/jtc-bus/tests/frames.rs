@@ -1,4 +1,4 @@
-//! The frames of the bus, byte by byte and by their properties.
+//! Tests of the frames of the bus, byte by byte and as properties of random frames.
 
 use jtc_bus::{
     Answer, Bits, Frame, FrameError, GRIPPER, GripperReport, JOINTS, JointReport, NODES, NodeState,
@@ -86,7 +86,7 @@ fn j11_joint_answer_of_16_and_20_bytes() {
             assert_eq!(answer, Ok(Answer::Joint { node, report: long }));
         }
         assert_eq!(Answer::Joint { node, report: long }.emit(SCALE), frame(id, &bytes[..20]));
-        // Only the long form has the bytes from 16 on.
+        // Only the long form contains the bytes from offset 16.
         let mut short = frame(id, &bytes[..16]);
         assert_eq!(Answer::Joint { node, report }.emit(SCALE), short);
         short.id += 1;

@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, so that only one program must be linked. Each file here is a module of it.
+//! All tests of the crate in one program, so that only one program must be linked. Each file in this directory is a module of the program.
 mod dbc;
 mod frames;
 mod fuzz_regressions;

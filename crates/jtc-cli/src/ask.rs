@@ -1,10 +1,10 @@
-//! A question to the user at the terminal. The user can also answer it beforehand with an option.
+//! Confirmation by the user at the terminal. The user can also confirm in advance with an option.
 
 use cli_kit::{ErrorKind, Failure};
 use std::io::{BufRead, IsTerminal, Write};
 
-/// Asks `question` and continues only if the answer is `yes`. Without a terminal the command is refused. The hint then
-/// suggests `option`, which answers the question beforehand.
+/// Asks `question` and continues only if the answer is `yes`. Refuses the command if no terminal is present. The hint then suggests
+/// `option`, with which the user confirms in advance.
 pub(crate) fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {
         Failure::new(ErrorKind::Refused, "not-confirmed-by-person", message)

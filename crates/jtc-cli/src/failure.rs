@@ -1,17 +1,17 @@
-//! Failures of commands whose recording is lost or interrupted.
+//! Failures for commands whose recording is lost or interrupted.
 
 use cli_kit::{ErrorKind, Failure};
 
 /// Hint if a file cannot be written completely.
 const MAKE_ROOM: &str = "free disk space or choose another place, then run again";
 
-/// Returns the failure if measured data cannot be written: the result of the command is lost.
+/// Returns the failure if measured data cannot be written, so that the result of the command is lost.
 pub(crate) fn output_lost(failure: impl Into<Failure>) -> Failure {
     let message = format!("{}; the recorded data are lost", failure.into().message);
     Failure::new(ErrorKind::Fault, "output-lost", message).next(MAKE_ROOM)
 }
 
-/// Returns the failure of an interrupted recording. The data that was written before is kept.
+/// Returns the failure of an interrupted recording. The data that was already written is kept.
 pub(crate) fn recording_broken_off(failure: impl Into<Failure>) -> Failure {
     let message = format!("{}; the recording ends at this point", failure.into().message);
     Failure::new(ErrorKind::Fault, "output-lost", message).next(MAKE_ROOM)

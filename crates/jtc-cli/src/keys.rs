@@ -2,12 +2,12 @@
 
 use cli_kit::{Key, Keys};
 
-/// Request of the user for the motion.
+/// Request of the user about the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wish {
-    /// `s`: stop on the path.
+    /// Stop on the path (key `s`).
     Stop,
-    /// Space: pause, or resume after a pause.
+    /// Pause, or resume after a pause (space bar).
     PauseOrResume,
     /// `+`: faster.
     Faster,
@@ -18,14 +18,14 @@ pub(crate) enum Wish {
 /// Key help for the user at the terminal.
 pub(crate) const HELP: &str = "keys: space pauses, s stops, Ctrl-C ends";
 
-/// Like [`HELP`], if the controller can change the speed of a motion.
+/// Like [`HELP`], for controllers that can change the speed of a motion.
 pub(crate) const HELP_WITH_SPEED: &str = "keys: space pauses, s stops, + - speed, Ctrl-C ends";
 
 /// Message if the speed cannot be changed, with the next step.
 pub(crate) const NO_SPEED: &str = "this controller cannot change the speed of a motion: press s to stop it, then \
     use `jtc traj run FILE --speed PCT`";
 
-/// Returns the strongest request of the keys pressed since the last call.
+/// Returns the most urgent request among the keys that were pressed since the last call.
 pub(crate) fn wish(keys: &mut Keys) -> Option<Wish> {
     strongest(&keys.pressed())
 }
@@ -37,7 +37,7 @@ fn strongest(keys: &[Key]) -> Option<Wish> {
     } else if pressed(&[' ']) {
         Some(Wish::PauseOrResume)
     } else {
-        // On many keyboards, `=` is the key of `+` without Shift.
+        // On many keyboards, `+` is typed with Shift and the `=` key.
         let faster = pressed(&['+', '=']).then_some(Wish::Faster);
         faster.or_else(|| pressed(&['-', '_']).then_some(Wish::Slower))
     }

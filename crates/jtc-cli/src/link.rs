@@ -1,5 +1,5 @@
-//! Link to the controller. The link uses the port that the user has given, or the only port of the computer. If an
-//! agent owns the port, the link goes through the agent.
+//! Link to the controller. The link uses the port that the user has specified, or the only port of the computer. If an agent owns the port,
+//! the link goes through the agent.
 use cli_kit::{ErrorKind, Failure};
 use jtc_agent::access::Tokens;
 use jtc_client::agents::{Registered, is_same_port, owner_of, registered};
@@ -9,7 +9,7 @@ use jtc_host::{Port, PortError, Session};
 
 use crate::args::LinkArgs;
 
-/// A serial port, or an agent's line.
+/// Serial port, or connection to an agent.
 pub(crate) type LinkPort = Box<dyn Port>;
 
 impl LinkArgs {
@@ -21,7 +21,7 @@ impl LinkArgs {
         }
     }
 
-    /// Opens the port, or the line of the agent that owns it.
+    /// Opens the port, or connects to the agent that owns the port.
     pub(crate) fn open(&self) -> Result<LinkPort, Failure> {
         self.open_with(None)
     }
@@ -31,11 +31,11 @@ impl LinkArgs {
         Ok(self.open_as(policy, true)??)
     }
 
-    /// Opens the link for a Stop or a Pause. An agent on this computer needs no token for these, and accepts them even
-    /// with an unknown token. The inner error is the error of a serial port that no agent of this user owns.
+    /// Opens the link for a Stop or a Pause. An agent on this computer accepts a Stop or a Pause without a token, and even with an unknown
+    /// token. The inner error is the error of a serial port that no agent of this user owns.
     pub(crate) fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
-            // The agent does not answer, so a second attempt would only take time.
+            // The agent does not answer, so a second attempt would fail too.
             ErrorKind::NoLink => Err(error),
             _ => self.open_as(None, false).map_err(|_| error),
         })
@@ -71,8 +71,8 @@ impl LinkArgs {
         Ok(Ok(Box::new(port)))
     }
 
-    /// Returns the name and token that this program sends to an agent. The token is sent only to agents of this user,
-    /// or if the user has given its file.
+    /// Returns the name and token that this program sends to an agent. The token is sent only to agents of this user, or if the user has
+    /// specified a token file.
     fn options(
         &self,
         agent: Option<&Registered>,
@@ -91,7 +91,7 @@ impl LinkArgs {
         Ok(Session::new(self.open()?))
     }
 
-    /// Opens the serial port itself, for the program that will own it.
+    /// Opens the serial port directly, for the program that will own the port.
     pub(crate) fn own(&self) -> Result<SerialPort, Failure> {
         let name = self.name()?;
         if is_agent(&name) {
@@ -107,7 +107,7 @@ impl LinkArgs {
     }
 }
 
-/// Returns the name of this program for other clients: its command and its user.
+/// Returns the name that other clients see for this program, which contains the command and the user.
 pub(crate) fn who() -> String {
     let command = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     match std::env::var("USER").or_else(|_| std::env::var("LOGNAME")) {

@@ -1,4 +1,4 @@
-//! The `jtc` command: parses the arguments, calls the libraries and prints the results. Results go to stdout, progress
+//! The `jtc` command: parses the arguments, calls the libraries and prints the results. The command writes results to stdout, and progress
 //! and logs to stderr.
 #![forbid(unsafe_code)]
 

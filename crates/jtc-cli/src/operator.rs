@@ -1,4 +1,4 @@
-//! Interaction with the user while an arm moves: keys, Ctrl-C, and the message at a sudden end.
+//! Interaction with the user while an arm moves, with keys, Ctrl-C and the message if the command ends at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -13,10 +13,10 @@ use crate::keys::{HELP, HELP_WITH_SPEED, NO_SPEED, Wish, wish};
 use crate::progress::Progress;
 use cli_kit::output_file;
 
-/// Longest time for the last message, so that a blocked reader cannot block the command.
+/// Longest time for printing the last message, so that a blocked output does not block the command.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
-/// Handles the second signal: removes empty files, reports the reason of the end, and returns the exit code.
+/// Handles the second signal. Removes empty files, reports why the command ended, and returns the exit code.
 pub(crate) fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> u8 {
     output_file::abandon();
     let (done, written) = mpsc::channel();
@@ -29,29 +29,29 @@ pub(crate) fn ended_at_once(out: Output, message: &'static str, hint: &'static s
     FAULT
 }
 
-/// Steps of the speed override that the keys select, in percent.
+/// Values of the speed override that the user selects with keys, in percent.
 const SPEEDS: [u8; 10] = [5, 10, 20, 30, 40, 50, 60, 70, 85, 100];
 
-/// Requests of the user, read at each status.
+/// Reader of the requests of the user, which are read at each status.
 pub(crate) struct Operator<'a> {
     /// Output of messages.
     pub out: &'a Output,
     /// Events for programs.
     pub progress: Progress,
     stop: Stop,
-    /// Keyboard input. The keyboard is read only while the arm moves. At other times the terminal is unchanged.
+    /// Keyboard input. Keyboard, which is read only while the arm moves. At other times the terminal is unchanged.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,
     /// Last announced trajectory state.
     announced: Option<Code<TrajectoryState>>,
-    /// Speed override in percent, if the controller has one.
+    /// Speed override in percent, if the controller supports it.
     pub speed: Option<u8>,
 }
 
 impl<'a> Operator<'a> {
-    /// Starts to listen: the first SIGINT, SIGTERM or SIGHUP requests the end. The second one ends the process at once,
-    /// with the terminal restored and a message about the arm.
+    /// Starts to handle signals. The first SIGINT, SIGTERM or SIGHUP requests the end of the command. The second signal restores the
+    /// terminal, prints a message about the arm, and ends the process at once.
     pub(crate) fn listen(out: &'a Output, progress: &Progress) -> Result<Self, Failure> {
         let moving = Arc::new(AtomicBool::new(false));
         let (its_moving, its_out) = (Arc::clone(&moving), *out);
@@ -93,7 +93,7 @@ impl<'a> Operator<'a> {
             return;
         }
         match draws_bars() {
-            // The keys are shown below the bar.
+            // The key help is shown below the progress bar.
             Ok(()) if !self.out.is_json() => {}
             Err(Some((columns, rows))) => self.out.note(format_args!(
                 "{}: the progress bar needs {} columns and {} rows, but the terminal has {columns} and \
@@ -106,7 +106,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Returns the key help that is shown below a bar. Empty if no keys are read.
+    /// Returns the key help that is shown below a progress bar. Returns an empty text if no keys are read.
     pub(crate) fn keys(&self) -> &'static str {
         match (&self.keys, self.speed) {
             (None, _) => "",
@@ -121,11 +121,11 @@ impl<'a> Operator<'a> {
         self.keys = None;
     }
 
-    /// Returns the request of the user for the motion.
+    /// Returns the request of the user about the motion.
     pub(crate) fn wish(&mut self, status: &Status) -> Flow {
         if status.trajectory.is_in(&[TrajectoryState::Pause, TrajectoryState::Execute])
             && self.announced != Some(status.trajectory)
-            // A held stop ends the run and has its own message.
+            // A held stop ends the run and is reported with a separate message.
             && !status.is_held_stop()
         {
             let before = self.announced.replace(status.trajectory);
@@ -134,8 +134,7 @@ impl<'a> Operator<'a> {
                 (false, Some(_)) => self.out.note("moving"),
                 // The motion begins.
                 (_, None) if before.is_none() => {}
-                // Another program has paused the motion, or the controller did after a timeout without frames of this
-                // program (J-59).
+                // Another program has paused the motion, or the controller has paused it because this program sent no frames (J-59).
                 (true, None) => {
                     self.out.note("paused; `jtc traj resume` resumes the motion, `jtc traj stop` ends it");
                 }

@@ -1,4 +1,4 @@
-//! Progress reports to programs: events of `--json`, one object per line on stderr.
+//! Progress reports for programs. The events of `--json` are written to stderr, with one object per line.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -11,16 +11,16 @@ use jtc_host::{Session, labels, session};
 use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 use serde_json::{Value, json};
 
-/// Page of `jtc help events`.
+/// Text of the page `jtc help events`.
 pub(crate) const EVENTS_HELP: &str = include_str!("progress.md");
 
 /// Shortest interval between two samples, or two upload events.
 const MODEST: Duration = Duration::from_millis(200);
 
-/// States of controller and trajectory, and errors.
+/// State of the controller, state of the trajectory, and error bits that were reported.
 type Reported = (Code<ControllerState>, Code<TrajectoryState>, u16);
 
-/// The events of a command.
+/// Writer of the events of a command.
 #[derive(Clone)]
 pub(crate) struct Progress(Rc<Inner>);
 
@@ -51,16 +51,16 @@ impl Progress {
         self.0.out.event(name, value);
     }
 
-    /// Turns all further statuses of this session into events. Callers with their own observer pass the statuses to
-    /// [`Progress::see`] instead.
+    /// Reports all further statuses of this session as events. Callers with their own observer pass the statuses to [`Progress::see`]
+    /// instead.
     pub(crate) fn watch<P: Port>(&self, session: &mut Session<P>) {
         *self.0.link.borrow_mut() = json!({ "port": session.port().name(), "baud": session.port().baud() });
         let own = self.clone();
         session.observe(move |_, status| own.see(status));
     }
 
-    /// Takes a status. The first status is reported as `connected`. Changes of the state are reported at once. While
-    /// the arm moves or may be moved, measured values are reported at a limited rate.
+    /// Takes a status. Reports a status. The first status is reported as `connected`. Changes of the state are reported at once. While the
+    /// arm moves or may be moved, measured values are reported at a limited rate.
     pub(crate) fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);
         let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": labels::causes(s) });
@@ -100,7 +100,7 @@ fn due(last: &Cell<Option<Instant>>) -> bool {
     due
 }
 
-/// Returns the measured values of all joints; null if a joint does not answer.
+/// Returns the measured values of all joints. The value of a joint that does not answer is null.
 fn sample(s: &Status) -> Value {
     let all = |value: fn(&jtc_wire::JointStatus) -> f32| -> Vec<Option<f32>> {
         let joints = s.joints.iter().enumerate();

@@ -1,4 +1,4 @@
-//! Simulated controller on a pseudo-terminal: world, terminal and clock in one loop.
+//! Simulated controller on a pseudo-terminal. One loop runs the world, the terminal and the clock.
 
 mod frames;
 mod pty;
@@ -18,18 +18,17 @@ use frames::{Frames, Incoming};
 pub(crate) use pty::{Pty, PtyError};
 pub(crate) use typed::{Typed, hand};
 
-/// Largest number of host bytes that wait for the line, like the buffer of an adapter. When it is full, the host's
-/// writes block.
+/// Largest number of host bytes that wait for transmission, like the buffer of a serial adapter. When the buffer is full, writes of the
+/// host block.
 const WAITING_MAX: usize = 4096;
-/// With free-running virtual time: longest wait for a host to read before statuses are lost.
+/// Longest wait for a host that does not read before statuses are lost. The value applies to free-running virtual time.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay that the simulator makes up for, µs. After a longer delay (a suspended computer), the missed time is
-/// skipped.
+/// Largest delay that the simulator catches up on, µs. After a longer delay (for example a suspended computer), the missed time is skipped.
 const CATCH_UP_US: u64 = 2_000_000;
 /// A tick, µs.
 const TICK_US: u64 = 1000;
 
-/// Joint bus that is connected to a CAN bus, so that other programs can join it.
+/// Joint bus that is connected to a CAN bus, so that other programs can use the joint bus.
 pub(crate) type Tap = BusTap<Box<dyn CanBus + Send>>;
 
 /// The loop's state.
@@ -40,22 +39,22 @@ pub(crate) struct Server {
     typed: Typed,
     frames: Frames,
     incoming: Incoming,
-    /// Bytes of a frame that the terminal did not accept at once.
+    /// Remaining bytes of a frame that the terminal did not accept at once.
     rest: Vec<u8>,
     connected: bool,
-    /// `true` if the host has not read for a long time. Statuses are lost until it reads again.
+    /// `true` if the host has not read for a long time. Statuses are lost until the host reads again.
     stalled: bool,
     /// `true` after the first status of the controller.
     answers: bool,
-    /// Sink for every tick.
+    /// Sink for the samples of every tick.
     sink: Option<SampleSink>,
     /// File of the stored arm, and the number of the arm that it contains.
     keeps: Option<(PathBuf, u32)>,
 }
 
 impl Server {
-    /// Creates a server for a world on a terminal. `tap` is its joint bus, and `typed` are the events that the user
-    /// types.
+    /// Creates a server for a simulated world on a pseudo-terminal. `tap` is the joint bus of the world, and `typed` contains the events
+    /// that the user types.
     pub(crate) fn new(world: World, pty: Pty, tap: Option<Tap>, typed: Typed) -> Self {
         Self {
             world,
@@ -99,7 +98,8 @@ impl Server {
         }
     }
 
-    /// Runs until `stop`. Calls `ready` when the controller has sent its first status. Returns the virtual time, s.
+    /// Runs until `stop`. Runs the simulation, and calls `ready` when the controller has sent its first status. Returns the elapsed virtual
+    /// time, s.
     pub(crate) fn run(
         &mut self,
         speed: SimSpeed,
@@ -153,7 +153,7 @@ impl Server {
         Ok(self.world.now_us() as f64 * 1e-6)
     }
 
-    /// Passes as many of the host's bytes to the line as the buffer of an adapter would hold.
+    /// Passes bytes of the host to the simulated line, up to the buffer size of a serial adapter.
     fn take_input(&mut self) -> Result<(), PtyError> {
         let mut buffer = [0; WAITING_MAX];
         loop {
@@ -170,7 +170,7 @@ impl Server {
         }
     }
 
-    /// Tells the world how long the host has been silent within a frame; see [`Incoming`].
+    /// Reports to the world how long the host has been silent within a frame; see [`Incoming`].
     fn note_silence(&mut self) {
         let now = Instant::now();
         if self.world.host_write_pending() > 0 {
@@ -180,7 +180,7 @@ impl Server {
         self.world.limit_host_silence(silence.map(|silence| silence.as_micros() as u64));
     }
 
-    /// Passes statuses to the host. Without a host they are lost, like on a line with an open end.
+    /// Passes statuses to the host. Without a host the statuses are lost, as on a serial line without a receiver.
     fn give_output(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let mut buffer = [0; 1024];
         loop {
@@ -216,8 +216,8 @@ impl Server {
         Ok(())
     }
 
-    /// Writes the rest of a frame. A host that does not read must not delay the arm: in real time the simulator does
-    /// not wait. With free-running time it waits only for a limited time.
+    /// Writes the remaining bytes of a frame. A host that does not read must not delay the arm, so the simulator does not wait in real
+    /// time. With free-running time the simulator waits only for a limited time.
     fn write_rest(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

@@ -1,4 +1,4 @@
-//! Recordings during a motion.
+//! Recordings that are written during a motion.
 
 use crate::failure::recording_broken_off;
 use std::fs::File;
@@ -15,8 +15,8 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// Begins a recording in `output`, in the format of its file ending. An earlier recording in the file is discarded.
-    /// A later write error is reported at once. `goes_on` is the part of the message about the consequence.
+    /// Begins a recording in `output`. The file name extension selects the format. An earlier recording in the file is discarded. A later
+    /// write error is reported at once. `goes_on` is the part of the message that describes the consequence.
     pub(crate) fn begin(
         output: &mut OutputFile,
         info: &RecordingInfo,
@@ -32,14 +32,14 @@ impl Tape {
         match live {
             Ok(live) => Ok(Self { name: output.name(), live, on_disk }),
             Err(e) => {
-                // A file without its beginning is useless.
+                // A recording without its header is useless.
                 output.is_worthless();
                 Err(e.into())
             }
         }
     }
 
-    /// Returns the name for users.
+    /// Returns the file name that is shown to the user.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
@@ -56,7 +56,7 @@ impl Tape {
         settle(&on_disk).map_err(|e| recording_broken_off(Failure::usage(format!("{name}: {e}"))))
     }
 
-    /// Ends the recording without completing the file. The file will be started again.
+    /// Ends the recording without completing the file. The caller will start the file again.
     pub(crate) fn abandon(self) {
         self.live.abandon();
     }

@@ -1,4 +1,4 @@
-//! Interrupted runs: their remainder, and the position from which it runs.
+//! Tests of interrupted runs. The remainder runs from the right position.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,7 @@ fn phases(value: &Value) -> Vec<&str> {
     value["runs"].as_array().unwrap().iter().map(|run| run["phase"].as_str().unwrap()).collect()
 }
 
-/// If a closed path begins and ends at the position of a restarted controller, the whole path is run.
+/// If a closed path begins and ends at the position of the arm after a restart of the controller, the whole path is executed.
 #[test]
 fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let dir = tempfile::tempdir().unwrap();
@@ -44,7 +44,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let of_first = &value["verdict"]["joints"][0];
     assert!(of_first["position_max_rad"].as_f64().unwrap() > 0.399, "{of_first}");
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
-    // Replays the whole motion, and then its measured version.
+    // The test replays the whole motion, and then the measured motion.
     let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach"]).ends(0);
     assert!(output.err.contains("the whole trajectory of the recording; the run reached"), "{}", output.err);
     assert!((output.json()["verdict"]["duration_s"].as_f64().unwrap() - whole).abs() < 0.1);
@@ -69,7 +69,7 @@ fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     sim.json(&["traj", "continue", &record, "--trajectory", &file], 0);
 }
 
-/// A motion as fast as the limits allow was recorded. Its measured version runs again within the limits.
+/// The recording contains a motion that is as fast as the limits allow. The measured motion is replayed within the limits.
 #[test]
 fn a_measured_motion_at_its_limits_is_run_again() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -80,13 +80,13 @@ fn a_measured_motion_at_its_limits_is_run_again() {
     let words = ["traj", "replay", &record, "--measured", "--approach", "--record", &again];
     let value = sim.json(&words, 0);
     let executed = value["verdict"]["duration_s"].as_f64().unwrap();
-    // The motion takes 2.4 s. The time of a measured end is known to a tenth of a second.
+    // The motion takes 2.4 s. The end time of a measured motion is accurate to 0.1 s.
     assert!((2.3..8.0).contains(&executed), "{executed} s");
     let most = value["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
 }
 
-/// No pose is saved during a motion, not even at its beginning, before the arm has a speed.
+/// A pose cannot be saved during a motion. This includes its beginning, when the velocity is still zero.
 #[test]
 fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -142,7 +142,7 @@ fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
     moving_while(sim, &[&["traj", "run"], words].concat(), 1.0)
 }
 
-/// After a stop by the user, or if the program was killed, the remainder runs from the last recorded position.
+/// After a Stop by the user or a killed program, the remainder runs from the last recorded position.
 #[test]
 fn a_run_that_was_broken_off_goes_on_where_it_was() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -159,8 +159,8 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         let before = place(&sim);
         assert!(before[0] > 0.01, "{before:?}");
         let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-        // A recording with the stop contains the final position of the arm. A recording that ends before the stop does
-        // not.
+        // A recording that includes the stop contains the final position of the arm. A recording that ends before the stop does not contain
+        // the final position.
         let stands =
             output.err.contains("and the arm is at rest there: the motion continues from that position");
         assert!(stands || signal == "-KILL" && output.err.contains("no later position"), "{}", output.err);
@@ -177,7 +177,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     child.wait().unwrap();
     let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
     assert!(output.err.contains("at another speed"), "{}", output.err);
-    // A finished run has no remainder, and a CSV file does not contain the path.
+    // A finished run has no remainder. A CSV file does not contain the commanded path.
     let (other, whole, rest) =
         (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
     sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
@@ -188,12 +188,12 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     assert!(!std::path::Path::new(&rest).exists());
 }
 
-/// After an error the arm must be recovered first. If it was moved meanwhile, an approach leads to the resume point.
+/// After an error the arm must be recovered first. If the arm was moved in the meantime, an approach moves it to the resume point.
 #[test]
 fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     let faults =
         "format = 2\n[[fault]]\nkind = \"motor-fault\"\njoint = 3\nbits = 2\nfor_s = 0.05\nat_point = 1500\n";
-    // The simulator runs in real time, so that the recording has a status for each 40 ms of the path.
+    // The simulator runs in real time, so that the recording contains a status for each 40 ms of the path.
     let sim = Sim::with_faults(&["--no-throttle"], faults).held();
     let (file, record) = (sim.file("motion.csv", &slow_motion(60)), sim.path("fault.mcap"));
     sim.jtc(&["traj", "run", &file, "--record", &record]).ends(5);
@@ -210,8 +210,8 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     at(&sim, [0.0; 6]);
 }
 
-/// After an interruption in the second of three runs, its remainder and the third run are executed. This also works if
-/// the recording is itself of a remainder, and if the controller has finished the run by itself.
+/// After an interruption in the second of three runs, the remainder of the second run and the third run are executed. The command also
+/// works if the recording contains a remainder, or if the controller has finished the run without the program.
 #[test]
 fn the_runs_that_are_left_are_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -221,7 +221,7 @@ fn the_runs_that_are_left_are_run() {
     let child = moving_after(&sim, &words, "run 1 of 3 finished", 0.7);
     cli_kit::testing::signal(&child, "-INT");
     child.wait_with_output().unwrap();
-    // Interrupts the command again, in the last run.
+    // The test interrupts the command again during the last run.
     let words = ["traj", "continue", &run, "--record", &rest];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
     cli_kit::testing::signal(&child, "-KILL");
@@ -229,18 +229,18 @@ fn the_runs_that_are_left_are_run() {
     std::thread::sleep(std::time::Duration::from_secs(3));
     let output = sim.jtc(&["traj", "continue", &rest]).ends(4);
     assert!(output.err.contains("no part of it remains"), "{}", output.err);
-    // With this option the user requests one more run.
+    // With `--repeat 3`, the user requests one more run.
     let value = sim.json(&["traj", "continue", &rest, "--repeat", "3"], 0);
     assert_eq!((phases(&value), &value["runs_finished"]), (vec!["motion"], &1.into()), "{value}");
-    // Continues from the first recording again, after the controller has executed another motion. The remainder of the
-    // second run and the third run are executed.
+    // The test continues from the first recording again, after the controller has executed another motion. The remainder of the second run
+    // and the third run are executed.
     sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]).ends(0);
     let output = sim.jtc(&["--json", "traj", "continue", &run]).ends(0);
     assert!(output.err.contains("then the whole trajectory runs once"), "{}", output.err);
     let value = output.json();
     assert_eq!(value["runs_finished"], 2, "{value}");
     assert!((value["verdict"]["duration_s"].as_f64().unwrap() - 2.0).abs() < 1e-6, "{value}");
-    // If a recording lacks required data, this is reported.
+    // The command reports if a recording lacks required data.
     let csv = path("run.csv");
     let words = ["traj", "run", &file, "--repeat", "2", "--record", &csv];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);

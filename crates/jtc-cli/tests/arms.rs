@@ -1,4 +1,4 @@
-//! Arm files and robot descriptions: their content, and refusals.
+//! Tests of arm files and robot descriptions, including files that are refused.
 
 use crate::common;
 
@@ -23,7 +23,7 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     let (arm, motion_file) = (slower(dir.path()), dir.path().join("motion.csv"));
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let file = motion_file.to_str().unwrap();
-    // The controller is asked for its data first. If it cannot be reached, this error is reported.
+    // The command first requests the data of the controller. If the controller does not answer, the command reports this error.
     let port = ["--port", "/nowhere/tty"];
     jtc(&["params", "push", &arm, port[0], port[1]]).ends(3);
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -50,8 +50,8 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     }
 }
 
-/// Parameters that a URDF cannot contain are unknown, not zero. Such parameters are not listed as differences to the
-/// controller, and a check without them reports this.
+/// Parameters that a URDF cannot contain are unknown, not zero. Unknown parameters are not listed as differences from the controller. A
+/// check reports that it does not use them.
 #[test]
 fn j55_what_a_urdf_cannot_say_is_not_given() {
     let dir = tempfile::tempdir().unwrap();
@@ -60,7 +60,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     std::fs::write(&urdf, arm.to_urdf()).unwrap();
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let (urdf, file) = (urdf.to_str().unwrap(), motion_file.to_str().unwrap());
-    // The limits are equal to the controller's, so the command continues and opens the port, which does not exist.
+    // The limits are equal to those of the controller, so the command continues and opens the port, which does not exist.
     let output = jtc(&["params", "push", urdf, "--port", "/nowhere/tty"]).ends(3);
     assert!(!output.err.contains("rotor_inertia"), "{}", output.err);
 
@@ -78,7 +78,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     assert!(output.err.contains("without friction: the file"), "{}", output.err);
 }
 
-/// J-55: a URDF has neither friction nor gains. The missing values are not replaced by the values of another arm.
+/// J-55: a URDF does not contain friction and gains. The missing values are not replaced by the values of another arm.
 #[test]
 fn j55_recover_refuses_an_arm_that_is_not_whole() {
     let dir = tempfile::tempdir().unwrap();
@@ -147,7 +147,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     assert!(codes.contains(&"proposed") && codes.contains(&"holding"), "{codes:?}");
 }
 
-/// J-06, J-35: the check refuses the same values as a controller, and reports joint, value, limit and next step.
+/// J-06, J-35: the check and the controller refuse the same values. The check reports the joint, value, limit and next step.
 #[test]
 fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
     let dir = tempfile::tempdir().unwrap();
@@ -172,7 +172,7 @@ fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
         "{}",
         output.out
     );
-    // An unreadable file gives another exit code.
+    // If the file cannot be read, the exit code is different.
     jtc(&["arm", "check", "nowhere.toml"]).ends(2);
     jtc(&["arm", "check", "Cargo.toml"]).ends(2);
 }
@@ -207,7 +207,7 @@ fn an_arm_is_shown_with_units_ranges_and_sources() {
     assert_eq!(one("pid.kp", 2)["value"].as_f64(), Some(8000.0));
 }
 
-/// J-71: the check refuses unstable gains, and no command sends them to a controller.
+/// J-71: the check refuses unstable gains, and no command sends unstable gains to a controller.
 #[test]
 fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     let dir = tempfile::tempdir().unwrap();
@@ -240,8 +240,8 @@ fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     sim.jtc(&["arm", "push", whole]).ends(0);
 }
 
-/// A robot description in degrees is refused, and no file is written. Values with a unit in the header are not
-/// converted twice.
+/// A robot description in degrees is refused, and no file is written. Values in degrees are converted only once if the header contains
+/// their unit.
 #[test]
 fn degrees_are_neither_taken_for_radians_nor_turned_twice() {
     let dir = tempfile::tempdir().unwrap();

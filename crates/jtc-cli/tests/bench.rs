@@ -1,10 +1,10 @@
-//! `jtc bench`: absent joints (J-53).
+//! Tests of `jtc bench`, which declares absent joints (J-53).
 
 use crate::common;
 
 use common::{Sim, motion};
 
-/// Fault file: joint 3 of this arm is missing on the bus.
+/// Fault file for an arm whose joint 3 is missing on the bus.
 const WITHOUT: &str = "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_s = 0\n";
 
 #[test]
@@ -35,7 +35,7 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let doctor = sim.jtc(&["doctor"]).ends(0).out;
     assert!(doctor.contains("joint 3 is marked as absent"), "{doctor}");
 
-    // Motions and teaching are refused. The other joints can be jogged, but joint 3 cannot.
+    // The controller refuses motions and teaching. All joints except joint 3 can be jogged.
     let file = sim.file("motion.csv", &motion(0.1));
     let refused = sim.jtc(&["traj", "run", &file]).ends(4).err;
     assert!(
@@ -50,7 +50,7 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let moved = way["to_rad"][4].as_f64().unwrap() - way["from_rad"][4].as_f64().unwrap();
     assert!(moved > 0.02, "{moved} rad");
 
-    // Joints can be declared absent or present only without torque.
+    // Joints can be declared absent or present only while the drives produce no torque.
     let refused = sim.jtc(&["bench", "present"]).ends(1).err;
     assert!(refused.contains("jtc disable"), "{refused}");
     sim.jtc(&["disable", "--yes"]).ends(0);

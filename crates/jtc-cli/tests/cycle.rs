@@ -1,5 +1,5 @@
-//! docs/from-two-poses-to-a-cycle.md: the real program runs each command of the page against `jtc sim`. `UPDATE_DOCS=1`
-//! updates the outputs in the page.
+//! Runs each command of docs/from-two-poses-to-a-cycle.md with the real program against `jtc sim`. `UPDATE_DOCS=1` updates the outputs on
+//! the page.
 #![cfg(target_os = "linux")]
 
 use test_kit::page::{Page, Printed, blurred};
@@ -13,19 +13,19 @@ const PAGE: &str = "from-two-poses-to-a-cycle.md";
 fn done(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command);
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
-    // The table head is left out, because its width depends on the measured figures.
+    // The table heading is omitted, because its width depends on the measured numbers.
     let lines = seen.text.lines().filter(|line| !line.contains("peak rad/s"));
     Printed { code: seen.code, text: lines.map(measured).collect() }
 }
 
-/// Like [`done`], for commands without figures that differ from run to run.
+/// Like [`done`], for commands whose output is identical in every run.
 fn exact(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command).0;
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
     seen
 }
 
-/// Replaces the measured figures of a line by placeholders, but not the words that the user types.
+/// Replaces the measured numbers of a line by placeholders, but not the words that the user types.
 fn measured(line: &str) -> String {
     let (typed, rest) = match line.split_once(": ") {
         Some((typed, rest)) if typed.starts_with("move to ") => (format!("{typed}: "), rest),
@@ -164,7 +164,7 @@ fn broken_off() {
     page.finish();
 }
 
-/// Tests the section in which a hand leads the simulated arm.
+/// Tests the section in which a hand guides the simulated arm.
 fn taught() {
     let mut page = Page::new(PAGE, "teach");
     let mut desk = Desk::simulated(&["--no-throttle"]);

@@ -1,4 +1,4 @@
-//! Workplace of a user who types commands: a directory, a port, and a controller.
+//! Simulated workplace of a user who types commands, with a directory, a port and a controller.
 #![cfg(target_os = "linux")]
 
 use std::fs::File;
@@ -16,7 +16,7 @@ use test_kit::page::{Printed, blurred};
 
 use crate::common::{Sim, command};
 
-/// Name of the port on the page.
+/// Name of the port in the documentation.
 const PORT: &str = "/tmp/jtc";
 
 /// Output of a command.
@@ -30,13 +30,13 @@ impl std::ops::Deref for Seen {
 }
 
 impl Seen {
-    /// Replaces values that differ from run to run by placeholders.
+    /// Replaces values that are different in each run by placeholders.
     pub(crate) fn blurred(self) -> Printed {
         Printed { code: self.code, text: blurred(&self.text) }
     }
 }
 
-/// Returns the test's end of a terminal, and the name of the file that a command opens.
+/// Creates a terminal. Returns the side of the test, and the path that a command opens.
 fn terminal() -> (File, String, OwnedFd) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -46,7 +46,7 @@ fn terminal() -> (File, String, OwnedFd) {
     (File::from(master), name.to_string_lossy().into_owned(), slave)
 }
 
-/// A serial line with another device at its end.
+/// Serial line to which a device other than a controller is connected.
 pub(crate) struct Line {
     port: String,
     ended: Arc<AtomicBool>,
@@ -54,7 +54,7 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// Creates a device that sends this text again and again, and ignores its input.
+    /// Creates a device that repeatedly sends this text, and ignores its input.
     pub(crate) fn new(text: &'static str) -> Self {
         let (mut end, port, slave) = terminal();
         let mut raw = rustix::termios::tcgetattr(&slave).unwrap();
@@ -91,7 +91,7 @@ impl Desk {
         Self { dir: tempfile::tempdir().unwrap(), sim: None, line: None }
     }
 
-    /// Creates a desk with this line at the port.
+    /// Creates a desk with this serial line at the port.
     pub(crate) fn at(line: Line) -> Self {
         Self { line: Some(line), ..Self::new() }
     }
@@ -101,7 +101,7 @@ impl Desk {
         Self { sim: Some(Sim::start(options)), ..Self::new() }
     }
 
-    /// Returns the directory of its files.
+    /// Returns the directory of the files of the desk.
     pub(crate) fn dir(&self) -> &Path {
         self.dir.path()
     }
@@ -114,7 +114,7 @@ impl Desk {
         }
     }
 
-    /// Returns a shell that writes both streams into one, like a terminal.
+    /// Returns a shell that writes stdout and stderr into one stream, like a terminal.
     fn shell(&self, shown: &str) -> Command {
         let jtc = command();
         let mut shell = Command::new("sh");
@@ -161,14 +161,14 @@ impl Desk {
         self.seen(child.wait().unwrap().code(), &text)
     }
 
-    /// Types a line into the simulator.
+    /// Writes a line to the standard input of the simulator.
     pub(crate) fn write_line(&mut self, line: &str) {
         if let Some(sim) = &mut self.sim {
             sim.write_line(line);
         }
     }
 
-    /// Opens the port like another program.
+    /// Opens the port, as another program would do.
     pub(crate) fn hold_port(&self) -> jtc_host::port::SerialPort {
         jtc_host::port::SerialPort::open(&self.port(), 115_200).unwrap()
     }

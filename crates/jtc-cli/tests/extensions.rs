@@ -1,11 +1,11 @@
-//! Reports and requests of a controller with extensions: identity, arm, speed, jogging (J-52 to J-58).
+//! Tests of a controller with extensions: identity, arm, speed and jogging (J-52 to J-58).
 
 use crate::common;
 
 use common::{Sim, jtc, motion};
 use serde_json::Value;
 
-/// Writes an arm file that differs from the built-in arm in a gain, a limit of a joint, and a setting of the controller.
+/// Writes an arm file with a gain, a joint limit and a controller setting that differ from the built-in arm.
 fn another(sim: &Sim) -> String {
     let text = include_str!("../../../arms/avena.toml")
         .replacen("name = \"avena\"", "name = \"another\"", 1)
@@ -30,7 +30,7 @@ fn j52_a_controller_tells_who_it_is() {
     }
     let text = sim.jtc(&["info"]).ends(0).out;
     assert!(text.contains(info["hash"].as_str().unwrap()) && text.contains("started:   once"), "{text}");
-    // Controller and host compute the same hash for the arm.
+    // The controller and the host compute the same hash for the arm.
     let sim = sim.with_parameters();
     assert_eq!(sim.json(&["info"], 0)["hash"], info["hash"]);
     let avena = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
@@ -43,7 +43,8 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let sim = Sim::start(&["--no-throttle"]);
     let arm = another(&sim);
     let file = sim.file("motion.csv", &motion(0.2));
-    // Before the push the controller has none of these values. Its gains and friction are the built-in values.
+    // Before the push, all these values differ from those of the controller. The gains and the friction of the controller are the built-in
+    // values.
     let diff = sim.json(&["arm", "diff", &arm], 4);
     assert_eq!(names(&diff), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
 
@@ -54,7 +55,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     assert_eq!((&info["hash"], info["missing"].as_array().unwrap().len()), (&pushed["hash"], 3));
     assert_eq!(sim.json(&["arm", "diff", &arm], 0)["equal"], true);
 
-    // The controller's defaults are now this arm, and a run is checked with it. A run for another arm is refused.
+    // The controller's defaults are now this arm, and a run is checked with it. A run with a different arm file is refused.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let sim = sim.held();
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
@@ -74,7 +75,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let shown = sim.json(&["arm", "show"], 0);
     assert_eq!(shown["arm"], "another");
 
-    // Settings of the arm can change only without torque.
+    // Settings of the arm can be changed only while the drives produce no torque.
     let refused = sim.jtc(&["arm", "push", avena]).ends(1);
     assert!(
         refused.err.contains("jtc disable") && refused.err.contains("nothing was changed"),
@@ -82,7 +83,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
         refused.err
     );
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
-    // The command is refused without a terminal, because no user can confirm that the torque may be removed.
+    // The command is refused without a terminal, because no user can confirm that the torque may be switched off.
     sim.jtc(&["disable"]).ends(4);
     assert_eq!(sim.json(&["disable", "--yes"], 0)["status"]["state"], "Init");
     sim.jtc(&["arm", "push", avena]).ends(0);
@@ -137,7 +138,7 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!((at(&way["to_rad"], 0) - at(&way["from_rad"], 0)).abs() < 1e-3);
     let back = sim.json(&["jog", "3", "-10", "--deg", "--duration", "0.5"], 0);
     assert!(at(&back["to_rad"], 2) < at(&way["to_rad"], 2) - 0.05);
-    // A killed command cannot send a Stop. The controller brings the arm to rest by itself.
+    // A killed command cannot send a Stop. The controller therefore stops the arm without a Stop.
     let mut child = sim.command(&["jog", "1", "0.3"]).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_millis(600));
     child.kill().unwrap();
@@ -157,12 +158,12 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!(refused.err.contains("jtc recover"), "{}", refused.err);
 }
 
-/// If an error releases the arm during a jog, the script that jogs is told this, with the reason.
+/// If an error releases the arm during a jog, the command reports the error and its reason to the script.
 #[test]
 fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
     let fault =
         "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 4\nin_state = \"hold\"\nafter_s = 10\n";
-    // The drives are enabled 4 s after the arm is in HoldPos. Without the fault the jog would take a minute.
+    // The drives are enabled 4 s after the controller enters HoldPos. Without the fault the jog would take a minute.
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
     let output = sim.jtc(&["--json", "jog", "2", "0.01", "--duration", "60"]).ends(5);
     let error = &output.json()["error"];
@@ -171,8 +172,7 @@ fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() 
     assert!(error.to_string().contains("jtc recover"), "{error}");
 }
 
-/// The simulated board keeps its arm in a file, like a real board in flash. The file remains after the end of the
-/// simulator.
+/// The simulated board keeps its arm in a file, like a real board in flash. The file still exists after the end of the simulator.
 #[test]
 fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -186,7 +186,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
         (&status["state"], status["missing_parameters"].as_array().unwrap().len()),
         (&"Init".into(), 3)
     );
-    // The torque of a held arm is not removed without confirmation.
+    // The torque of a held arm is not switched off without confirmation.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let refused = sim.jtc(&["arm", "push", &arm, "--store"]).ends(1);
     assert!(
@@ -207,7 +207,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     assert!(refused.err.contains("the file contains no stored arm"), "{}", refused.err);
 }
 
-/// The simulated controller gets a user's own arm from its memory, like a board.
+/// Like a board, the simulated controller reads the arm of the user from its memory.
 #[test]
 fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     let dir = tempfile::tempdir().unwrap();
@@ -222,7 +222,7 @@ fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     assert_eq!(sim.json(&["arm", "diff", arm], 0)["equal"], true);
 }
 
-/// If parameters are only stored, the controller must not begin to hold the arm with them.
+/// If parameters are only stored, the controller must not start position hold with them.
 #[test]
 fn j54_an_arm_that_is_stored_is_not_held_in_between() {
     let dir = tempfile::tempdir().unwrap();

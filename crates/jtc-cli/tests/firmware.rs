@@ -1,5 +1,5 @@
-//! `jtc firmware` with drives that are folders, and boards on pseudo-terminals. The tests of the library cover the
-//! complete behaviour of an ST-LINK.
+//! Tests of `jtc firmware` with folders as USB drives and boards on pseudo-terminals. The tests of the library cover the complete behaviour
+//! of an ST-LINK.
 
 #[cfg(unix)]
 mod board;
@@ -14,10 +14,10 @@ use common::{Dir, Sim, command};
 use serde_json::Value;
 
 const H745: &str = "nucleo-h745zi-q";
-/// SHA-256 that does not match the image of 4096 bytes. The library computes the correct one.
+/// SHA-256 that does not match the image of 4096 bytes. The library computes the correct SHA-256.
 const WRONG: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// Returns an image for this board. Its program does nothing.
+/// Returns an image for this board. The program in the image does nothing.
 fn image(board: &str) -> Vec<u8> {
     let mut bytes = vec![0; 0x1000];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
@@ -39,7 +39,8 @@ fn image(board: &str) -> Vec<u8> {
     bytes
 }
 
-/// Creates a drive with this label, an image, and in another folder a catalogue that lists the image with a wrong digest.
+/// Creates a USB drive with this label, an image, and a catalogue. The catalogue is in another folder and lists the image with a wrong
+/// digest.
 fn desk(label: &str) -> (Dir, String, String) {
     let dir = Dir::new();
     fs::create_dir(dir.path(label)).unwrap();
@@ -106,7 +107,7 @@ fn without_a_line_a_person_answers_for_the_arm_and_nothing_is_proved() {
     let question = refused["error"]["message"].as_str().unwrap();
     assert!(question.contains("safety wires") && question.contains("file is complete"), "{question}");
     nothing_written(&drive);
-    // If the drive stays mounted, the board has not accepted the image, and the command fails.
+    // A drive that stays mounted shows that the board has not accepted the image, so the command fails.
     let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(5));
     assert_eq!(done["error"]["code"], "not-taken");
     assert_eq!(fs::read(Path::new(&drive).join("openjtc.bin")).unwrap(), image(H745));
@@ -193,7 +194,7 @@ mod with_a_board {
     use super::board::{Board, appear, program_of};
     use super::*;
 
-    /// `jtc firmware flash` of this board's image.
+    /// Returns the arguments of `jtc firmware flash` for this board, drive and image.
     fn words<'a>(board: &'a Board, drive: &'a str, new: &'a str) -> Vec<&'a str> {
         let image =
             ["firmware", "flash", "--image", new, "--drive", drive, "--accept-supply", "--wait", "60"];
@@ -206,7 +207,7 @@ mod with_a_board {
         let board = Board::new(H745, Path::new(&drive), image(H745).len());
         let words = [&["--json"], &words(&board, &drive, &new)[..], &["--yes"]].concat();
         let crc32 = format!("{:08x}", program_of(&image(H745)).crc32);
-        // The second time, a board already runs the image. The command cannot know if this is the board with the drive.
+        // In the second pass, a board already runs the image. The command cannot determine if the drive belongs to this board.
         for _ in 0..2 {
             let done = json(&jtc(&dir, &words).ends(0));
             assert_eq!((&done["written"], &done["proved"]), (&true.into(), &true.into()), "{done}");
@@ -217,7 +218,7 @@ mod with_a_board {
         }
         let verified = jtc(&dir, &["--json", "firmware", "verify", "--image", &new, "--port", &board.port]);
         assert_eq!(json(&verified.ends(0))["proved"], true);
-        // With `--no-read-back`, the command ends without verification when the drive has come back.
+        // With `--no-read-back`, the command ends without verification when the drive has appeared again.
         let done = json(&jtc(&dir, &[&words[..], &["--no-read-back"]].concat()).ends(0));
         assert_eq!((&done["proved"], &done["drive_after"]), (&false.into(), &"came_back".into()), "{done}");
     }
@@ -252,7 +253,7 @@ mod with_a_board {
             },
             "the report of the board has changed in the meantime",
         );
-        // The drive is unmounted and its folder stays. Then another drive is mounted there.
+        // The drive is unmounted, but its folder still exists. Then another drive is mounted at this folder.
         let page = Path::new(&drive).join("MBED.HTM");
         answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is at this place");
         fs::remove_file(page).unwrap();

@@ -1,15 +1,15 @@
-//! A user reads the flight recorder (J-56) after a fault, while the arm moves, and again from the file.
+//! Tests in which a user reads the flight recorder (J-56) after a fault, while the arm moves, and again from a file.
 
 use crate::common;
 
 use common::{Sim, jtc, slow_motion};
 use serde_json::Value;
 
-/// Fault file: joint 3 does not answer in the middle of a motion.
+/// Fault file in which joint 3 does not answer in the middle of a motion.
 const SILENT: &str =
     "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_point = 700\nfor_s = 0.5\n";
 
-/// Returns a controller in which this fault has occurred.
+/// Returns a simulated controller after this fault has occurred.
 fn after_fault() -> Sim {
     let sim = Sim::with_faults(&["--no-throttle"], SILENT).held();
     let file = sim.file("motion.csv", &slow_motion(30));
@@ -43,7 +43,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     assert!(count(&fetched, "replayed") > 2_300, "{fetched}");
     assert_eq!((count(&fetched, "other_arm"), count(&fetched, "other_trajectory")), (0, 0));
 
-    // The page begins with the fault. The recording is a normal one that also contains the log.
+    // The page begins with the fault. The recording is a normal recording that also contains the log.
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.contains("after the start of the device: joint 3: does not answer"));
     let report = jtc(&["--json", "report", &recording, "--out", &sim.path("again.html")]).ends(0).json();
@@ -62,7 +62,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     std::thread::sleep(std::time::Duration::from_millis(300));
     let anew = sim.json(&["log", "fetch"], 0);
     assert_eq!((&anew["state"], &anew["first"]), (&Value::from("recording"), &Value::Null));
-    // An output is never overwritten.
+    // An existing output file is never overwritten.
     sim.jtc(&["log", "fetch", "-o", &recording]).ends(4);
 }
 

@@ -1,10 +1,10 @@
-//! Files of new users: errors in a trajectory, and hints.
+//! Tests of the hints for errors that new users make in trajectory files and options.
 
 use crate::common;
 
 use common::{Dir, jtc};
 
-/// For degrees, a missing header, and a move that is too fast, the error has a hint, and the hint works.
+/// The errors for degrees, a missing header and a too fast move contain a hint, and each hint works.
 #[test]
 fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let dir = tempfile::tempdir().unwrap();
@@ -31,7 +31,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let output = jtc(&["--json", "traj", "check", file, "--deg"]).ends(0).json();
     let top = output["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((top - 45f64.to_radians()).abs() < 1e-3, "{top}");
-    // If the header contains units, these are used.
+    // The units in the header are used.
     std::fs::write(&path, header.replace("q1,", "q1_deg,") + &rows(45.0, 0.01)).unwrap();
     let output = jtc(&["traj", "info", file, "--deg"]).ends(2);
     assert!(output.err.contains("the file states its units"), "{}", output.err);
@@ -53,8 +53,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     jtc(&["traj", "check", file, "--speed", &percent.to_string()]).ends(0);
     jtc(&["traj", "check", file, "--speed", &(percent + 5.0).to_string()]).ends(4);
 
-    // The waypoints are too far apart for the given times. The error must report this, and not a gap between two pieces
-    // of the path.
+    // The waypoints are too far apart for their times. The error must report this cause, and not a gap between two parts of the path.
     let waypoints = "0,0,0,0,0,0,0\n1,0.1,0,0,0,0,0\n2,0.2,0,0,0,0,0\n3,0.3,0,0,0,0,0\n3.4,1.5,0,0,0,0,0\n4.4,1.6,0,0,0,0,0\n\
                      5.4,1.7,0,0,0,0,0\n6.4,1.8,0,0,0,0,0\n";
     std::fs::write(&path, header.to_owned() + waypoints).unwrap();

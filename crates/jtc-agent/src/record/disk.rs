@@ -1,4 +1,4 @@
-//! Writer of recordings, in a separate thread, so that a slow or full disk delays nothing else.
+//! Writer of recordings, in a separate thread, so that a slow or full disk does not delay other threads.
 #[cfg(test)]
 mod tests;
 
@@ -16,18 +16,18 @@ use serde_json::{Value, json};
 
 use super::retention::{Begun, Retention};
 
-/// Largest number of samples that wait for the disk: minutes of statuses.
+/// Largest number of samples that wait for the disk. This is enough for minutes of statuses.
 const WAITING_MAX: usize = 1 << 13;
-/// Number of queue places that are reserved for the start and end of recordings.
+/// Number of queue entries that are reserved for the start and end of recordings.
 const RESERVED: usize = 64;
-/// Time after which a failed write is tried again.
+/// Time after which a failed write is repeated.
 const AGAIN: Duration = Duration::from_secs(5);
 
 /// Message to the writer's thread.
 enum Message {
     Begin(Box<RecordingInfo>),
     Sample(Box<Sample>),
-    /// End of the recording, and the number of samples that did not get into the queue.
+    /// End of the recording, and the number of samples that did not fit into the queue.
     End(Ending, u64),
 }
 
@@ -36,9 +36,9 @@ enum Message {
 pub struct Notice {
     /// Keyword for logs.
     pub what: &'static str,
-    /// Facts of the notice.
+    /// Details of the notice in JSON.
     pub facts: Value,
-    /// Warning for people; `None` without a problem.
+    /// Warning for the user; `None` if there is no problem.
     pub warning: Option<String>,
 }
 
@@ -82,7 +82,7 @@ impl Disk {
         sent
     }
 
-    /// Begins a recording. Like the other methods, this never waits.
+    /// Begins a recording. Opens a recording. Like the other methods, this method never waits.
     pub(super) fn open(&mut self, info: RecordingInfo) {
         self.lost = 0;
         self.send(Message::Begin(Box::new(info)), 0);
@@ -95,7 +95,7 @@ impl Disk {
         }
     }
 
-    /// Adds a number of samples that were lost before they reached this queue.
+    /// Adds samples that were lost before they reached this queue to the count of lost samples.
     pub(super) fn lose(&mut self, samples: u64) {
         self.lost += samples;
     }
@@ -143,7 +143,7 @@ impl Writer {
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
-                    // The queue closed without an end of the recording.
+                    // The queue was closed before the recording ended.
                     self.end(&Ending::default());
                     return;
                 }
@@ -189,7 +189,7 @@ impl Writer {
         (self.notify)(Notice { what, facts, warning });
     }
 
-    /// Removes old recordings that exceed the limit.
+    /// Removes old recordings until `bytes` more bytes fit within the limit.
     fn make_room(&mut self, bytes: u64) {
         for path in self.retention.make_room(bytes) {
             self.notice("recording-removed", json!({ "file": path }), None);
@@ -237,17 +237,17 @@ impl Writer {
         }
     }
 
-    /// Ends the file without completing it.
+    /// Closes the file without completing it.
     fn break_off(&mut self) -> Option<PathBuf> {
         let Open { recorder, begun } = self.open.take()?;
         let (path, samples) = (begun.path.clone(), recorder.samples());
-        // The drop tries to complete the file. A failure has no consequence.
+        // Dropping the recorder tries to complete the file. A failure of this attempt is ignored.
         drop(recorder);
         self.retention.break_off(begun, samples);
         Some(path)
     }
 
-    /// Passes all data to the operating system. If the file is too long, begins another one.
+    /// Passes all data to the operating system. Begins a new file if the present file is too long.
     fn flush(&mut self) {
         let Some(open) = &mut self.open else { return };
         if let Err(error) = open.recorder.flush() {

@@ -1,4 +1,4 @@
-//! Finds the start and end of recordings from the statuses alone, for motions of any client.
+//! Finds the start and end of recordings from the statuses only, so that motions of all clients are recorded.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -6,17 +6,17 @@ use jtc_host::labels;
 use jtc_host::recording::Ending;
 use jtc_wire::{ControllerState, Status, TrajectoryState};
 
-/// Time before a motion that is recorded with it.
+/// Time before a motion that is included in the recording.
 const BEFORE: Duration = Duration::from_millis(500);
-/// Largest number of statuses in this time.
+/// Largest number of statuses that are included from before a motion.
 const BEFORE_MAX: usize = 256;
 /// Time at rest after a motion before its recording ends.
 const REST: Duration = Duration::from_millis(500);
-/// Time after the end of a motion before its recording ends even if the arm is not quite at rest.
+/// Longest time from the end of a motion to the end of its recording, even if the arm is not yet completely at rest.
 const OVER: Duration = Duration::from_secs(5);
-/// Time after which recording stops while the arm is at rest: in a pause, or in Teaching when no person leads it.
+/// Time at rest after which recording stops in a pause, or in Teaching if no person guides the arm.
 const STANDS: Duration = Duration::from_secs(10);
-/// Time for which a Jog acts (J-58), plus its time on the line.
+/// Time for which a Jog is effective (J-58), plus its transmission time on the serial line.
 const JOG: Duration = Duration::from_millis(400);
 /// Time without a status after which the recording of a motion ends, because the connection is considered lost.
 pub(super) const SILENT: Duration = Duration::from_secs(2);
@@ -28,12 +28,12 @@ pub(super) enum Motion {
     Execution,
     /// Jog: joints with commanded velocities.
     Jog,
-    /// Teaching: the arm is led by hand.
+    /// Teaching: a person guides the arm by hand.
     Teaching,
 }
 
 impl Motion {
-    /// Returns the name in recordings.
+    /// Returns the name of the motion in recordings.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Execution => "execution",
@@ -46,7 +46,7 @@ impl Motion {
 /// Step of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Step {
-    /// Begins a recording, with a status that arrived at this time.
+    /// Begins a recording whose first status arrived at this time.
     Begin(Motion, Duration),
     /// Adds a status.
     Status(Duration, Box<Status>),
@@ -57,7 +57,7 @@ pub(super) enum Step {
 /// Recording in progress.
 struct Open {
     motion: Motion,
-    /// Time since which the arm has been at rest in a pause, or in Teaching when no person leads it.
+    /// Time since which the arm has been at rest in a pause, or in Teaching while no person guides the arm.
     stands: Option<Duration>,
     /// Time of the end of the motion. The next field is the time since which the arm has been at rest.
     over: Option<Duration>,
@@ -65,7 +65,7 @@ struct Open {
     last: Status,
 }
 
-/// Finds recordings in a stream of statuses.
+/// State machine that finds the start and end of recordings in a stream of statuses.
 #[derive(Default)]
 pub(super) struct Follower {
     before: VecDeque<(Duration, Status)>,
@@ -85,11 +85,11 @@ impl Follower {
         self.open.is_some()
     }
 
-    /// Takes the next status, which arrived at `now`.
+    /// Processes the next status, which arrived at `now`.
     pub(super) fn status(&mut self, now: Duration, status: &Status) -> Vec<Step> {
         let mut steps = self.silence(now);
         let motion = self.motion(now, status);
-        // Another motion gets a separate recording, even directly after the last one.
+        // Each motion gets a separate recording, even if it begins directly after the previous motion.
         let another = motion.is_some_and(|motion| {
             self.open.as_ref().is_some_and(|open| open.motion != motion)
                 || motion == Motion::Execution && self.begins_anew(status)
@@ -123,7 +123,7 @@ impl Follower {
         steps
     }
 
-    /// Notes that no status has arrived until `now`.
+    /// Handles the absence of statuses until `now`.
     pub(super) fn silence(&mut self, now: Duration) -> Vec<Step> {
         let silent = self.last.is_some_and(|(at, ..)| now.saturating_sub(at) > SILENT);
         if !silent {
@@ -132,7 +132,7 @@ impl Follower {
         self.end("fault", &format!("no status received for {} s", SILENT.as_secs()))
     }
 
-    /// Ends the recording with the given reason, because no more statuses will be taken.
+    /// Ends the recording with the given reason, because no more statuses will be processed.
     pub(super) fn end(&mut self, outcome: &str, reason: &str) -> Vec<Step> {
         self.last = None;
         self.before.clear();
@@ -143,7 +143,7 @@ impl Follower {
     /// Returns the kind of motion, if the arm moves.
     fn motion(&mut self, now: Duration, status: &Status) -> Option<Motion> {
         if status.state != ControllerState::HoldPos {
-            // A Jog acts only in HoldPos.
+            // A Jog is effective only in HoldPos.
             self.jogged = None;
         }
         if status.is_executing() {
@@ -158,7 +158,7 @@ impl Follower {
         }
     }
 
-    /// Returns `true` if this status belongs to another execution than the last status.
+    /// Returns `true` if this status belongs to a different execution than the last status.
     fn begins_anew(&self, status: &Status) -> bool {
         self.last.is_none_or(|(_, trajectory, point)| {
             !matches!(trajectory, TrajectoryState::Execute | TrajectoryState::Pause) || status.point < point
@@ -191,7 +191,7 @@ impl Open {
     }
 }
 
-/// Returns the ending of a motion with this last status.
+/// Returns how a motion with this last status ended.
 fn ending(motion: Motion, status: &Status) -> Ending {
     let fault = status.state == ControllerState::Error || status.errors != 0;
     let (outcome, reason) = match (motion, status.trajectory.known()) {
@@ -208,7 +208,7 @@ fn ending(motion: Motion, status: &Status) -> Ending {
 mod tests {
     use super::*;
 
-    /// Arm that reports every 40 ms.
+    /// Arm that sends a status every 40 ms.
     struct Arm {
         follower: Follower,
         now: Duration,
@@ -300,7 +300,7 @@ mod tests {
             arm.is(HoldPos, end, 0.0);
             arm.run_ms(200);
         }
-        // In the first case the next motion begins after a short rest, in the second case between two statuses.
+        // In the first case the next motion begins after a short rest. In the second case it begins between two statuses.
         arm.is(Operate, Execute, 0.3);
         arm.run_ms(400);
         arm.status.point = 0;
@@ -355,7 +355,7 @@ mod tests {
         arm.is(HoldPos, Stop, 0.0);
         arm.run_ms(2_000);
         assert_eq!(arm.take(), ["begin teaching", "finished"]);
-        // Two motions directly after each other.
+        // The second motion begins directly after the first motion.
         arm.follower.jog(arm.now);
         arm.run_ms(120);
         arm.is(Teaching, Stop, 0.3);

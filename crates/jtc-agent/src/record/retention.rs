@@ -1,28 +1,29 @@
 //! Recording directory: file names, size limit, and deletion of the oldest recordings.
 //!
-//! A file in the directory lists the recordings that agents have made in it, so that no other file is ever removed. The
-//! list is locked, so two agents cannot share a directory.
+//! A list file in the directory names the recordings that agents have made there, so that no other file is ever removed. The list file is
+//! locked, so two agents cannot use the same directory.
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Name of the list.
+/// Name of the list file.
 pub(super) const LIST: &str = ".jtc-recordings";
-/// Ending of a complete recording.
+/// File name extension of a complete recording.
 const WHOLE: &str = ".mcap";
-/// Ending of a recording that is incomplete or in progress. Every command can read such a file.
+/// File name extension of a recording that is incomplete or in progress. Every command can read an incomplete recording.
 const PART: &str = ".part.mcap";
-/// Number of list lines for removed files after which the list is rewritten.
+/// Number of lines about removed files at which the list file is rewritten.
 const GONE_MAX: usize = 10_000;
 
 /// Recording that an agent has made in this directory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Own {
-    /// Name without its ending.
+    /// File name without extension.
     name: String,
-    /// Length in bytes; 0 if it is not known. A file of another length was changed from outside and is never removed.
+    /// Length of the file in bytes; 0 if the length is unknown. A file with a different length was changed by another program and is never
+    /// removed.
     bytes: u64,
     /// `true` if the recording is incomplete or in progress.
     part: bool,
@@ -51,13 +52,13 @@ pub(super) struct Retention {
 
 /// Recording in progress.
 pub(super) struct Begun {
-    /// Path of its file.
+    /// Path of the recording file.
     pub path: PathBuf,
     name: String,
 }
 
 impl Retention {
-    /// Opens or creates a directory. `limit`: largest size of all recordings together, bytes.
+    /// Opens or creates a directory. `limit` is the largest total size of all recordings, bytes.
     ///
     /// # Errors
     ///
@@ -85,7 +86,7 @@ impl Retention {
         Ok(retention)
     }
 
-    /// Takes a line of the list. Ignores invalid lines.
+    /// Processes a line of the list file. Ignores invalid lines.
     fn take_line(&mut self, line: &str) {
         let mut words = line.split(' ');
         let (Some(what), Some(name), bytes) = (words.next(), words.next(), words.next()) else { return };
@@ -101,8 +102,8 @@ impl Retention {
         }
     }
 
-    /// Checks the listed files, and drops from the list those that were removed or changed from outside. The length of
-    /// a recording whose agent was killed is not known.
+    /// Checks the listed files, and removes from the list the files that another program has removed or changed. The length of a recording
+    /// is unknown if its agent was killed.
     fn look(&mut self) {
         let dir = self.dir.clone();
         self.own.retain_mut(|own| match length(&own.path(&dir)) {
@@ -119,7 +120,7 @@ impl Retention {
         let mut text = String::new();
         let line =
             |own: &Own| format!("{} {} {}\n", if own.part { "part" } else { "end" }, own.name, own.bytes);
-        // The number continues after removed recordings.
+        // The numbers of removed recordings are not used again.
         if self.number > 0 {
             text += &format!("gone {}\n", name(Duration::ZERO, self.number));
         }
@@ -135,13 +136,13 @@ impl Retention {
         let end = self.list.seek(SeekFrom::End(0))?;
         let written = self.list.write_all(format!("{line}\n").as_bytes());
         if written.is_err() {
-            // Even if this fails, the list is still valid.
+            // Even if this truncation fails, the list is still valid.
             let _ = self.list.set_len(end);
         }
         written
     }
 
-    /// Creates a file with the next number, at this time since 1970. Its name is added to the list first.
+    /// Creates a recording file with the next number. `now` is the time since 1970. The file name is added to the list first.
     ///
     /// # Errors
     ///
@@ -153,7 +154,7 @@ impl Retention {
                 (self.dir.join(format!("{name}{WHOLE}")), self.dir.join(format!("{name}{PART}")));
             self.number += 1;
             if whole.symlink_metadata().is_ok() || path.symlink_metadata().is_ok() {
-                // A file of this name exists that is not a recording of an agent.
+                // A file with this name exists, but it is not a recording of an agent.
                 continue;
             }
             self.note(&format!("begin {name}"))?;
@@ -166,7 +167,7 @@ impl Retention {
     ///
     /// # Errors
     ///
-    /// The recording keeps its name of an incomplete recording.
+    /// The recording could not be renamed and keeps the name of an incomplete recording.
     pub(super) fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
         let bytes = length(&begun.path).unwrap_or(0);
         let mut own = Own { name: begun.name, bytes, part: true };
@@ -178,12 +179,12 @@ impl Retention {
         renamed.and(noted).map(|()| whole)
     }
 
-    /// Ends a recording without completing it. The file is kept if it contains samples.
+    /// Ends a recording without completing it. The file is deleted only if it contains no samples.
     pub(super) fn break_off(&mut self, begun: Begun, samples: u64) {
         if samples == 0 && std::fs::remove_file(&begun.path).is_ok() {
             let _ = self.note(&format!("gone {}", begun.name));
             self.gone += 1;
-            // The next recording may use its number.
+            // The next recording may use the number of the deleted file.
             self.number -= u64::from(number_of(&begun.name) == Some(self.number));
             return;
         }
@@ -207,13 +208,14 @@ impl Retention {
             let _ = self.note(&format!("gone {}", oldest.name));
         }
         if self.gone > GONE_MAX {
-            // The old list is still valid if this fails.
+            // If the rewrite fails, the old list is still valid.
             let _ = self.rewrite();
         }
         removed
     }
 
-    /// Returns the size in bytes after which a recording continues in another file. So old parts can be removed.
+    /// Returns the file size in bytes after which a recording continues in a new file. The old parts of a long recording can then be
+    /// removed.
     pub(super) fn longest(&self) -> u64 {
         self.limit / 4
     }
@@ -233,13 +235,13 @@ fn make(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// Returns the length of the file itself. For a link this is not the length of its target.
+/// Returns the length of the file at this path. For a symbolic link, the result is the length of the link, not of its target.
 fn length(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().filter(std::fs::Metadata::is_file).map(|found| found.len())
 }
 
-/// Returns a name that consists of time (UTC) and number, such as `20261123T154412Z-000017`. The numbers are always in
-/// the order of time. The names are in this order unless the clock was set back.
+/// Returns a name that consists of time (UTC) and number, such as `20261123T154412Z-000017`. The numbers always increase with time. The
+/// names also increase with time, unless the clock was set back.
 fn name(now: Duration, number: u64) -> String {
     let since = now.as_secs();
     let (year, month, day) = date((since / 86_400) as i64);
@@ -274,8 +276,7 @@ mod tests {
     /// 2026-11-23 15:44:12 UTC.
     const NOW: Duration = Duration::from_secs(1_795_448_652);
 
-    /// Makes a recording of this number of bytes. If `whole` is false, the agent is killed before the recording is
-    /// complete.
+    /// Creates a recording of `bytes` bytes. If `whole` is false, the agent is killed before the recording is complete.
     fn make(retention: &mut Retention, bytes: usize, whole: bool) -> PathBuf {
         make_at(retention, NOW, bytes, whole)
     }
@@ -306,7 +307,7 @@ mod tests {
         let mut retention = Retention::open(dir.path(), 1000).unwrap();
         let files: Vec<PathBuf> = (0..4).map(|_| make(&mut retention, 200, true)).collect();
         assert!(retention.make_room(200).is_empty());
-        // The first file was replaced from outside by another file, and the second by a link.
+        // Another program has replaced the first file by another file, and the second file by a link.
         std::fs::write(&files[0], [0; 10]).unwrap();
         std::fs::remove_file(&files[1]).unwrap();
         #[cfg(unix)]
@@ -315,13 +316,12 @@ mod tests {
         assert!(files[0].exists() && others.exists() && files[3].exists());
         #[cfg(unix)]
         assert!(files[1].symlink_metadata().is_ok());
-        // If the requested space exceeds the limit, all recordings made here are removed.
+        // If the requested space exceeds the limit, all recordings of agents are removed.
         assert_eq!(retention.make_room(5000), [files[3].clone()]);
         assert!(retention.make_room(5000).is_empty() && others.exists());
     }
 
-    /// Even if the computer's clock is changed, during an agent or between two agents, the oldest recording is removed
-    /// first and no number is used twice.
+    /// The oldest recording is removed first and no number is used twice, even if the clock of the computer is changed.
     #[test]
     fn the_oldest_are_those_that_were_made_first_whatever_the_clock_shows() {
         let dir = tempfile::tempdir().unwrap();

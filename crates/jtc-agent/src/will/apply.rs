@@ -1,4 +1,4 @@
-//! Last will of a killed agent, applied by the next one at its start.
+//! Last will of a killed agent, which the next agent applies when it starts.
 use std::time::{Duration, Instant};
 
 use jtc_host::Session;
@@ -11,14 +11,15 @@ use crate::line::{Applied, Introduction, Policy, Role, SharedLine};
 use crate::owner::Line;
 use crate::record::Notice;
 
-/// Time within which a connected controller reports.
+/// Time within which a connected controller sends a status.
 const REPORTS: Duration = Duration::from_secs(1);
-/// Longest wait for the confirmation of a Stop. The line repeats the Stop even after this time.
+/// Longest wait for the confirmation of a Stop. After this time, the line still repeats the Stop.
 const TAKES: Duration = Duration::from_secs(1);
 /// Interval of checks.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Applies the policy in the file to the controller's motion. Returns a notice about the file and the result; `None` without a file.
+/// Applies the policy in the file to the motion that the controller executes. Returns a notice about the file and the result; `None` if no
+/// file exists.
 pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     let (client, policy) = match found {
         Found::Nothing => {
@@ -40,9 +41,9 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
 }
 
-/// Reads the controller's `host_timeout_ms` for the line. A motion of a killed program may still run. With the timeout,
-/// the line can refuse questions of other clients that the controller would take for a sign of life of that program
-/// (J-59). Has no effect if the controller has no such setting or does not answer.
+/// Reads `host_timeout_ms` from the controller, so that the line knows the value. A motion that a killed program has started may still be
+/// in progress. The line uses this timeout to refuse requests of other clients, because the controller would treat such requests as signs
+/// of life of the killed program (J-59). Has no effect if the controller has no such setting or does not answer.
 pub fn read_host_timeout(line: &Line) {
     let introduction = Introduction { name: "agent".into(), role: Role::Viewer, policy: Policy::Continue };
     // The result is not used, because the line itself reads the value from the answer.
@@ -63,8 +64,8 @@ fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> boo
     }
 }
 
-/// Returns the result in words. `reports`: statuses of the controller arrive. `taken`: the controller has confirmed the
-/// command.
+/// Describes the result as a text. `reports` is true if statuses of the controller arrive. `taken` is true if the controller has confirmed
+/// the command.
 fn in_words(applied: Applied, reports: bool, taken: bool) -> String {
     let sent = match applied {
         Applied::Rests => return "the arm no longer moves".into(),

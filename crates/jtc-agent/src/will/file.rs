@@ -1,5 +1,4 @@
-//! File of a last will: each port has one. The file is readable only by its owner, and written completely or not at
-//! all.
+//! File of a last will. Each port has a separate file. Only the owner can read the file. The agent writes it completely or not at all.
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -10,7 +9,7 @@ use crate::line::{Moves, Policy, Will};
 
 /// Version of the file format.
 const VERSION: u32 = 1;
-/// Limit of the file length, larger than any valid file, bytes.
+/// Upper limit of the file length, bytes. Valid files are always shorter.
 const LEN_MAX: u64 = 16 << 10;
 /// Longest displayed name, characters.
 const NAME_MAX: usize = 100;
@@ -22,11 +21,11 @@ pub struct Stored {
     version: u32,
     /// Name of the port.
     port: String,
-    /// Name of the client for people.
+    /// Name of the client that users see.
     pub client: String,
     /// Policy of the client.
     pub policy: Policy,
-    /// Cause of the motion.
+    /// Kind of motion that is in progress.
     pub what: Moves,
     /// Start of the motion, s since 1970.
     pub since_unix_s: f64,
@@ -35,16 +34,16 @@ pub struct Stored {
 /// State of the file when an agent starts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
-    /// No file: the previous agent has ended properly, or no motion was in progress.
+    /// No file exists, because the previous agent has ended properly or no motion was in progress.
     Nothing,
     /// Will of an agent that was killed during a motion.
     Left(Stored),
-    /// Invalid contents, with the reason: the policy is not known.
+    /// Invalid contents, with the reason. The policy is unknown.
     Doubtful(String),
 }
 
-/// Returns the path of a port's file in this folder. The name of the port is used as the user has given it. A name that
-/// identifies the adapter (by-id) always stays the same, but a device name may change.
+/// Returns the path of a port's file in this folder. The name of the port is used as the user has specified it. A name that identifies the
+/// adapter (by-id) never changes, but a device name may change.
 pub(super) fn path(folder: &Path, port: &str) -> PathBuf {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'.' || byte == b'-';
     let escaped = |byte: u8| if plain(byte) { char::from(byte).to_string() } else { format!("_{byte:02x}") };
@@ -91,7 +90,7 @@ fn is_open(_: &fs::Metadata) -> bool {
     false
 }
 
-/// Returns `true` if the file belongs to another user than its folder, or if other users can write to the folder.
+/// Returns `true` if the file and its folder have different owners, or if other users can write to the folder.
 #[cfg(unix)]
 fn is_others(folder: &Path, file: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -103,8 +102,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Writes the file in one step. From then on the file is valid even if the agent is killed. After the disk has stored
-/// the file, the file also survives a loss of power.
+/// Writes the file in one step. After this write, the file is valid even if the agent is killed. After the disk has stored the file, the
+/// file also survives a loss of power.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };
@@ -135,7 +134,7 @@ pub(super) fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Checks that files can be written there; creates a missing folder.
+/// Checks that files can be written to the folder; creates the folder if it is missing.
 pub(super) fn try_out(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         let mut builder = fs::DirBuilder::new();
@@ -153,7 +152,7 @@ fn part_of(path: &Path) -> PathBuf {
     path.with_extension("part")
 }
 
-/// Creates a file that only its owner can read, and replaces an incomplete one of a killed agent.
+/// Creates a file that only its owner can read, and replaces an incomplete file of a killed agent.
 fn begin(part: &Path) -> io::Result<File> {
     remove(part)?;
     let mut options = OpenOptions::new();
@@ -219,7 +218,7 @@ mod tests {
         doubtful("another port");
         write(&path, PORT, &will(Policy::Continue), 0.0).expect("there is room");
         let good = fs::read_to_string(&path).expect("text");
-        // A file that is cut off at any byte is reported as damaged, and is never read as another policy.
+        // A file that is truncated at any byte is reported as damaged. It is never read as another policy.
         for n in 0..good.len() {
             fs::write(&path, &good[..n]).expect("a file");
             doubtful("damaged");

@@ -1,4 +1,4 @@
-//! Keeper of the file of a last will. The keeper updates the file as soon as the disk accepts a write.
+//! Keeper that writes and removes the file of a last will. The keeper updates the file as soon as the disk accepts a write.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -10,7 +10,7 @@ use super::file::{self, Found};
 use crate::line::{LineEvent, Will};
 use crate::record::{Notice, Notify};
 
-/// Time after which a failed write is tried again.
+/// Time after which a failed write is repeated.
 const AGAIN: Duration = Duration::from_secs(5);
 /// Longest wait for the disk at the end.
 const LAST: Duration = Duration::from_secs(1);
@@ -20,7 +20,7 @@ type Wanted = Option<(Will, f64)>;
 
 struct Slot {
     wanted: Wanted,
-    /// `true` until the will of the previous agent was applied. Meanwhile its file must be kept.
+    /// `true` until the will of the previous agent is applied. Until then, the file of the previous agent must be kept.
     held: bool,
     ended: bool,
     /// `true` after the thread has ended.
@@ -38,11 +38,11 @@ impl Shared {
     }
 }
 
-/// Passes events of the line to the keeper. Never waits.
+/// Receiver that passes events of the serial line to the keeper. Never waits.
 pub struct Witness(Arc<Shared>);
 
 impl Witness {
-    /// Takes an event of the line.
+    /// Processes an event of the serial line.
     pub fn see(&self, event: &LineEvent) {
         let LineEvent::Will(will) = event else { return };
         let mut slot = self.0.lock();
@@ -53,12 +53,12 @@ impl Witness {
     }
 }
 
-/// Keeper of a port's file. If the arm moves when the keeper is dropped, the file stays.
+/// Keeper of a port's file. If the arm moves when the keeper is dropped, the file is not removed.
 pub struct Keeper(Arc<Shared>);
 
 impl Keeper {
-    /// Begins to keep the file of `port` in `folder`. Also returns the present contents, which stay until
-    /// [`settle`](Self::settle).
+    /// Starts the keeper of the file of `port` in `folder`. Also returns the present contents, which stay unchanged until
+    /// [`settle`](Self::settle) is called.
     ///
     /// # Errors
     ///
@@ -80,13 +80,13 @@ impl Keeper {
         Ok((Self(shared), found))
     }
 
-    /// Returns the witness for the observer of the line.
+    /// Returns the witness that the owner of the line calls for each event.
     pub fn witness(&self) -> Witness {
         Witness(self.0.clone())
     }
 
-    /// Notes that the will of the previous agent was applied. From now on the file follows the line, whose present will
-    /// is `will`. `since`: start of a motion that still continues.
+    /// Reports to the keeper that the will of the previous agent was applied. After this call, the keeper updates the file with each will
+    /// that the line reports. The present will is `will`. `since` is the start of a motion that still continues.
     pub fn settle(&self, will: Option<Will>, since: Option<f64>) {
         let mut slot = self.0.lock();
         slot.held = false;
@@ -100,7 +100,7 @@ impl Keeper {
         self.0.changed.notify_all();
     }
 
-    /// Notes that the arm was brought to rest at the end.
+    /// Reports to the keeper that the arm was stopped when the agent ended.
     pub fn forget(&self) {
         self.0.lock().wanted = None;
         self.0.changed.notify_all();
@@ -133,7 +133,7 @@ struct Writer {
     shared: Arc<Shared>,
     path: PathBuf,
     port: String,
-    /// Present contents of the file; `None`: not known.
+    /// Present contents of the file; `None` if they are unknown.
     there: Option<Wanted>,
     fails: bool,
     notify: Notify,
@@ -150,7 +150,7 @@ impl Writer {
                 None => file::remove(&self.path),
             };
             if done.is_err() {
-                // The contents of the file are outdated. If the file is not valid, the next agent stops the arm.
+                // The contents of the file are outdated. If the next agent finds an invalid file, it stops the arm.
                 file::spoil(&self.path);
             }
             self.there = done.is_ok().then_some(wanted);
@@ -160,14 +160,14 @@ impl Writer {
         self.shared.changed.notify_all();
     }
 
-    /// Waits until the contents must change, and returns the new contents. `None`: the keeper ends.
+    /// Waits until the contents must change, and returns the new contents. Returns `None` when the keeper ends.
     fn next(&self) -> Option<Wanted> {
         let mut slot = self.shared.lock();
         let mut tried = self.fails.then(|| slot.wanted.clone());
         let end = Instant::now() + AGAIN;
         loop {
             let is_there = self.there.as_ref() == Some(&slot.wanted);
-            // A failed write is tried again after a while, and at once if the contents have changed.
+            // A failed write is repeated after an interval, or at once if the contents have changed.
             if !slot.held && !is_there && tried.as_ref() != Some(&slot.wanted) {
                 return Some(slot.wanted.clone());
             }
@@ -256,7 +256,7 @@ mod tests {
         drop(keeper);
         let (keeper, found, _notices) = begin(dir.path());
         let Found::Left(stored) = &found else { panic!("{found:?}") };
-        // However the agent ends, the file and its time stay unchanged until the will was applied.
+        // The file and its time stay unchanged until the will is applied, even if the agent ends before that.
         drop(keeper);
         assert_eq!(begin(dir.path()).1, found);
         let (keeper, _, _notices) = begin(dir.path());
@@ -306,7 +306,7 @@ mod tests {
         keeper.settle(None, None);
         keeper.witness().see(&moves(Policy::Continue));
         until(dir.path(), "continue", left(Policy::Continue));
-        // From now on no file can be created there. This simulates a full disk.
+        // No file can be created at this path after this call. The directory simulates a full disk.
         let part = file::path(dir.path(), PORT).with_extension("part");
         std::fs::create_dir(&part).expect("a folder");
         keeper.witness().see(&moves(Policy::Stop));

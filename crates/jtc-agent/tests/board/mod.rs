@@ -1,5 +1,5 @@
-//! Simulates the controller's end of a serial line, bit by bit in virtual time. The only code that it shares with the tested code is the
-//! parser of `jtc-wire`.
+//! Simulates the controller at a serial line, bit by bit in virtual time. The simulation and the tested code share only the parser of
+//! `jtc-wire`.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use jtc_wire::{DataStatus, FRAME_MAX, FrameType, LinkEvent, Receiver, Response, 
 
 /// Step of the virtual time, µs; a byte at 115,200 Bd takes 86.8 µs.
 const STEP_US: u64 = 20;
-/// Longest interval between two turns of the line's owner, µs.
+/// Longest interval between two calls of the owner of the line, µs.
 const TURN_US: u64 = 2000;
 /// Interval between two statuses, µs.
 const REPORT_US: u64 = 15_500;
@@ -19,19 +19,18 @@ pub(crate) struct Board {
     pub line: SharedLine,
     baud: f64,
     now_us: u64,
-    /// Bytes that the operating system has accepted. The next field is the time at which the line has sent the first of
-    /// them.
+    /// Bytes that the operating system has accepted. The next field is the time at which the first of these bytes has been sent.
     queue: VecDeque<u8>,
     byte_over_us: f64,
-    /// Largest number of these bytes so far.
+    /// Largest number of queued bytes so far.
     pub queued_most: usize,
-    /// Delays before the operating system accepts bytes, in µs, one for each write. The next field has the bytes of the present write,
-    /// and the time at which they are accepted.
+    /// Delay before the operating system accepts the bytes of each write, µs. The next field contains the bytes of the present write and
+    /// the time at which the operating system accepts them.
     pub held_up_us: VecDeque<u64>,
     handed_over: Option<(u64, Vec<u8>)>,
     receiver: Receiver<Vec<u8>>,
     records: VecDeque<Response>,
-    /// Frames that arrived at the board: time, type (`None`: a bad frame), first bytes.
+    /// Frames that arrived at the board, with their time, type (`None` for an invalid frame) and first bytes.
     pub frames: Vec<(Duration, Option<FrameType>, Vec<u8>)>,
     /// Bytes of each write to the operating system, with the time.
     pub written: Vec<(Duration, Vec<u8>)>,
@@ -40,7 +39,7 @@ pub(crate) struct Board {
     pub damaged: usize,
     /// Time before which no status is sent.
     pub deaf_until: Duration,
-    /// Type of the frames that the board refuses.
+    /// Type of frame that the board refuses.
     pub refuses: Option<FrameType>,
 }
 

@@ -15,7 +15,7 @@ use serde_json::json;
 use crate::args::ArmCommand;
 pub(super) use show::poses as poses_table;
 
-/// Runs a command of the family.
+/// Runs a `jtc arm` command.
 pub(super) fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
     match command {
         ArmCommand::Import(args) => import::import(args, out),
@@ -56,8 +56,8 @@ fn check(file: &Path, out: &Output) -> Result<(), Failure> {
     if refused { Err(Failure::shown(ErrorKind::Refused)) } else { Ok(()) }
 }
 
-/// Formats a line for each finding. A next step that several findings have in common is printed once, after the last of
-/// them.
+/// Formats each finding as a line. If several findings suggest the same next step, the step is printed once, after the last of these
+/// findings.
 fn as_text(findings: &[ArmFinding]) -> String {
     let mut text = String::new();
     for (i, f) in findings.iter().enumerate() {

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::args::{BenchCommand, LinkArgs};
 
-/// Runs a command of the family.
+/// Runs a `jtc bench` command.
 pub(super) fn bench(command: &BenchCommand, out: &Output) -> Result<(), Failure> {
     match command {
         BenchCommand::Absent { joints, deg, link } => {

@@ -12,7 +12,7 @@ use super::named_arm;
 use super::run::{Course, perform};
 use crate::args::ContinueArgs;
 
-/// Finds the resume point, and runs the remainder from there.
+/// Finds the resume point, and runs the remainder of the trajectory from that point.
 pub(super) fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
     let recording = Recording::read(&args.run).map_err(Failure::nothing_sent)?;
     if let Some(cut) = &recording.cut {
@@ -42,11 +42,11 @@ pub(super) fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure
 
 /// Remainder of a run, and the runs after it.
 struct Left {
-    /// Interrupted trajectory and its resume point; `None` if only whole runs are left.
+    /// Interrupted trajectory and its resume point; `None` if only complete runs remain.
     current: Option<(Trajectory, ResumePoint)>,
     /// Trajectory of the following runs.
     then: Trajectory,
-    /// Number of these runs.
+    /// Number of the following runs.
     runs: u32,
 }
 
@@ -72,7 +72,7 @@ impl Left {
         }
     }
 
-    /// Sets the remainder, and the runs after it, as the motion of a job.
+    /// Sets the remainder and the following runs as the motion of a job.
     fn make(&self, job: &mut Job, status: &Status, out: &Output) -> Result<(), Failure> {
         let rest = match &self.current {
             None => None,
@@ -124,7 +124,7 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
     })
 }
 
-/// Returns the path time of the resume point, ms. Prints the reason for it on stderr.
+/// Returns the path time of the resume point, ms. Prints the reason for the chosen time on stderr.
 fn place(
     job: &Job,
     whole: &Trajectory,

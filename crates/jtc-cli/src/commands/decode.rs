@@ -1,4 +1,4 @@
-//! `jtc decode`: frames of both directions from hex, a capture, or raw bytes.
+//! `jtc decode`: decodes frames of both directions from hex text, a capture, or raw bytes.
 
 use std::io::Read;
 
@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 
 use super::status;
 
-/// Longest run of noise that is shown byte by byte.
+/// Largest number of consecutive invalid bytes that are shown one by one.
 const SHOWN: usize = 32;
 
-/// Decodes stdin to its end. Exit code 2 if it contains no frame.
+/// Decodes stdin to its end. Ends with exit code 2 if the input contains no frame.
 pub(super) fn decode(out: &Output) -> Result<(), Failure> {
     let mut input = Vec::new();
     std::io::stdin().lock().read_to_end(&mut input)?;

@@ -1,4 +1,4 @@
-//! `jtc demo`: a complete run from parameters to report, on a simulator in this process.
+//! `jtc demo`: a complete demonstration from parameters to report, on a simulator in this process.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -21,11 +21,11 @@ use crate::failure::output_lost;
 use crate::progress::Progress;
 use crate::tape::Tape;
 
-/// Random seed of the demo. The seed is constant, so that every demo gives the same figures.
+/// Random seed of the demo. The seed is constant, so that every demo has the same numbers.
 const SEED: u64 = 1;
 /// Recorded time before and after the motion.
 const MARGIN: Duration = Duration::from_millis(400);
-/// Longest wait for the drives; their first enable takes 4 s.
+/// Longest wait until the drives are enabled; the first enable takes 4 s.
 const BRING_UP: Duration = Duration::from_secs(30);
 
 /// Files of the demo, in the order of the output.
@@ -42,7 +42,7 @@ struct Run {
     frictions: String,
 }
 
-/// Runs the demo and writes its files.
+/// Runs the demo and writes its output files.
 pub(super) fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::usage(format!("{}: {e}", args.out.display())))?;

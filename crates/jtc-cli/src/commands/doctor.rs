@@ -1,4 +1,4 @@
-//! `jtc doctor`: finds faults of link, bus and set-up, and suggests the next command.
+//! `jtc doctor`: finds faults of the link, the bus and the set-up, and suggests the next command.
 
 use std::time::Duration;
 
@@ -12,12 +12,12 @@ use serde_json::json;
 use super::status;
 use crate::args::LinkArgs;
 
-/// Listening time at the requested rate: 50 statuses.
+/// Listening time at the requested rate, in which 50 statuses arrive.
 const LISTEN: Duration = Duration::from_secs(2);
 /// Listening time at each other rate.
 const TRY: Duration = Duration::from_millis(300);
 
-/// Checks link, bus and set-up. The exit code is 0 without a problem, 3 without a link, and else 1.
+/// Checks the link, the bus and the set-up. The exit code is 0 if no problem was found, 3 if there is no link, and 1 for other problems.
 pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));
@@ -30,7 +30,7 @@ pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         Some(status) => jtc_host::labels::absent(status),
         None => Vec::new(),
     };
-    // A held stop and an encoder jump occur only under torque.
+    // A held stop and an encoder jump can occur only while the drives produce torque.
     if seen.status.as_ref().is_some_and(jtc_host::labels::has_torque) {
         seen.reactions = session.reactions();
     }

@@ -1,4 +1,4 @@
-//! `jtc dynamics`: the dynamics code of the controller, as a filter from numbers to numbers.
+//! `jtc dynamics`: runs the dynamics code of the controller on numbers from stdin and prints the results.
 
 use std::io::{BufRead, Write};
 
@@ -9,7 +9,7 @@ use serde_json::json;
 use super::named_arm;
 use crate::args::{DynamicsArgs, DynamicsKind};
 
-/// Reads lines of numbers until the end of stdin.
+/// Evaluates each line of numbers until the end of stdin.
 pub(super) fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
     let arm = named_arm::load(args.arm.as_deref())?;
     named_arm::note_warnings(&arm, out);
@@ -32,7 +32,7 @@ pub(super) fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure>
         let written = if out.is_json() {
             writeln!(stdout, "{}", json!({ key(args.what): result }))
         } else {
-            // 17 significant digits, one before the point and sixteen after it, reproduce exactly the same f64.
+            // A number with 17 significant digits (one before the decimal point, 16 after it) reproduces exactly the same f64.
             let words: Vec<String> = result.iter().map(|v| format!("{v:.16e}")).collect();
             writeln!(stdout, "{}", words.join(" "))
         };
@@ -66,7 +66,7 @@ fn numbers(line: &str, what: DynamicsKind) -> Result<Vec<f64>, String> {
                 .ok_or_else(|| format!("\"{w}\" is not a finite number"))
         })
         .collect::<Result<Vec<f64>, String>>()?;
-    // A mass matrix needs only positions, but lines in the format of the other kinds are accepted as well.
+    // A mass matrix needs only positions, but lines in the format of the other calculations are also accepted.
     if values.len() == need || (what == DynamicsKind::Mass && values.len() == 3 * JOINTS) {
         Ok(values)
     } else {

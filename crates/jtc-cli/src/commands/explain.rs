@@ -1,4 +1,4 @@
-//! `jtc explain`: one page about a code, or about fault files.
+//! `jtc explain`: prints one page about a code or about fault files.
 
 use cli_kit::{Failure, Output, table};
 use jtc_host::explain::{Page, find, pages};

@@ -76,7 +76,7 @@ fn drive_json(drive: &Drive) -> Value {
     })
 }
 
-/// Returns the image that the user has given, or else the installed image for `board`.
+/// Returns the image that the user has specified. Without it, returns the installed image for `board`.
 fn image(
     args: &ImageArgs,
     board: impl FnOnce(&Catalogue) -> Result<String, Failure>,
@@ -122,9 +122,9 @@ fn the_drive(places: &Places, named: Option<&PathBuf>) -> Result<Drive, Failure>
     }
 }
 
-/// Returns the port that is asked in addition to the ports of the drive's own USB device. This is the port that the
-/// user has given. Without it, the only port of the computer is used, if the board must report its firmware and the
-/// system does not tell which port belongs to the board.
+/// Returns the port that is checked in addition to the ports of the USB device of the drive. The result is the port that the user has
+/// specified. Otherwise, the result is the only port of the computer. This applies if the board must report its firmware and the system
+/// does not show which port belongs to the board.
 fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<String>, Failure> {
     match &link.port {
         Some(url) if url.contains("://") => {
@@ -144,8 +144,8 @@ fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<Str
     }
 }
 
-/// Returns the only port of the computer. A port that another program has open is included, because the board may be
-/// connected to it.
+/// Returns the only port of the computer. Ports that other programs have opened are included, because the board may be connected to such a
+/// port.
 fn only_port() -> Result<String, Failure> {
     let there = |port: &PortInfo| matches!(port.problem, None | Some(PortError::Busy { .. }));
     let mut paths: Vec<String> = ports()?.into_iter().filter(there).map(|port| port.path).collect();
@@ -208,7 +208,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     if let Some(question) = &question {
         confirm(question, "--yes")?;
     }
-    // The state is read again, because the user may have taken minutes to answer the question.
+    // The state is read again, because the user may have confirmed after several minutes.
     let now = lines.look()?;
     may_flash(&image, &drive, &now, permissions)?;
     if let Some(other) = now.to_confirm(&image).filter(|now| !args.yes && question.as_ref() != Some(now)) {
@@ -222,8 +222,8 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let bar = out.bytes_bar(image.bytes().len() as u64, "copying");
     let mut lines = Some(lines);
     let written = write_image(&drive, &image, &mut |bytes| {
-        // The ports are closed as soon as copying has begun, because the ST-LINK may remove its serial port from USB
-        // together with its drive. If the port were still open then, it would come back under another name.
+        // The ports are closed as soon as copying has begun, because the ST-LINK may remove its serial port from USB together with its
+        // drive. If the port were still open at that time, it would appear again under another name.
         drop(lines.take());
         bar.set_position(bytes as u64);
     });
@@ -239,7 +239,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         return Ok(());
     };
     out.note("copied; the ST-LINK writes the image to the flash, then the board starts");
-    // The port of the board may come back under another name.
+    // The port of the board may appear again under another name.
     let mut again = || {
         let own = places.ports_of(&drive).into_iter().next();
         open(own.as_ref().unwrap_or(&port), record.baud)
@@ -284,7 +284,7 @@ fn program_json(program: Program) -> Value {
     json!({ "bytes": program.bytes, "crc32": format!("{:08x}", program.crc32) })
 }
 
-/// Describes the effect of flashing on the arm that is stored in the board.
+/// Describes how flashing affects the arm that is stored in the board.
 fn stored_arm(before: Option<bool>, after: bool) -> &'static str {
     match (before, after) {
         (Some(true), false) => "lost",

@@ -1,5 +1,5 @@
-//! `jtc stop` and `jtc traj pause`. The command goes directly to the controller, through an agent, or through the
-//! program of this user that has the port.
+//! `jtc stop` and `jtc traj pause`. The command goes directly to the controller, through an agent, or through the program of this user that
+//! has opened the port.
 
 use std::cell::Cell;
 use std::panic::resume_unwind;
@@ -20,14 +20,13 @@ use crate::args::LinkArgs;
 use crate::link::{LinkPort, who};
 use crate::progress::Progress;
 
-/// Longest time for which a program does not listen after it has opened the port, or before it closes the port.
+/// Longest time for which a program does not accept Stops after it has opened the port, or before it closes the port.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
-/// Like [`CHANGES_HANDS`], for a port at which a program of this user has listened. Such a program may be waiting for
-/// the end of another Stop.
+/// Like [`CHANGES_HANDS`], for a port that a program of this user has used. The program may be waiting for the end of another Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
-/// Largest number of programs that may have the port in turn during one Stop.
+/// Largest number of programs that may open the port one after another during one Stop.
 const OWNERS: usize = 16;
-/// Time after which a Stop, or the end of teaching, is sent again if the statuses do not show it.
+/// Time after which a Stop or the end of teaching is sent again if the statuses do not show its effect.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Longest time until a stopped arm is at rest.
 const REST: Duration = Duration::from_secs(5);
@@ -40,7 +39,7 @@ pub(super) fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arms = arms(link);
     let not_asked = if link.port.is_some() { Vec::new() } else { not_asked(&arms) };
     out.stream()?;
-    // The Stops of all arms run in parallel, so that none waits for another.
+    // The Stops of all arms run in parallel, so that no Stop waits for another Stop.
     let ends: Vec<Result<Stopped, Failure>> = std::thread::scope(|scope| {
         let stops: Vec<_> =
             arms.iter().map(|arm| scope.spawn(|| stop_one(arm, &Progress::begin(out)?))).collect();
@@ -67,7 +66,7 @@ pub(super) fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         ends.iter().map(|end| end.as_ref().map_or_else(failed_json, Stopped::json)).collect();
     let accepted = ends.iter().flatten().any(|one| one.accepted);
     let mut value = json!({ "command": "stop", "accepted": accepted, "arms": arms, "not_asked": not_asked });
-    // An arm that still moves is the most urgent failure and comes first.
+    // An arm that still moves is the most urgent failure, so it is listed first.
     failed.sort_by_key(|failure| failure.code != STILL_MOVING);
     if let Some(failure) = failed.first() {
         value["error"] = error_object(failure);
@@ -82,11 +81,11 @@ fn failed_json(failure: &Failure) -> Value {
     json!({ "error": error_object(failure) })
 }
 
-/// Lists the USB ports that get no Stop.
+/// Lists the USB ports to which no Stop is sent.
 fn not_asked(arms: &[Arm]) -> Vec<String> {
     let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
     if asked.is_empty() {
-        // The arm is at the only port, so no port is left out.
+        // The computer has only this port, so no other port must be listed.
         return Vec::new();
     }
     let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
@@ -128,8 +127,8 @@ pub(super) fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the arms to stop. If the user has given a port, this is the arm at that port. Otherwise these are the arms
-/// of all agents and programs of this user, or, without agents and programs, the arm at the only port.
+/// Returns the arms that the command stops. If the user has specified a port, the result is the arm at that port. Otherwise the result is
+/// the arms of all agents and programs of this user. If no agent or program runs, it is the arm at the only port.
 fn arms(link: &LinkArgs) -> Vec<Arm> {
     if link.port.is_some() {
         return vec![Arm::Of { link: link.clone(), port: None }];
@@ -150,7 +149,7 @@ fn arms(link: &LinkArgs) -> Vec<Arm> {
     arms
 }
 
-/// Returns the arms of programs with a socket. The socket of a killed program is included, because its arm may still be
+/// Returns the arms of programs that have a socket for Stops. The socket of a killed program is included, because its arm may still be
 /// moving.
 #[cfg(unix)]
 fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
@@ -175,7 +174,7 @@ fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
 
 /// An arm to stop.
 enum Arm {
-    /// An arm at a port, or of an agent that has this port.
+    /// Arm at a port, or arm of an agent that has opened this port.
     Of { link: LinkArgs, port: Option<String> },
     /// Arm of the program that listens, or has listened, at this socket.
     #[cfg(unix)]
@@ -205,11 +204,11 @@ impl Arm {
 struct Stopped {
     /// `true` if the controller accepted the Stop.
     accepted: bool,
-    /// `true` if the arm was moving.
+    /// `true` if the arm was moving before the Stop.
     moved: bool,
     state: String,
     trajectory: String,
-    /// The program that had the port.
+    /// Answer of the program that had opened the port.
     holder: Option<Answer>,
 }
 
@@ -254,7 +253,7 @@ enum Sent {
     Confirmed,
 }
 
-/// An arm that may be moving.
+/// Failure of a Stop or Pause; the arm may still be moving.
 #[derive(Debug)]
 struct NotHalted {
     sent: Sent,
@@ -272,12 +271,12 @@ impl NotHalted {
         Self { sent, failure: failure.into() }
     }
 
-    /// Returns the result with at least the progress that an earlier program has reached with the Stop.
+    /// Raises the progress of this result to the progress that the Stop reached in an earlier program.
     fn at_least(self, sent: Sent) -> Self {
         Self { sent: self.sent.max(sent), ..self }
     }
 
-    /// Adds to the failure how far the Stop or Pause got, and how the operator can stop the arm in any case.
+    /// Adds to the failure the progress of the Stop or Pause, and a sure method to stop the arm.
     fn told(self, halt: Halt) -> Failure {
         let name = if halt == Halt::Stop { "Stop" } else { "Pause" };
         if self.failure.code == STILL_MOVING {
@@ -310,13 +309,14 @@ impl NotHalted {
 /// Link to an arm.
 #[expect(clippy::large_enum_variant, reason = "there is one for each arm, for a moment")]
 enum Reached {
-    /// Separate connection to the line.
+    /// Separate connection to the serial line.
     Line(Box<Session<LinkPort>>),
-    /// Answer of the program that has the port and has executed the request.
+    /// Answer of the program that has opened the port and has executed the request.
     Holder(Answer, Option<End>),
 }
 
-/// Opens the line, or asks the program that has the port. `own`: a program of this user had the port a moment ago.
+/// Opens the serial line, or sends the request to the program that has opened the port. `own` is true if a program of this user had the
+/// port open just before.
 fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalted> {
     let start = Instant::now();
     loop {
@@ -337,7 +337,7 @@ fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalte
     }
 }
 
-/// Returns `true` if a program of this user listens for this port, or has listened for it.
+/// Returns `true` if a program of this user accepts, or has accepted, Stops for this port.
 #[cfg(unix)]
 fn is_own(path: &str) -> bool {
     !halt::sockets_of(path).is_empty()
@@ -348,7 +348,7 @@ fn is_own(_: &str) -> bool {
     false
 }
 
-/// Asks the program that has this port, if it belongs to this user and listens.
+/// Sends the request to the program that has opened this port, if the program belongs to this user and accepts requests.
 #[cfg(unix)]
 fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     for socket in halt::sockets_of(path) {
@@ -359,7 +359,7 @@ fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalte
     Ok(None)
 }
 
-/// Asks the program that listens at this socket. A program that does not answer may have written the frame.
+/// Sends the request to the program that listens at this socket. If the program does not answer, it may still have sent the frame.
 #[cfg(unix)]
 fn ask_at(socket: &std::path::Path, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     halt::ask(socket, what, &who()).map_err(|error| NotHalted::after(Sent::Unconfirmed, error))
@@ -370,8 +370,7 @@ fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     Ok(None)
 }
 
-/// Stops one arm. The stopped program may end before the arm is at rest. Then the port is free, or another program has
-/// opened it.
+/// Stops one arm. The stopped program may end before the arm is at rest. The port is then free, or another program has opened the port.
 fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
@@ -382,7 +381,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
             }
             Reached::Holder(answer, end) => (answer, end),
         };
-        // The port and the rate at which the controller has answered.
+        // The link uses the port and the rate at which the controller has answered.
         let link = LinkArgs { port: Some(answer.port.clone()), baud: answer.baud, ..arm.link().clone() };
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
@@ -411,8 +410,8 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
                     return Ok(Reached::Holder(answer, end));
                 }
-                // The program has ended, so the port is free or the next program has opened it. Or the program is busy
-                // with other clients.
+                // The program has ended, so the port is free or another program has opened the port. Another possible cause is that the
+                // program is busy with other clients.
                 if link.port.is_some() {
                     return reach(link, Halt::Stop, true);
                 }
@@ -427,14 +426,14 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     }
 }
 
-/// Stops through a separate connection. If the controller refuses the Stop, no motion is in progress.
+/// Stops the arm through a separate connection. If the controller refuses the Stop, no motion is in progress.
 fn directly(
     mut session: Session<LinkPort>,
     progress: &Progress,
     holder: Option<Answer>,
 ) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
-    // A motion in the statuses before the confirmation of the Stop is noted as well.
+    // A motion in the statuses before the confirmation of the Stop is also recorded.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
     let seen = Rc::clone(&moved);
     session.observe(move |_, status| {
@@ -447,7 +446,7 @@ fn directly(
         Err(error) => return Err(unconfirmed(error)),
     };
     let confirmed = |error: Error| NotHalted::after(Sent::Confirmed, error);
-    // An arm in teaching is compliant. After a Stop it holds its position.
+    // An arm in teaching is compliant. After a Stop, the arm holds its position.
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {
@@ -492,7 +491,7 @@ fn still_moving(end: &End) -> Failure {
     Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(end.next_step())
 }
 
-/// Returns the failure of a frame that was written, or that an agent refused.
+/// Returns the failure for a frame that was sent without confirmation, or that an agent refused.
 fn unconfirmed(error: Error) -> NotHalted {
     let sent = match error {
         Error::Link(LinkError::Denied { .. }) => Sent::Nothing,

@@ -1,4 +1,4 @@
-//! `jtc help`: pages, and the help of each command.
+//! `jtc help`: prints a help page or the help of a command.
 
 use clap::CommandFactory;
 use cli_kit::{Failure, Output};
@@ -6,14 +6,14 @@ use serde_json::json;
 
 use crate::args::{Cli, HelpArgs};
 
-/// Pages that belong to no command.
+/// Help pages that do not belong to a command.
 const PAGES: [(&str, &str); 3] = [
     ("files", jtc_host::example::FORMS),
     ("faults", jtc_sim::FAULT_FILE_HELP),
     ("events", crate::progress::EVENTS_HELP),
 ];
 
-/// Prints a page, or the help of the command that the words name.
+/// Prints a help page, or the help of the command in `args`.
 pub(super) fn help(args: &HelpArgs, out: &Output) -> Result<(), Failure> {
     if let [word] = args.topic.as_slice()
         && let Some((_, text)) = PAGES.iter().find(|(name, _)| name == word)

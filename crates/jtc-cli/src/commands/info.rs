@@ -1,4 +1,4 @@
-//! `jtc info` prints the identity of the controller. `jtc disable` switches the torque off at rest.
+//! `jtc info` prints the identity of the controller. `jtc disable` switches the torque off while the arm is at rest.
 
 use std::time::Duration;
 
@@ -108,7 +108,7 @@ fn recorder(state: LogState) -> String {
     }
 }
 
-/// Describes the last held stop and the current reactions. Each line begins with a line break.
+/// Describes the last held stop and the present reactions to errors. Each line of the text begins with a line break.
 fn reacting_words(reacting: &Reacting) -> String {
     let mut lines = Vec::new();
     let joints = |joints: &[u8]| {
@@ -162,7 +162,7 @@ fn without_extensions(s: &Status) -> String {
     )
 }
 
-/// Removes the torque from an arm that is held at rest.
+/// Switches off the torque of an arm that is held at rest.
 pub(super) fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     if !yes {

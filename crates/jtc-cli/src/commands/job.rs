@@ -1,4 +1,4 @@
-//! Trajectory from a file at the requested speed, its arm, and the result of its check.
+//! Trajectory from a file at the requested speed, with the arm and the result of the trajectory check.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Returns the arm that the user has given, or the built-in arm. Prints its warnings on stderr.
+/// Returns the arm that the user has specified, or the built-in arm. Prints the warnings about the arm on stderr.
 fn arm_of(args: &CheckArgs, out: &Output) -> Result<Arm, Failure> {
     let arm = named_arm::load(args.arm.as_deref())?;
     named_arm::note_warnings(&arm, out);
@@ -50,24 +50,24 @@ pub(super) struct Job {
     pub trajectory: Trajectory,
     /// Arm with masses, friction and names.
     pub arm: Arm,
-    /// Limits and settings in use.
+    /// Limits and settings that the command uses.
     pub config: Config,
     /// Configuration of the controller, if it was read.
     pub device: Config,
-    /// Identity of the controller and hash of its arm, if it was read and the controller has them.
+    /// Identity of the controller and hash of its arm, if the controller reports them and they were read.
     pub identity: Option<(DeviceIdentity, u64)>,
-    /// File and arm, as the user typed them.
+    /// Command-line words for the file and the arm, as the user typed them.
     pub words: String,
-    /// Trajectory to run after this one, and the number of runs.
+    /// Trajectory that runs after this trajectory, and the number of its runs.
     pub later: Option<(Trajectory, u32)>,
-    /// Speed in percent of the file's own speed.
+    /// Speed in percent of the speed in the file.
     speed: f64,
-    /// `true` if no file was read: the motion is planned once the arm's position is known.
+    /// `true` if no file was read, so that the motion is planned when the position of the arm is known.
     made: bool,
 }
 
 impl Job {
-    /// Reads the files. Prints notes and warnings on stderr.
+    /// Reads the files. Loads a trajectory file. Prints notes and warnings on stderr.
     pub(super) fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         let arm = arm_of(args, out)?;
         let loaded = Loaded::load(file, Some(&arm.joint_names))?;
@@ -108,7 +108,7 @@ impl Job {
         })
     }
 
-    /// Creates a job without a file. [`Job::take`] sets its motion later. `words` is the command as the user typed it.
+    /// Creates a job without a file. [`Job::take`] later sets the motion of this job. `words` is the command as the user typed it.
     pub(super) fn made(arm: Arm, words: String, out: &Output) -> Self {
         named_arm::note_warnings(&arm, out);
         let loaded = Loaded {
@@ -140,8 +140,8 @@ impl Job {
         self.trajectory = trajectory;
     }
 
-    /// Plans the same path within the limits if a measured motion violates them with its own times. The check reports
-    /// the errors that remain.
+    /// Plans the path of a measured motion again within the limits, if the motion violates the limits with its measured times. The check
+    /// reports the errors that remain.
     pub(super) fn plan_anew(&mut self, out: &Output) {
         let verdict = self.verdict(&self.trajectory, None, UploadOptions::default());
         let Some(why) = verdict.refusals().next() else { return };
@@ -159,8 +159,7 @@ impl Job {
         self.trajectory = at_speed;
     }
 
-    /// Returns the hint after a verdict, with the names that the user typed and the [passing
-    /// speed](Self::passing_speed).
+    /// Returns the hint for a verdict. The hint contains the names that the user typed and the [passing speed](Self::passing_speed).
     pub(super) fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> Next {
         if self.made {
             return format!(
@@ -194,21 +193,21 @@ impl Job {
         verdict.hint_with(&self.words, self.speed, passing_speed)
     }
 
-    /// Returns `true` if the values are valid as degrees.
+    /// Returns `true` if the trajectory passes the check with its values read as degrees.
     fn passes_as_degrees(&self) -> bool {
         let degrees = self.loaded.clone().in_degrees().map(|loaded| loaded.trajectory);
         let at_speed = degrees.ok().and_then(|t| plan::at_speed(&t, self.speed).ok());
         at_speed.is_some_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
     }
 
-    /// Returns the highest speed in whole percent that passes the check. `None`: no speed passes, or the speed is not
-    /// the problem.
+    /// Returns the highest speed in whole percent that passes the check. Returns `None` if no speed passes, or if the speed is not the
+    /// problem.
     pub(super) fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
         let passes = |percent: f64| {
             let slower = plan::at_speed(&self.loaded.trajectory, percent);
             slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
         };
-        // The estimate can be too low. If the torque is exceeded, it can also be too high.
+        // The estimate can be too low. If a torque limit is exceeded, the estimate can also be too high.
         let mut good = verdict.slower(self.speed)?;
         let mut bad = self.speed;
         while !passes(good) {
@@ -246,7 +245,7 @@ impl Job {
         Failure::shown(ErrorKind::Refused)
     }
 
-    /// Adds the name of the file to a failure of this job, if its hint does not contain it.
+    /// Adds the name of the file to a failure of this job, if the hint does not contain the name.
     pub(super) fn named(&self, failure: Failure) -> Failure {
         let again =
             if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };
@@ -255,7 +254,7 @@ impl Job {
         Failure { next, ..failure }
     }
 
-    /// Returns the parts of the torque that are missing in the check because the arm file does not give them.
+    /// Returns the parts of the torque that are missing in the check because the arm file does not contain their parameters.
     pub(super) fn left_out(&self) -> Vec<&'static str> {
         let arm = &self.arm;
         let rotors = (0..JOINTS).any(|j| !arm.rotors_given[j] && self.config.joints[j].rotor_inertia == 0.0);
@@ -263,7 +262,7 @@ impl Job {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the parts that are missing in the torques, and how the user can add them. `None`: no part is missing.
+    /// Describes the parts that are missing in the torques, and how the user can add these parts. Returns `None` if no part is missing.
     pub(super) fn without(&self) -> Option<String> {
         let parts = self.left_out();
         (!parts.is_empty()).then(|| {
@@ -283,13 +282,12 @@ impl Job {
         }
     }
 
-    /// Returns a planner for the arm of this job, with the limits in use. `friction` is the friction of this arm.
+    /// Returns a planner for the arm of this job, with the limits of the job. `friction` is the friction of this arm.
     pub(super) fn planner<'a>(&'a self, friction: Option<&'a Friction>) -> Planner<'a> {
         Planner { model: Some(&self.arm.model), friction, ..Planner::new(&self.config) }
     }
 
-    /// Checks the limits at every point and between points, the torque from the arm model, and the start pose, if there
-    /// is one.
+    /// Checks the limits at and between the points, the torque from the arm model, and the start pose if one is specified.
     pub(super) fn verdict(
         &self,
         trajectory: &Trajectory,

@@ -1,4 +1,4 @@
-//! `jtc jog`: single joints, with keys or at a given rate.
+//! `jtc jog`: moves single joints with keys or at a specified velocity.
 
 use std::time::Duration;
 
@@ -14,15 +14,15 @@ use crate::args::JogArgs;
 use crate::link::LinkPort;
 use jtc_host::session::BRING_UP;
 
-/// Time for which a key press moves the joint. A terminal repeats a held key after half a second, and then at a shorter
-/// interval than this.
+/// Time for which one key press moves the joint. A terminal repeats a pressed key after half a second, and then at intervals that are
+/// shorter than this time.
 const HELD: Duration = Duration::from_millis(150);
-/// Rates of the keys, rad/s.
+/// Joint velocities that the user can select with keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
-/// Index of the highest initial rate of the keys.
+/// Index of the highest velocity at which jogging with keys may begin.
 const FIRST_MAX: usize = 2;
 
-/// Jogs until a key, the time or a signal ends the jog. The arm is then at rest.
+/// Jogs until a key, the time or a signal ends the jog. Waits until the arm is at rest.
 pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let rate = args.rate.map(|rate| if args.deg { rate.to_radians() } else { rate });
     if let Some(rate) = rate
@@ -59,13 +59,12 @@ pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
         (Some(joint), Some(rate)) => one(&mut session, joint, rate, over),
         _ => with_keys(&mut session, out, over),
     };
-    // However the jog has ended, the arm is stopped now, without waiting for the controller's timeout.
+    // The arm is stopped at once after every end of the jog, without waiting for the timeout of the controller.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // An error that has released the arm is the cause of all other failures, and may be the only one, so it is reported
-    // first.
+    // An error that has released the arm causes all other failures, so it is reported first.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
-        // A held stop is the reason why a jog was refused.
+        // The controller refuses a jog during a held stop.
         (_, Err(failure)) if failure.code == "held-stop" => return Err(failure),
         (jogged, rested) => jogged.and(rested)?,
     };
@@ -99,8 +98,8 @@ fn one(
     session.jog_while(&velocity, over).map_err(refused)
 }
 
-/// Returns the index of the initial rate. For the slowest joint it is at most the share of the velocity limit that a
-/// move uses by default.
+/// Returns the index of the initial velocity. For the slowest joint, this velocity is at most the share of the velocity limit that a move
+/// uses by default.
 fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     let share = 1e-2 * session.move_speed(None)?.percent;
     let arm = if session.has_extensions() { session.device_arm()? } else { Arm::avena() };
@@ -108,16 +107,16 @@ fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     Ok(rate_within(share * limits.into_iter().fold(f64::INFINITY, f64::min)))
 }
 
-/// Returns the index of the highest initial rate up to `most`, rad/s.
+/// Returns the index of the highest allowed initial velocity that is at most `most`, rad/s.
 fn rate_within(most: f64) -> usize {
     RATES[..=FIRST_MAX].iter().rposition(|rate| *rate <= most).unwrap_or(0)
 }
 
-/// Joint that the keys move, its rate, and its present motion.
+/// State of the joint that the keys move, with its velocity setting and present motion.
 struct Held {
     joint: Joint,
     rate: usize,
-    /// Direction, and the time of the last press of its key.
+    /// Direction of motion, and the time of the last key press for this direction.
     moving: Option<(f64, Duration)>,
 }
 
@@ -134,13 +133,13 @@ impl Held {
             Key::Left | Key::Char('h' | 'a') => self.moving = Some((-1.0, now)),
             Key::Up | Key::Char('+' | '=') => self.rate = (self.rate + 1).min(RATES.len() - 1),
             Key::Down | Key::Char('-' | '_') => self.rate = self.rate.saturating_sub(1),
-            // Any other key stops: the user may be searching for the stop key.
+            // Any other key stops the joint, because the user may be searching for the stop key.
             _ => self.moving = None,
         }
         true
     }
 
-    /// Returns the wanted velocity.
+    /// Returns the commanded velocity of each joint.
     fn velocity(&mut self, now: Duration) -> [f64; JOINTS] {
         self.moving = self.moving.filter(|(_, pressed)| now < *pressed + HELD);
         let mut velocity = [0.0; JOINTS];

@@ -1,4 +1,4 @@
-//! `jtc log`: flight recorder, its content, and its replay.
+//! `jtc log`: reads and replays the flight recorder.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use super::info::hash;
 use crate::args::{LinkArgs, LogCommand};
 use crate::failure::output_lost;
 
-/// Runs a command of the family.
+/// Runs a `jtc log` command.
 pub(super) fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
     match command {
         LogCommand::Fetch { out: file, report, arm, overwrite, link } => {
@@ -53,7 +53,7 @@ impl Files {
     }
 }
 
-/// A log, with the report about it.
+/// Log of the flight recorder, with the report about its contents.
 struct Read(Account);
 
 impl Read {
@@ -95,7 +95,7 @@ impl Read {
         })
     }
 
-    /// Describes the replayed part in one line. A further line follows for each reason why a part is missing.
+    /// Describes the replayed part in one line. Adds a line for each reason why a part is missing.
     fn extent(&self) -> Vec<String> {
         let replayed = &self.0.replayed;
         let verdict = match &replayed.difference {
@@ -157,7 +157,7 @@ impl Read {
         lines.join("\n")
     }
 
-    /// Returns the events as a table of the page.
+    /// Returns the events as a table for the report page.
     fn facts(&self) -> Vec<Facts> {
         let rows =
             self.0.story.events.iter().map(|event| (format!("{:.3} s", event.time_s), event.text.clone()));

@@ -20,7 +20,7 @@ use crate::progress::Progress;
 /// Time within which a clear takes effect.
 const EFFECT: Duration = Duration::from_millis(300);
 
-/// Clears errors, and reports the remaining ones.
+/// Clears errors, and reports the remaining errors.
 pub(super) fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     if args.occurred {
@@ -111,12 +111,12 @@ pub(super) fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the failure of a recovery. Its hint does not suggest `jtc recover` again, because the user must find the
-/// cause of the error first.
+/// Returns the failure of a recovery. The hint does not suggest `jtc recover` again, because the user must find the cause of the error
+/// first.
 fn not_itself(e: Error) -> Failure {
     let failure = Failure::of(&e);
     let recovers = [Action::Recover, Action::RecoverWithArm, Action::RecoverWithDefaults];
-    // If the controller lacks arm parameters, the same command with an option helps.
+    // If the controller lacks arm parameters, the hint suggests `jtc recover` with an option.
     if matches!(e, Error::Parameters(ParametersError::NoSource { .. }))
         || !recovers.iter().any(|action| failure.next.names(*action))
     {

@@ -1,4 +1,4 @@
-//! `jtc monitor`: live view of the controller. On a terminal it is a full view, otherwise one line per status.
+//! `jtc monitor`: live view of the controller. On a terminal the command shows a full view, otherwise it prints one line per status.
 
 mod joints;
 mod view;
@@ -15,12 +15,12 @@ use crate::args::MonitorArgs;
 use crate::link::LinkPort;
 use view::View;
 
-/// Shortest interval between two drawings of the view. 25 per second are enough at any rate of statuses.
+/// Shortest interval between two updates of the view. At any rate of statuses, 25 updates per second are enough.
 const PICTURE: Duration = Duration::from_millis(40);
 /// Time without a status after which the last values are shown as outdated.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// Shows statuses until `q`, Ctrl-C, or the requested number of them.
+/// Shows statuses until `q`, Ctrl-C, or until the requested number of statuses is reached.
 pub(super) fn monitor(args: &MonitorArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;

@@ -1,4 +1,4 @@
-//! `jtc move`: moves the arm from its position to joint positions or a pose.
+//! `jtc move`: moves the arm from its present position to joint positions or a pose.
 
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
@@ -11,7 +11,7 @@ use super::plan::note_low_margin;
 use super::run::{Course, perform};
 use crate::args::{MoveArgs, Target};
 
-/// Plans the move once the position of the arm is known, and runs it.
+/// Plans the move once the position of the arm is known, and executes the move.
 pub(super) fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     if let Some(percent) = args.speed.filter(|percent| !(1.0..=100.0).contains(percent)) {
         return Err(Failure::nothing_sent(PlanError::Speed { percent, most: 100.0 }));

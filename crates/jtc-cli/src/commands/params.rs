@@ -1,4 +1,4 @@
-//! `jtc params`: friction, gains and arm model from files into the controller.
+//! `jtc params`: sends friction, gains and arm model from files to the controller.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use crate::limits;
 use crate::link::LinkPort;
 use crate::progress::Progress;
 
-/// Runs a command of the family.
+/// Runs a `jtc params` command.
 pub(super) fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
     match command {
         ParamsCommand::Push { files, friction, accept, link } => {
@@ -64,8 +64,8 @@ fn push(
     let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
     let missing = labels::missing_parameters(status.jtc_init);
-    // These parameters were not sent, but are not missing either. The controller had them before, from an unknown
-    // source.
+    // The listed parameters were not sent, but the controller has values for them. The controller has received these values earlier from an
+    // unknown source.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
@@ -104,12 +104,13 @@ fn push(
     Ok(())
 }
 
-/// Waits for the result of the trial of new gains on an arm under torque. Returns `true` if the gains were tried.
+/// Waits for the result of the trial of new gains on an arm under torque. Returns `true` if the controller has tested the gains.
 pub(super) fn await_trial(session: &mut Session<LinkPort>, out: &Output) -> Result<bool, Failure> {
     Ok(session.await_trial(|| out.note("the controller tries the gains for 2 s"))?)
 }
 
-/// Refuses gains that do not keep the arm stable. The check uses the arm of the files, or else the controller's arm.
+/// Refuses gains with which the arm would be unstable. The check uses the arm of the files. Without it, the check uses the arm of the
+/// controller.
 fn check_gains(
     read: &ParameterFile,
     set: &ParameterSet,
@@ -118,7 +119,7 @@ fn check_gains(
     let Some(pid) = set.pid else { return Ok(()) };
     let arm = match &read.arm {
         Some(arm) => Some(arm.clone()),
-        // If the arm cannot be read yet, it is not under torque yet.
+        // If the arm cannot be read yet, its drives do not produce torque yet.
         None if session.info()?.is_some() => session.device_arm().ok(),
         None => None,
     };
@@ -218,7 +219,7 @@ fn as_text(set: &ParameterSet) -> String {
     text
 }
 
-/// Loads the files. Values of later files override those of earlier files. Prints warnings on stderr.
+/// Loads the files. Loads all files. Values of later files replace values of earlier files. Prints warnings on stderr.
 fn load(files: &[PathBuf], out: &Output) -> Result<ParameterFile, Failure> {
     let read = ParameterFile::load_all(files)?;
     for warning in &read.warnings {

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::args::{LinkArgs, PayloadCommand};
 
-/// Runs a command of the family.
+/// Runs a `jtc payload` command.
 pub(super) fn payload(command: &PayloadCommand, out: &Output) -> Result<(), Failure> {
     match command {
         PayloadCommand::Set { body, link } => set(&body.payload(), link, out),

@@ -1,4 +1,4 @@
-//! `jtc plan`: a trajectory through waypoints, as fast as the limits allow.
+//! `jtc plan`: plans a trajectory through waypoints that is as fast as the limits allow.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ use crate::args::PlanArgs;
 const NO_LINES: &str = "--blend-m has no effect: it rounds corners between lines and arcs, and this motion \
     has no lines or arcs; use --line, or a column `leg`";
 
-/// Plans a trajectory, checks it, and writes it.
+/// Plans, checks and writes a trajectory.
 pub(super) fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     if !(-40.0..=120.0).contains(&args.temperature) {
         return Err(Failure::usage(format!(
@@ -33,7 +33,7 @@ pub(super) fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     named_arm::note_warnings(&arm, out);
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
-    // The motion is planned before any file is opened, so that an impossible line leaves no file.
+    // The motion is planned before any file is opened, so that no file is created if a line is impossible.
     let blend = if args.deg { args.blend.to_radians() } else { args.blend };
     let options = WayOptions { line: args.line, blend, blend_m: args.blend_m };
     let way = WaypointPath::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
@@ -78,7 +78,7 @@ pub(super) fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Notes that the flange leaves the straight line between two of its poses.
+/// Describes the deviation of the flange from the straight line between two poses.
 fn off_the_line(aside: Aside) -> String {
     let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
     format!(
@@ -88,7 +88,7 @@ fn off_the_line(aside: Aside) -> String {
     )
 }
 
-/// Checks that the output has an ending for CSV. With the ending of another format, hardly any command would read it.
+/// Checks that the output has the file name extension of CSV. With the extension of another format, most commands could not read the file.
 fn readable(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if ["mcap", "yaml", "yml", "json", "toml", "urdf", "xml", "html"].contains(&ending.as_str()) {
@@ -107,7 +107,7 @@ fn readable(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Adds the line numbers of the file to the waypoints in an error.
+/// Adds to an error the line numbers of its waypoints in the file.
 fn located(error: &PlanError, file: &WaypointFile) -> Failure {
     Failure { message: file.located(error), ..Failure::of(error) }
 }
@@ -166,7 +166,7 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
     });
 }
 
-/// Returns for how long each limit of a joint is the limiting constraint. Returns a dash if no limit is.
+/// Returns for how long each limit of a joint is the limiting constraint. Returns a dash if the joint is never the limiting constraint.
 fn binds(binding: &[Bound], joint: Joint) -> String {
     let mut limits: Vec<(&str, f64)> = Vec::new();
     for bound in binding.iter().filter(|bound| bound.joint == joint) {
@@ -181,7 +181,7 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
     if words.is_empty() { "-".into() } else { words.join(", ") }
 }
 
-/// Returns the smallest torque margin of a motion as a line. Empty if no margin was computed.
+/// Returns the smallest torque margin of a motion as a line. Returns an empty text if no margin was computed.
 pub(super) fn margin_line(margin: Option<TorqueMargin>) -> String {
     margin.map_or(String::new(), |margin| format!("{margin}\n"))
 }
@@ -193,7 +193,7 @@ pub(super) fn note_low_margin(margin: Option<TorqueMargin>, out: &Output) {
     }
 }
 
-/// Returns the requested margin and the remaining one.
+/// Returns the requested margin and the remaining margin as a text.
 fn margin_words(planned: &Planned, percent: f64) -> String {
     let asked = format!("{percent} % of each limit");
     match planned.verdict.margin {
@@ -207,7 +207,7 @@ fn margin_words(planned: &Planned, percent: f64) -> String {
     }
 }
 
-/// Returns the page of a motion, with only the commanded values, and with the limiting constraints.
+/// Returns the report page of a planned motion, with the commanded values and the limiting constraints.
 fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> String {
     let info = run_report::info(arm, "planned, not run", &stem(&args.out), 0);
     let trajectory = &planned.trajectory;

@@ -1,4 +1,4 @@
-//! `jtc ports`: available ports, and the reason if a port cannot be used.
+//! `jtc ports`: lists the available ports, with the reason if a port cannot be used.
 
 use cli_kit::{Diagnose, Failure, Output};
 use jtc_host::port::{PortKind, list};

@@ -1,4 +1,4 @@
-//! `jtc pose`: named positions in the arm file.
+//! `jtc pose`: lists and saves named positions in the arm file.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::arm::poses_table;
 use super::job::typed;
 use crate::args::{LinkArgs, PoseCommand};
 
-/// Runs a command of the family.
+/// Runs a `jtc pose` command.
 pub(super) fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
     match command {
         PoseCommand::Save { name, arm, link, overwrite } => save(name, &arm.arm, link, *overwrite, out),
@@ -25,8 +25,7 @@ pub(super) fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
 }
 
 fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output) -> Result<(), Failure> {
-    // Name and file are checked before the controller is asked, because an error in them does not depend on the
-    // controller.
+    // The name and the file are checked before a request to the controller, because these checks do not need the controller.
     let arm = Arm::load(file)?;
     if arm.poses.contains_key(name) && !overwrite {
         let path = file.to_owned();

@@ -1,4 +1,4 @@
-//! `jtc report`: page and picture of a recording made earlier.
+//! `jtc report`: creates the report page and picture of an existing recording.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use super::run_report;
 use crate::args::ReportArgs;
 use cli_kit::OutputFile;
 
-/// Writes the page and prints the figures.
+/// Writes the report page and prints the results per joint.
 pub(super) fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let page = args.out.clone().unwrap_or_else(|| args.file.with_extension("html"));
     let picture = page.with_extension("svg");

@@ -1,4 +1,4 @@
-//! `jtc reset`: restarts nodes of the joint bus. The user counts the joints from 1.
+//! `jtc reset`: restarts nodes of the joint bus. On the command line, joints are counted from 1.
 
 use cli_kit::{Failure, Output};
 use jtc_host::labels;
@@ -9,11 +9,11 @@ use serde_json::json;
 use crate::args::ResetArgs;
 use crate::ask::confirm;
 
-/// All joints and the gripper.
+/// Bit mask of all joints and the gripper.
 const ALL: u8 = 0x7F;
 /// The gripper's bit.
 const GRIPPER: u8 = 1 << 6;
-/// Resets the given nodes. If the arm is held, this needs the user's agreement. While the arm moves, no joint is reset.
+/// Resets the specified nodes. If the arm is held, the user must confirm the reset. Refuses to reset a joint while the arm moves.
 pub(super) fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let nodes = nodes(args)?;
     let reset = labels::node_names(nodes);
@@ -30,7 +30,7 @@ pub(super) fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the bit mask of the given nodes: bits 0..5 for joints 1..6, and bit 6 for the gripper.
+/// Returns the bit mask of the specified nodes. Bits 0..5 are joints 1..6, and bit 6 is the gripper.
 fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
     if let Some(mask) = &args.mask {
         return Err(of_mask(mask));
@@ -44,7 +44,7 @@ fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
     Ok(nodes)
 }
 
-/// Returns the failure for a bit mask. In older versions the argument was a bit mask, in which 3 meant joints 1 and 2.
+/// Returns the failure if the argument is a bit mask. In older versions the argument was a bit mask, in which 3 meant joints 1 and 2.
 fn of_mask(text: &str) -> Failure {
     let value = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
         Some(hex) => u8::from_str_radix(hex, 16).ok(),

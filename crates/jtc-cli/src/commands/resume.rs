@@ -1,4 +1,4 @@
-//! `jtc traj resume`: resumes after a pause, and checks the remainder if the trajectory is known.
+//! `jtc traj resume`: resumes a motion after a pause. Checks the remainder of the motion first, if the trajectory is known.
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::error::MotionError;
@@ -12,7 +12,7 @@ use crate::args::ResumeArgs;
 use crate::link::LinkPort;
 use crate::progress::Progress;
 
-/// Resumes the motion, unless the remainder of the given trajectory no longer passes the check (J-36, J-60).
+/// Resumes the motion, unless the remainder of the specified trajectory fails the check (J-36, J-60).
 pub(super) fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let job = args.trajectory.as_deref().map(|file| Job::load(file, &args.check, out)).transpose();
@@ -20,7 +20,7 @@ pub(super) fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     progress.watch(&mut session);
     let status = session.fresh_status()?;
-    // In any other state, the session reports the error.
+    // In any other state, the session refuses the request and reports the error.
     if status.trajectory == TrajectoryState::Pause {
         match &mut job {
             Some(job) => check_rest(job, args.check.arm.is_none(), &mut session, &status)?,
@@ -33,8 +33,7 @@ pub(super) fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Checks the remainder of the trajectory, from the place of the pause, against the controller's limits and with its
-/// payload.
+/// Checks the remainder of the trajectory after the pause with the limits and the payload of the controller.
 fn check_rest(
     job: &mut Job,
     arm_of_device: bool,
@@ -68,8 +67,7 @@ fn check_rest(
     })
 }
 
-/// Prints that the remainder is not checked: this program did not load the motion, and a controller cannot return its
-/// trajectory.
+/// Prints that the remainder is not checked. This program did not load the motion, and a controller cannot return its trajectory.
 fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Result<(), Failure> {
     let payload = session.payload()?;
     if session.has_extensions() {

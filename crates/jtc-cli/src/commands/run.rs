@@ -1,4 +1,4 @@
-//! `jtc traj run`, and the steps that it shares with other motion commands: check, upload, execute, follow, report.
+//! `jtc traj run`, and the steps that all motion commands share (check, upload, execute, follow, report).
 
 mod approach;
 mod conclude;
@@ -25,32 +25,32 @@ use conclude::conclude;
 use outputs::Outputs;
 use terminal::{Terminal, cancelled};
 
-/// Settings of a motion, for all commands that run one.
+/// Settings of a motion, for all commands that execute a motion.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
-    /// Link, files that the command writes, and accepted risks.
+    /// Options for the link, for output files, and for accepted risks.
     pub execute: ExecuteArgs,
     /// Name in recordings.
     pub name: String,
-    /// Name of the trajectory that an approach leads to, as the user typed it.
+    /// Name of the trajectory to whose start an approach moves, as the user typed it.
     pub words: String,
-    /// Files that the command reads, which must not be outputs.
+    /// Files that the command reads. Output files must not replace them.
     pub inputs: Vec<PathBuf>,
-    /// `true` if the user has given an arm file. The file must then match the controller's arm.
+    /// `true` if the user has specified an arm file. In this case, the file must match the arm of the controller.
     pub arm_named: bool,
-    /// `true`: if the arm is not at the first point, it is moved there first.
+    /// `true` if the command first moves the arm to the first point when it is elsewhere.
     pub approach: bool,
-    /// Speed of a move or an approach in %, if the user has given it.
+    /// Speed of a move or an approach in %, if the user has specified it.
     pub speed: Option<f64>,
-    /// Option for the speed; empty if the command has none.
+    /// Name of the speed option; empty if the command has no such option.
     pub speed_option: &'static str,
     pub points_per_segment: Option<usize>,
     /// Number of runs of the motion.
     pub repeat: u32,
 }
 
-/// Function that creates the trajectory of a job, when the position of the arm and the speed of a move on this
-/// controller are known.
+/// Function that creates the trajectory of a job. It is called when the position of the arm and the speed of a move on this controller are
+/// known.
 pub(super) type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
 
 impl Course {
@@ -85,7 +85,7 @@ pub(super) fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, |out| Job::load(&args.file, &args.check, out), None, out)
 }
 
-/// Runs a job: the unchanged trajectory of a file, or a motion that is planned when the position of the arm is known.
+/// Runs a job. The motion is the unchanged trajectory of a file, or it is planned when the position of the arm is known.
 pub(super) fn perform(
     course: &Course,
     load: impl FnOnce(&Output) -> Result<Job, Failure>,
@@ -100,8 +100,8 @@ pub(super) fn perform(
     drive(course, &mut job, make, &progress, out).map_err(|failure| job.named(failure))
 }
 
-/// Checks that the controller's arm matches the arm of the job (J-55). If the user has given an arm file, a difference
-/// is refused. Otherwise the controller's own arm is used. From then on the job uses the controller's settings.
+/// Checks that the controller's arm matches the arm of the job (J-55). If the user has specified an arm file, a difference is refused.
+/// Otherwise, the job uses the arm of the controller. After the check, the job uses the settings of the controller.
 fn match_device(
     session: &mut Session<LinkPort>,
     job: &mut Job,
@@ -127,8 +127,8 @@ fn match_device(
             }
         }
     }
-    // Without differences these are the arm's own settings. Rotor values that the file does not contain come from the
-    // controller.
+    // If there are no differences, these settings are the settings of the arm file. Rotor values that the file does not contain come from
+    // the controller.
     job.config = job.arm.config_on_device(&job.device);
     if job.device.payload.is_there() {
         out.note(format!(
@@ -140,7 +140,7 @@ fn match_device(
     Ok(())
 }
 
-/// Checks a motion that is known before the controller is asked. A repeated motion must end at its start.
+/// Checks a motion that is known before the connection to the controller. A repeated motion must end at its start point.
 fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failure> {
     let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {
@@ -216,7 +216,7 @@ fn ready(session: &mut Session<LinkPort>, operator: &Operator) -> Result<Status,
 }
 
 impl Job {
-    /// Returns the options of its checks.
+    /// Returns the options for the trajectory check on the controller.
     fn options(&self, course: &Course) -> CheckOptions {
         let accept_device_limits = course.accepts_device_limits();
         CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() }

@@ -1,4 +1,4 @@
-//! Report at the end of a run: figures per joint as a table and as JSON, and the output files.
+//! Report at the end of a run, with the output files and the results per joint as a table and as JSON.
 
 use cli_kit::table;
 use jtc_host::arm::Arm;
@@ -7,7 +7,7 @@ use jtc_host::report::{RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 use jtc_wire::{Joint, Status, TrajectoryState};
 
-/// Returns the description in a recording of this arm.
+/// Returns the description that a recording of this arm contains.
 pub(super) fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
     RecordingInfo {
         source: source.to_owned(),
@@ -17,7 +17,7 @@ pub(super) fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64
     }
 }
 
-/// Returns the text of the first failure, if there was one, followed by the figures.
+/// Returns the text of the first failure, if a failure occurred, and the results.
 pub(super) fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
     let Some(failure) = failure else { return figures(summary) };
     let rows: Vec<Vec<String>> = failure.rows().into_iter().map(|row| row.to_vec()).collect();
@@ -36,7 +36,7 @@ pub(super) fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String
     )
 }
 
-/// Returns the figures as a table.
+/// Returns the results per joint as a table.
 pub(super) fn figures(summary: &Summary) -> String {
     let rows: Vec<Vec<String>> = Joint::ALL
         .iter()
@@ -57,7 +57,7 @@ pub(super) fn figures(summary: &Summary) -> String {
     table(&head, &rows)
 }
 
-/// Formats a figure with `digits` decimals, or a dash if it is unknown.
+/// Formats a value with `digits` decimals, or as a dash if the value is unknown.
 fn figure(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".into(), |v| cli_kit::figure(v, digits))
 }
@@ -78,7 +78,7 @@ pub(super) fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String 
     )
 }
 
-/// Describes a motion in one line, below its bar: its state, and the joint that is closest to a limit.
+/// Describes a motion in one line below the progress bar, with its state and the joint that is closest to a limit.
 pub(super) fn motion_line(s: &Status) -> String {
     let what = match s.trajectory.known() {
         Some(TrajectoryState::Stop) => "stopped",

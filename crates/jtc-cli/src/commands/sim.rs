@@ -4,8 +4,8 @@ use cli_kit::{Failure, Output};
 
 use crate::args::SimArgs;
 
-/// Notice about the simulated brakes, which carry the arm while no drive does. The constants after it are the notices
-/// about a stand, and about an arm without support.
+/// Notice about the simulated brakes, which hold the arm while the drives produce no torque. The next constants are notices about an arm on
+/// a stand and about an arm without support.
 #[cfg(unix)]
 const BRAKES: &str =
     "note: simulated holding brakes hold the arm after an error; the known drives have no brakes";
@@ -89,7 +89,7 @@ pub(super) fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the image in the file with the stored arm, if the file exists.
+/// Returns the image of the stored arm from the file, if the file exists.
 #[cfg(unix)]
 fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
     let unreadable = |what: String| {
@@ -114,7 +114,7 @@ fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
         .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
 }
 
-/// Joint bus that is connected to a CAN bus, so that other programs can join it.
+/// Connects the joint bus to a CAN bus, so that other programs can use the joint bus.
 #[cfg(unix)]
 fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
     let parsed: can_link::CanUrl = url.parse().map_err(Failure::usage)?;

@@ -1,4 +1,4 @@
-//! Simulated arm, for `jtc sim` and `jtc serve --sim`, and its controller's parameters.
+//! Simulated arm for `jtc sim` and `jtc serve --sim`, and the parameters of its controller.
 
 use std::path::Path;
 
@@ -8,9 +8,9 @@ use jtc_sim::SimConfig;
 
 use super::named_arm;
 
-/// Returns the given arm, or the built-in arm, and its simulated world. Prints missing parameters of the arm file on
-/// stderr. The controller has stored the image `kept`. Without it, the controller has stored the given arm, if its file
-/// is complete.
+/// Returns the specified arm or the built-in arm, and the simulated world of this arm. Prints missing parameters of the arm file on stderr.
+/// `kept` is the image of the arm that the controller has stored. Without this image, the controller has stored the specified arm if the
+/// arm file is complete.
 pub(super) fn simulated(
     path: Option<&Path>,
     kept: Option<Vec<u8>>,
@@ -32,7 +32,7 @@ pub(super) fn simulated(
     };
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored.is_some() {
-        // The controller gets its arm in the same way as a board: from its memory, and from frames.
+        // Like a board, the controller reads its arm from memory and receives it in frames.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
     }
     Ok((arm, config))

@@ -1,4 +1,4 @@
-//! `jtc status`, and a status as text and as JSON for all commands that show one.
+//! `jtc status`, and a status as text and as JSON for all commands that show a status.
 
 use cli_kit::{Failure, Output, figure, table};
 use host_kit::FrontEnd;
@@ -25,7 +25,7 @@ pub(super) fn status(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns a status as JSON. The keys contain the units.
+/// Returns a status as JSON. The names of the JSON fields contain the units.
 pub(super) fn as_json(s: &Status) -> Value {
     let joints: Vec<Value> = Joint::ALL
         .into_iter()
@@ -83,7 +83,7 @@ pub(super) fn as_json(s: &Status) -> Value {
     })
 }
 
-/// Returns the state of joint `j` (from 0). This is the last state that the joint has sent, unless the joint is silent.
+/// Returns the state of joint `j` (from 0). The result is the last state that the joint has sent, unless the joint does not answer.
 pub(super) fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
     // A joint that is not ready may still answer. An enabled joint that is not measured does not answer.
@@ -102,7 +102,7 @@ pub(super) fn gripper_answers(s: &Status) -> bool {
     !labels::is_silent(s, GRIPPER)
 }
 
-/// Returns the state of the gripper. This is the last state that the gripper has sent, unless the gripper is silent.
+/// Returns the state of the gripper. The result is the last state that the gripper has sent, unless the gripper does not answer.
 pub(super) fn gripper_state(s: &Status) -> &'static str {
     match s.gripper {
         Some(g) if gripper_answers(s) => g.state.name(),
@@ -188,7 +188,7 @@ mod tests {
         assert!(told.contains("next: remove what pushes the joint"), "{told}");
         let untold = text(&s, None);
         assert!(untold.contains("errors: held stop: joint 2: torque over limit\n"), "{untold}");
-        // A held stop whose errors were cleared is not shown.
+        // A held stop is not shown after its errors were cleared.
         assert!(!text(&Status { errors: 0, ..s }, Some(&reactions)).contains("held stop"));
     }
 

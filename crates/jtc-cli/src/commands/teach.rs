@@ -1,4 +1,4 @@
-//! `jtc teach`: moving the arm by hand, and recording it.
+//! `jtc teach`: records a motion for which the user guides the arm by hand.
 
 mod taught_file;
 
@@ -18,13 +18,13 @@ use crate::operator::ended_at_once;
 use crate::progress::Progress;
 use taught_file::TaughtFile;
 
-/// Default for the largest deviation of waypoints from the motion, rad.
+/// Default of the largest deviation between waypoints and motion, rad.
 const TOLERANCE: f64 = 0.01;
 
-/// Runs a command of the family.
+/// Runs a `jtc teach` command.
 pub(super) fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
-        // The events begin here, so that a note about a file that cannot be opened is an event as well.
+        // The events begin here, so that an error at opening a file is also reported as an event.
         out.stream()?;
     }
     match command {
@@ -65,7 +65,7 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Records until the user or the time ends the recording. With a tolerance (rad), the result is a file of waypoints.
+/// Records until the user or the time ends the recording. If a tolerance (rad) is specified, the result is a file of waypoints.
 fn record(
     file: OutputFile,
     link: &LinkArgs,
@@ -80,7 +80,7 @@ fn record(
     progress.watch(&mut session);
     let status = session.fresh_status()?;
     if stop.asked() {
-        // Teaching would release an arm that the user no longer guides.
+        // The user no longer guides the arm, so Teaching would release an arm without support.
         let message = "cancelled before teaching was switched on".into();
         return Err(Failure { message, ..Failure::of(&jtc_host::Error::Cancelled) });
     }
@@ -101,15 +101,15 @@ fn record(
             Ok(s) if s.state == ControllerState::Teaching => {
                 match taught.take((session.now() - start).as_secs_f64(), s.positions()) {
                     Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
-                    // If the file is lost, the user does not need to guide the arm any longer. The arm is held, as
-                    // after Ctrl-C.
+                    // If the file is lost, the user does not need to guide the arm any longer. The controller then holds the arm, as after
+                    // Ctrl-C.
                     Err(e) => {
                         lost = Some(e);
                         break;
                     }
                 }
             }
-            // After a Stop of another program the arm is held, and the user can let go of it.
+            // After a Stop of another program the controller holds the arm, and the user can release it.
             Ok(s) => {
                 teaching.store(false, Ordering::Relaxed);
                 failed = Some(taught_no_more(&s));
@@ -121,7 +121,7 @@ fn record(
             }
         }
     }
-    // The recording is completed first, in every state of the link.
+    // The recording is completed first, even if the link is lost.
     let written = lost.map_or_else(|| finish(taught, thin, out), Err);
     if failed.is_none() && !was_on {
         session.teach(false)?;
@@ -138,8 +138,8 @@ fn taught_no_more(status: &Status) -> Failure {
         .next("`jtc teach record FILE` starts a new recording")
 }
 
-/// Handles Ctrl-C. The first one requests the end. The second one ends the command at once and reports the state at
-/// that moment.
+/// Handles Ctrl-C. Handles signals. The first signal requests the end of the command. The second signal ends the command at once and
+/// reports the state at that moment.
 fn stop_at_once_with(
     out: Output,
     teaching: Arc<AtomicBool>,

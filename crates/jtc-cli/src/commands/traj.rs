@@ -1,4 +1,4 @@
-//! `jtc traj check`, `info`, `speed`: trajectories from files, and the one being executed.
+//! `jtc traj check`, `info`, `speed`: commands for trajectories in files, and for the trajectory that is executed.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use super::plan::{margin_line, note_low_margin};
 use super::{continued, halt, resume, run};
 use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
 
-/// Runs a command of the family.
+/// Runs a `jtc traj` command.
 pub(super) fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TrajCommand::Check { file, check: args, payload } => {
@@ -33,7 +33,7 @@ pub(super) fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     }
 }
 
-/// Runs the motion of a recording.
+/// Executes the motion of a recording.
 fn replay(args: &RunArgs, measured: bool, out: &Output) -> Result<(), Failure> {
     let recorded = if measured { Loaded::load_measured(&args.file) } else { Loaded::load(&args.file, None) }?;
     if recorded.form != Form::Recording {
@@ -99,7 +99,7 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
-        // If the check fails, the margin is not printed, because the problems are the reason.
+        // If the check fails, the command prints the problems and not the margin.
         let margin = margin_line(verdict.margin.filter(|_| verdict.is_ok()));
         format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.plain(FrontEnd::Command))
     });

@@ -1,5 +1,4 @@
-//! Splits the controller's bytes into complete statuses, so that a host that connects later never receives a part of a
-//! status.
+//! Splits the controller's bytes into complete statuses, so that a host that connects later never receives an incomplete status.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -9,11 +8,11 @@ use jtc_wire::{FRAME_MAX, HEADER, STATUS_LEN};
 /// First bytes of each status.
 const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8];
 
-/// Silence that ends a frame (J-03).
+/// Duration of the silence that ends a frame (J-03).
 pub(super) const GAP: Duration = Duration::from_millis(5);
-/// Smallest size of the first piece when the operating system passes a long write to a terminal in pieces, bytes.
+/// Smallest size of the first part if the operating system splits a long write to a terminal, bytes.
 const PIECE: usize = 2048;
-/// Time of a byte on a serial line of 115,200 baud.
+/// Transmission time of a byte on a serial line at 115,200 Bd.
 const BYTE: Duration = Duration::from_micros(87);
 
 /// Received bytes, and the complete frames.
@@ -24,7 +23,7 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Takes bytes. Bytes that are not a status (from a disturbed line) are passed on unchanged.
+    /// Takes bytes. Adds received bytes. Bytes that are not a status (from a disturbed line) are passed on unchanged.
     pub(super) fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let n = self.partial.len();
@@ -50,34 +49,34 @@ impl Frames {
         }
     }
 
-    /// Returns `true` if no frame is complete.
+    /// Returns `true` if no complete frame is available.
     pub(super) fn is_empty(&self) -> bool {
         self.whole.is_empty()
     }
 
-    /// Takes the oldest frame.
+    /// Removes and returns the oldest frame.
     pub(super) fn pop(&mut self) -> Option<Vec<u8>> {
         self.whole.pop_front()
     }
 }
 
-/// Follows the host's bytes to determine if a frame is incomplete, and since when its next byte is missing.
+/// Tracker of the bytes of the host. It determines if a frame is incomplete, and since when its next byte is missing.
 ///
-/// With `--speed max`, and while the simulator makes up for a delay, virtual time passes faster than the host's time. A
-/// gap between two pieces of a frame must then not become longer than it was for the host.
+/// With `--speed max`, and while the simulator makes up for a delay, virtual time passes faster than the host's time. A gap between two
+/// parts of a frame must then not become longer than it was for the host.
 ///
-/// A busy system can suspend a host between two pieces of one write for longer than the gap that ends a frame. On a
-/// real line the adapter would still be sending the bytes in its buffer. So in a long frame, the silence begins only
-/// after a real line would have sent the received bytes.
+/// A busy operating system can suspend a host within one write for longer than the silence that ends a frame. On a real serial line, the
+/// adapter would still be sending the bytes in its buffer. In a long frame, the silence therefore begins only after a real serial line
+/// would have sent the received bytes.
 pub(super) struct Incoming {
     head: Vec<u8>,
     /// Number of received bytes of the current frame.
     come: usize,
     /// Number of missing bytes of the current frame.
     missing: usize,
-    /// `true` if bytes have arrived that continue a frame.
+    /// `true` if the received bytes continue a frame.
     continued: bool,
-    /// Time at which the line carried the last byte. For a long frame, this is the time on a real serial line.
+    /// Time at which the last byte was sent on the simulated line. For a long frame, the value is the time on a real serial line.
     heard: Instant,
 }
 
@@ -87,7 +86,7 @@ impl Incoming {
         Self { head: Vec::new(), come: 0, missing: 0, continued: false, heard: now }
     }
 
-    /// Takes bytes of the host that arrived at `now`.
+    /// Processes bytes of the host that arrived at `now`.
     pub(super) fn push(&mut self, bytes: &[u8], now: Instant) {
         self.continued |= self.mid_frame();
         for &byte in bytes {
@@ -117,7 +116,7 @@ impl Incoming {
         };
     }
 
-    /// Notes that the line carries bytes at `now`.
+    /// Records that bytes are being sent on the simulated line at `now`.
     pub(super) fn carries(&mut self, now: Instant) {
         self.heard = self.heard.max(now);
     }
@@ -206,7 +205,7 @@ mod tests {
         let mut incoming = Incoming::new(start);
         let mut frame = vec![0; 9006];
         frame[..4].copy_from_slice(&[HEADER, 0x04, 0x23, 0x2E]);
-        // The host is suspended after it has sent 2,048 bytes, which take 178 ms on a line.
+        // The host is suspended after it has sent 2,048 bytes, which take 178 ms on a serial line.
         incoming.push(&frame[..2048], start);
         assert_eq!(incoming.silence(start), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
@@ -217,7 +216,7 @@ mod tests {
         incoming.carries(later(171));
         assert_eq!(incoming.silence(later(171)), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(176)), None, "the credit ends with the frame");
-        // If the host ends there, the later time is silence. For a short frame, the simulator does not wait.
+        // If the host does not send the remaining bytes, the later time counts as silence. For a short frame, the simulator does not wait.
         incoming.push(&frame[..2048], later(170));
         assert!(incoming.silence(later(300)).is_some() && incoming.silence(later(400)).is_none());
         incoming.push(&frame[..2047], later(600));

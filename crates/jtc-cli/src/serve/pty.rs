@@ -1,4 +1,4 @@
-//! Pseudo-terminal that looks like a serial port, under a name of the user's choice.
+//! Pseudo-terminal that behaves like a serial port, with a name that the user chooses.
 
 use std::fmt;
 use std::fs;
@@ -13,17 +13,17 @@ use rustix::io::Errno;
 use rustix::pty::OpenptFlags;
 use rustix::termios::{LocalModes, OptionalActions, OutputModes, QueueSelector};
 
-/// Reason why the terminal cannot be used.
+/// Reason why the pseudo-terminal cannot be used.
 #[derive(Debug)]
 pub(crate) enum PtyError {
-    /// A file that must not be replaced already exists at the path.
+    /// Existing file at the path that must not be replaced.
     Taken {
         /// The requested path.
         path: PathBuf,
         /// Kind of the existing file.
         what: &'static str,
     },
-    /// The operating system refused.
+    /// Operation that the operating system refused.
     Io {
         /// Failed operation.
         what: &'static str,
@@ -49,7 +49,7 @@ fn fails(what: &'static str) -> impl Fn(Errno) -> PtyError {
     move |e| PtyError::Io { what, source: e.into() }
 }
 
-/// The controller's end of a pseudo-terminal, and the symbolic link to the host's end.
+/// Controller side of a pseudo-terminal, and the symbolic link to its host side.
 pub(crate) struct Pty {
     master: OwnedFd,
     slave: PathBuf,
@@ -57,8 +57,8 @@ pub(crate) struct Pty {
 }
 
 impl Pty {
-    /// Creates a pseudo-terminal in raw mode, with `link` as a symbolic link to it. Replaces a link that an earlier run
-    /// has left, but no other file.
+    /// Creates a pseudo-terminal in raw mode, with `link` as a symbolic link to it. Replaces a link that an earlier simulator has created,
+    /// but does not replace other files.
     pub(crate) fn open(link: Option<&Path>) -> Result<Self, PtyError> {
         if let Some(link) = link {
             check_free(link)?;
@@ -69,14 +69,14 @@ impl Pty {
         Ok(pty)
     }
 
-    /// Returns the name that a host opens.
+    /// Returns the path that a host opens.
     pub(crate) fn name(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.slave)
     }
 
     fn put_link(&self) -> Result<(), PtyError> {
         let Some(link) = &self.link else { return Ok(()) };
-        // The new link is renamed over the old one, so that the link always exists.
+        // Renaming the new link replaces the old link, so that a link always exists.
         let name = link.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let new = link.with_file_name(format!(".{name}.{}", std::process::id()));
         let _ = fs::remove_file(&new);
@@ -85,17 +85,17 @@ impl Pty {
             .map_err(|source| PtyError::Io { what: "symbolic link", source })
     }
 
-    /// Reads the available bytes. Returns 0 without bytes, or if no host has the port open.
+    /// Reads the available bytes. Returns 0 if no bytes are available, or if no host has opened the port.
     pub(crate) fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         match rustix::io::read(&self.master, buffer) {
             Ok(n) => Ok(n),
-            // EIO: the other end is not open.
+            // The error EIO means that no host has opened the port.
             Err(Errno::AGAIN | Errno::IO | Errno::INTR) => Ok(0),
             Err(e) => Err(fails("read")(e)),
         }
     }
 
-    /// Writes as many bytes as fit.
+    /// Writes as many bytes as the terminal accepts.
     pub(crate) fn write(&self, bytes: &[u8]) -> Result<usize, PtyError> {
         match rustix::io::write(&self.master, bytes) {
             Ok(n) => Ok(n),
@@ -104,7 +104,7 @@ impl Pty {
         }
     }
 
-    /// Returns `true` if a host has the port open.
+    /// Returns `true` if a host has opened the port.
     pub(crate) fn host_is_there(&self) -> Result<bool, PtyError> {
         Ok(!self.poll(PollFlags::IN, Duration::ZERO)?.contains(PollFlags::HUP))
     }
@@ -178,8 +178,7 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     rustix::pty::unlockpt(&master).map_err(fails("unlock the pseudo-terminal"))?;
     let name = rustix::pty::ptsname(&master, Vec::new()).map_err(fails("name of the pseudo-terminal"))?;
     let slave = PathBuf::from(name.to_string_lossy().into_owned());
-    // The host's end is opened once, so that it is in raw mode before a host connects. After that, a missing host is
-    // reported as a hang-up.
+    // The host side is opened once, so that it is in raw mode before a host connects. After that, a missing host is reported as a hang-up.
     let open = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let first = rustix::fs::open(&slave, open, Mode::empty()).map_err(fails("open the host's end"))?;
     raw(&first).map_err(fails("raw mode"))?;
@@ -188,8 +187,8 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     Ok((master, slave))
 }
 
-/// Checks that a path is free, or contains a link that an earlier simulator has left. Such a link is dangling, or leads
-/// to a pseudo-terminal that another program uses by now.
+/// Checks that a path is free, or contains a link that an earlier simulator has created. The target of such a link is missing, or is a
+/// pseudo-terminal that another program uses now.
 fn check_free(path: &Path) -> Result<(), PtyError> {
     let taken = |what| Err(PtyError::Taken { path: path.to_owned(), what });
     match fs::symlink_metadata(path) {
@@ -204,8 +203,8 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
     }
 }
 
-/// Returns `true` if a program uses this pseudo-terminal as a serial port: it is open and raw, unlike the terminal of a
-/// shell. A terminal that a host has locked is also in use.
+/// Returns `true` if a program uses this pseudo-terminal as a serial port. It is then open and in raw mode, unlike the terminal of a shell.
+/// A terminal that a host has locked is also in use.
 fn serves(terminal: &Path) -> bool {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
     match rustix::fs::open(terminal, flags, Mode::empty()) {

@@ -8,7 +8,7 @@ use jtc_host::trajectory::Loaded;
 use jtc_sim::{HandPath, TypedEvent, World};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-/// Interval at which the program checks if it is in the foreground of its terminal.
+/// Interval at which the program checks if it is the foreground program of its terminal.
 const LOOK: Duration = Duration::from_millis(200);
 /// Longest line.
 const LINE_MAX: usize = 4096;
@@ -26,8 +26,8 @@ impl Typed {
         Self { lines }
     }
 
-    /// Applies the lines typed since the last call to `world`. Invalid lines are reported on stderr and have no effect
-    /// on the arm.
+    /// Applies the lines that were typed since the last call to `world`. Invalid lines are reported on stderr and have no effect on the
+    /// arm.
     pub(crate) fn act(&self, world: &mut World) {
         while let Ok(line) = self.lines.try_recv() {
             match TypedEvent::parse(&line).map_err(|e| e.to_string()) {
@@ -52,7 +52,7 @@ fn happen(event: &TypedEvent, world: &mut World) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns the joint positions of a trajectory file as the path of a hand that leads the arm.
+/// Returns the joint positions of a trajectory file as the path of a hand that guides the arm.
 pub(crate) fn hand(path: &Path) -> Result<HandPath, String> {
     let trajectory = Loaded::load(path, None).map_err(|e| format!("hand: {e}"))?.trajectory;
     let points = trajectory.points.iter().map(|point| point.position).collect();
@@ -62,8 +62,8 @@ pub(crate) fn hand(path: &Path) -> Result<HandPath, String> {
 
 /// Passes the lines of the standard input to `take` until it returns `false` or the input ends.
 ///
-/// The system stops a program in the background that reads from its terminal (SIGTTIN). So the thread reads only when
-/// input is available, and not while another program is in the foreground.
+/// The system stops a program in the background that reads from its terminal (SIGTTIN). The thread therefore reads only when input is
+/// available and no other program is in the foreground.
 fn read(mut take: impl FnMut(String) -> bool) {
     let stdin = rustix::stdio::stdin();
     let (mut line, mut buffer) = (Vec::new(), [0; 512]);

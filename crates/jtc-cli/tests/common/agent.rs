@@ -1,4 +1,4 @@
-//! Agent (`jtc serve`) with its own directories for tokens and other files.
+//! Agent (`jtc serve`) with separate directories for tokens and other files.
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -8,15 +8,14 @@ use serde_json::Value;
 
 use super::{command, slow_motion};
 
-/// Returns a `jtc` command that keeps its state and sockets in this directory.
+/// Returns a `jtc` command that stores its state and sockets in this directory.
 pub(crate) fn command_in(dir: &tempfile::TempDir) -> Command {
     let mut command = command();
     command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
     command
 }
 
-/// Starts an agent with these options at a free port of this computer. When it is ready, returns the process and its
-/// output.
+/// Starts an agent with these options at a free port of this computer. Returns the process and its output when the agent is ready.
 pub(crate) fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child, Value) {
     let mut child = command_in(dir)
         .args(["--json", "serve", "--listen", "127.0.0.1:0"])
@@ -32,7 +31,7 @@ pub(crate) fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> 
     (child, ready)
 }
 
-/// Running agent, which ends with the test.
+/// Running agent, which is stopped at the end of the test.
 pub(crate) struct Agent {
     pub child: Child,
     pub url: String,
@@ -45,7 +44,7 @@ impl Agent {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
 
-    /// Like `start`, in a directory that may hold files of another agent.
+    /// Like `start`, in a directory that may contain files of another agent.
     pub(crate) fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let (child, ready) = serve(&dir, options);
         Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
@@ -70,7 +69,7 @@ impl Agent {
         file.to_str().expect("a name").to_owned()
     }
 
-    /// Ends the agent with this signal. Returns its exit code and its directory.
+    /// Stops the agent with this signal. Returns the exit code and the directory of the agent.
     pub(crate) fn end(mut self, signal: &str) -> (Option<i32>, tempfile::TempDir) {
         Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
         let code = self.child.wait().expect("it ends").code();

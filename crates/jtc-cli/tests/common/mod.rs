@@ -1,4 +1,4 @@
-//! Runs the `jtc` command like a user, and a simulated controller that it can connect to.
+//! Runs the `jtc` command like a user, and a simulated controller for this command.
 
 pub(crate) mod agent;
 
@@ -14,7 +14,7 @@ pub(crate) fn command() -> Command {
     program(env!("CARGO_BIN_EXE_jtc"), "JTC_")
 }
 
-/// Runs `jtc` with these words.
+/// Runs `jtc` with these arguments.
 pub(crate) fn jtc(words: &[&str]) -> CommandOutput {
     jtc_with(words, "")
 }
@@ -24,7 +24,7 @@ pub(crate) fn jtc_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
 
-/// A directory with files.
+/// Temporary directory for the files of a test.
 pub(crate) struct Dir(tempfile::TempDir);
 
 impl Dir {
@@ -37,7 +37,7 @@ impl Dir {
         self.0.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// Creates a file in it.
+    /// Creates a file in the directory.
     pub(crate) fn file(&self, name: &str, text: &str) -> String {
         std::fs::write(self.path(name), text).expect("a file");
         self.path(name)
@@ -49,7 +49,7 @@ impl Dir {
     }
 }
 
-/// Simulated controller on a pseudo-terminal, which ends with the test.
+/// Simulated controller on a pseudo-terminal, which is stopped at the end of the test.
 pub(crate) struct Sim {
     child: Child,
     stderr: BufReader<std::process::ChildStderr>,
@@ -93,7 +93,7 @@ impl Sim {
         Self::start_in(dir, &[options, &["--faults", file.to_str().unwrap()]].concat())
     }
 
-    /// Makes the controller use its default parameters.
+    /// Sets the default parameters of the controller.
     pub(crate) fn with_parameters(self) -> Self {
         self.jtc(&["params", "use-defaults"]).ends(0);
         self
@@ -117,40 +117,40 @@ impl Sim {
         run(self.command(words), &[], "")
     }
 
-    /// Returns the answer of `jtc --json` with these words. Panics if the exit code is not `code`.
+    /// Returns the JSON output of `jtc --json` with these arguments. Panics if the exit code is not `code`.
     pub(crate) fn json(&self, words: &[&str], code: i32) -> Value {
         self.jtc(&[&["--json"], words].concat()).ends(code).json()
     }
 
-    /// Creates a file in its directory.
+    /// Creates a file in the directory of the simulator.
     pub(crate) fn file(&self, name: &str, text: &str) -> String {
         std::fs::write(self.path(name), text).expect("a file");
         self.path(name)
     }
 
-    /// Types a line on its standard input.
+    /// Writes a line to the standard input of the simulator.
     pub(crate) fn write_line(&mut self, line: &str) {
         writeln!(self.child.stdin.as_mut().expect("stdin"), "{line}").expect("it reads");
     }
 
-    /// Waits for the next line of its stderr.
+    /// Waits for the next line on the stderr of the simulator, and returns the line.
     pub(crate) fn error_line(&mut self) -> String {
         let mut line = String::new();
         self.stderr.read_line(&mut line).expect("a line");
         line
     }
 
-    /// Returns its process id.
+    /// Returns the process id of the simulator.
     pub(crate) fn pid(&self) -> String {
         self.child.id().to_string()
     }
 
-    /// Returns a path in its directory.
+    /// Returns a path in the directory of the simulator.
     pub(crate) fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// Sends a signal, waits for the end and returns the exit code.
+    /// Sends a signal to the simulator, waits for its end, and returns the exit code.
     pub(crate) fn end(mut self, signal: &str) -> (i32, bool) {
         let pid = self.child.id().to_string();
         Command::new("kill").args([signal, &pid]).status().expect("kill");
@@ -184,7 +184,7 @@ pub(crate) fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::proc
     moving_after(sim, words, "", seconds)
 }
 
-/// Like [`moving_while`], for the motion after a line with this text.
+/// Like [`moving_while`], for the motion that begins after an output line with this text.
 pub(crate) fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std::process::Child {
     let mut child = sim
         .command(&[&["--json"], words].concat())

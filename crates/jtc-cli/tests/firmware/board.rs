@@ -20,7 +20,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 /// Bytes of the program in an image of [`super::image`].
 const PROGRAM: usize = 0x1000;
 
-/// Returns the program data that a board with this image in flash reports. Computed bit by bit, as in the definition.
+/// Returns the program data that a board with this image in flash reports. The checksum is computed bit by bit, as in its definition.
 pub(super) fn program_of(image: &[u8]) -> Program {
     let mut register = u32::MAX;
     for byte in &image[..PROGRAM] {
@@ -32,7 +32,7 @@ pub(super) fn program_of(image: &[u8]) -> Program {
     Program { bytes: PROGRAM as u32, crc32: !register }
 }
 
-/// Processor and ST-LINK of a board. Both end when this is dropped.
+/// Processor and ST-LINK of a board. Both stop when this value is dropped.
 pub(super) struct Board {
     /// Its serial port.
     pub port: String,
@@ -46,12 +46,13 @@ struct Flashed {
     status: Status,
     program: Option<Program>,
     started: Instant,
-    /// Time that it had run before the test began, ms.
+    /// Operating time of the processor before the start of the test, ms.
     before_ms: u64,
 }
 
 impl Board {
-    /// Creates a board with an arm without torque, and a drive at this folder that accepts an image of this length.
+    /// Creates a board whose arm is without torque. The folder `drive` is the USB drive of the board and accepts an image of `length`
+    /// bytes.
     pub(super) fn new(board: &str, drive: &Path, length: usize) -> Self {
         let (master, port) = pseudo_terminal();
         let mut status = Status { state: ControllerState::Init.into(), ..Status::default() };
@@ -75,7 +76,7 @@ impl Board {
         Self { port, flashed, stop, thread: Some(thread) }
     }
 
-    /// Sets the status that it sends from now on.
+    /// Changes the status that the board sends after this call.
     pub(super) fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.flashed.lock().unwrap().status);
     }
@@ -104,7 +105,7 @@ impl Running {
         let few_ms = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
         let _ = poll(&mut ends, Some(&few_ms));
         if ends[0].revents().contains(PollFlags::HUP) {
-            // No program has the port open.
+            // No program has opened the port.
             thread::sleep(Duration::from_millis(5));
         } else {
             self.serve();
@@ -152,13 +153,13 @@ impl Running {
     }
 }
 
-/// Creates a drive at this folder.
+/// Creates a USB drive at this folder.
 pub(super) fn appear(drive: &Path) {
     fs::create_dir_all(drive).unwrap();
     fs::write(drive.join("DETAILS.TXT"), "Version: V3J13M4B5S1\n").unwrap();
 }
 
-/// Returns the board's end of a line, and the name of the other end.
+/// Creates a pseudo-terminal. Returns the side of the board, and the path of the other side.
 fn pseudo_terminal() -> (OwnedFd, String) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).and_then(|()| unlockpt(&master)).unwrap();

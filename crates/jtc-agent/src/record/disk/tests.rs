@@ -35,8 +35,7 @@ fn files(dir: &tempfile::TempDir) -> Vec<PathBuf> {
     all
 }
 
-/// A blocked disk delays no other thread, and lost samples are counted. The queue always has a place for the end of a
-/// recording.
+/// A blocked disk does not delay other threads, and lost samples are counted. The queue always has a free entry for the end of a recording.
 #[test]
 fn what_finds_no_room_is_counted() {
     let (mut disk, messages) = Disk::new();

@@ -15,7 +15,7 @@ use crate::args::{AcceptArgs, LinkArgs, OverwriteArgs};
 use crate::limits;
 use crate::link::LinkPort;
 
-/// Sends all parameters of the arm to the controller.
+/// Sends all parameters of the arm in a file to the controller.
 pub(super) fn push(
     file: &Path,
     store: bool,
@@ -81,7 +81,7 @@ fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }
 
-/// Returns the failure of a refused setting, with a hint that the controller accepts settings only in Init and Error.
+/// Returns the failure if the controller refused a setting. The hint says that the controller accepts settings only in Init and Error.
 fn refused(error: Error, arm: &Arm) -> Failure {
     let failure = Failure::of(&error);
     match error {
@@ -123,7 +123,7 @@ fn without_extensions(
     Ok(())
 }
 
-/// Writes the controller's arm to a file.
+/// Reads the arm of the controller and writes it to a file.
 pub(super) fn pull(
     file: &Path,
     overwrite: OverwriteArgs,

@@ -1,4 +1,4 @@
-//! `jtc arm import`: an arm file from a robot description.
+//! `jtc arm import`: creates an arm file from a robot description.
 
 use std::collections::BTreeMap;
 
@@ -41,7 +41,7 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Lists the changes by kind. A change that several joints have in common is listed in one line.
+/// Lists the changes of the import, grouped by kind. If several joints have the same change, they are listed in one line.
 fn changes(warnings: &[Warning]) -> String {
     let mut kinds: BTreeMap<Change, Vec<(&str, Vec<&str>)>> = BTreeMap::new();
     for w in warnings {
@@ -65,7 +65,7 @@ fn changes(warnings: &[Warning]) -> String {
     text
 }
 
-/// Shows the proposed values: a row for each value, a column for each joint.
+/// Formats the proposed values as a table with a row for each value and a column for each joint.
 fn as_table(values: &[ArmValue]) -> String {
     let mut rows: Vec<(&ArmValue, [String; 6])> = Vec::new();
     for v in values {

@@ -8,7 +8,7 @@ use serde_json::json;
 /// Degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// Shows the arm. `name` is its file, or the controller that it was read from.
+/// Shows the arm. Prints the parameters. `name` is the file or the controller from which the arm was read.
 pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(), Failure> {
     let mut values = arm.values();
     if deg {
@@ -52,7 +52,7 @@ pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(),
     Ok(())
 }
 
-/// Converts the value to degrees, if it is an angle or its rate.
+/// Converts the value to degrees if it is an angle or an angular rate.
 fn in_degrees(v: &mut ArmValue) {
     let unit = match v.unit {
         "rad" => "°",
@@ -104,7 +104,7 @@ fn gravity(values: &[ArmValue]) -> String {
     format!("gravity: {own} m/s² in the frame of the base, default {default}, from: {from}\n")
 }
 
-/// Returns a row for each parameter of the joints.
+/// Formats each joint parameter as a row.
 fn by_joint(values: &[ArmValue]) -> String {
     let of_joints = |v: &&ArmValue| v.joint.is_some() && v.link.is_none();
     let mut names: Vec<&str> = Vec::new();
@@ -138,7 +138,7 @@ fn source(all: &[&ArmValue]) -> String {
     sources.join(", ")
 }
 
-/// Returns settings of the controller that belong to no joint.
+/// Formats the settings of the controller that do not belong to a joint.
 fn of_controller(values: &[ArmValue]) -> String {
     let own = |v: &&ArmValue| v.joint.is_none() && v.link.is_none() && !v.name.starts_with("gravity");
     let row = |v: &ArmValue| {
@@ -155,7 +155,7 @@ fn of_controller(values: &[ArmValue]) -> String {
     table(&["", ">value", "unit", "range", ">default", "from"], &rows)
 }
 
-/// Returns a row for each pose.
+/// Formats each pose as a row.
 pub(crate) fn poses(arm: &Arm, deg: bool) -> String {
     let row = |(name, position): (&String, &[f64; 6])| {
         let cells = position.iter().map(|v| number(if deg { v * DEGREES } else { *v }));

@@ -1,4 +1,4 @@
-//! Joints and gripper as rows of the live view.
+//! Rows of the live view for the joints and the gripper.
 
 use cli_kit::figure;
 use cli_kit::view::panel;
@@ -11,7 +11,7 @@ use ratatui::widgets::{Cell, Row, Table};
 
 use super::super::status::{gripper_answers, gripper_state, joint_state};
 
-/// Colours of the joints, as in the report.
+/// Colours of the joints, which are equal to those of the report.
 pub(super) const COLOURS: [Color; 6] = [
     Color::Rgb(122, 165, 255),
     Color::Rgb(255, 157, 87),
@@ -21,7 +21,7 @@ pub(super) const COLOURS: [Color; 6] = [
     Color::Rgb(227, 200, 76),
 ];
 
-/// A column: head, width, and the smallest width of the view at which it is shown.
+/// Column with its heading, its width, and the smallest width of the view at which it is shown.
 type Column = (&'static str, u16, u16);
 
 const COLUMNS: [Column; 7] = [
@@ -33,10 +33,10 @@ const COLUMNS: [Column; 7] = [
     ("  °C", 4, 58),
     ("", 8, 76),
 ];
-/// Columns before the words of a joint, with the spaces between them.
+/// Number of characters before the error texts of a joint.
 const WITH_WORDS: u16 = 56;
 
-/// Returns the number of rows.
+/// Returns the number of rows of the table.
 pub(super) fn count(s: &Status) -> usize {
     s.joints.len() + usize::from(s.gripper.is_some())
 }
@@ -47,7 +47,7 @@ fn is_broken(s: &Status, j: usize) -> bool {
     joint.state.is_fault() || joint.errors != 0 || joint.internal != 0 || joint.mc_current != 0
 }
 
-/// Returns as many words as fit, and the number of words left out. The head of the view shows all of them.
+/// Returns as many error texts as fit into the width, and the number of omitted texts. The head of the view shows all texts.
 fn fitting(words: &[&str], width: usize) -> String {
     for count in (1..=words.len()).rev() {
         let more = words.len() - count;
@@ -59,8 +59,8 @@ fn fitting(words: &[&str], width: usize) -> String {
     if words.is_empty() { String::new() } else { format!("{} above", words.len()) }
 }
 
-/// Returns all rows: first the joints whose values are unknown, then those with an error. The values of a silent joint
-/// are unknown, because the last ones are outdated. Without statuses all joints are unknown.
+/// Returns all rows. Joints with unknown values come first, then joints with an error. The values of a silent joint are unknown, because
+/// the last received values are outdated. If no statuses arrive, the values of all joints are unknown.
 fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     let room = usize::from(width.saturating_sub(WITH_WORDS));
     let known = |j: usize| !silent && is_measured(s, j);
@@ -136,7 +136,7 @@ pub(super) fn table(s: &Status, silent: bool, width: u16, framed: bool, first: u
     }
     let head = Row::new(COLUMNS.iter().filter(shown).map(|c| {
         let width = usize::from(c.1);
-        // The head of a column of figures is aligned to the right, like the figures.
+        // The heading of a column of numbers is aligned to the right, like the numbers.
         if c.0 == "state" { c.0.to_owned() } else { format!("{:>width$}", c.0) }
     }));
     let table = Table::new(rows(s, silent, width).into_iter().skip(first), widths).header(head.dark_gray());

@@ -1,6 +1,6 @@
-//! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first. In the
-//! table, unmeasured joints come first. Text that does not fit can be scrolled, and the keys are always visible. The
-//! curves fill the remaining space.
+//! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first. The first rows of the table
+//! are the joints without measured values. Text that does not fit can be scrolled, and the keys are always visible. The position curves
+//! fill the remaining space.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -18,13 +18,13 @@ use ratatui::widgets::{Paragraph, Sparkline};
 
 use super::joints::{self, COLOURS};
 
-/// Number of values that the curves show: 8 s of statuses.
+/// Number of values that the curves show, which is 8 s of statuses.
 const HISTORY: usize = 200;
-/// Smallest height of the view, in rows, with a row for a good link.
+/// Smallest height of the view, in rows, at which a row shows a link without faults.
 const LINK: u16 = 16;
 /// Smallest height of the curves.
 const CURVES: u16 = 6;
-/// Smallest number of joint rows with their head, for any number of errors.
+/// Smallest number of table rows, including the heading, for any number of errors.
 const LEAST_ROWS: u16 = 3;
 /// Key help. A terminal that is too small shows only the first key.
 const KEYS: &str = "s stops   q ends";
@@ -37,13 +37,13 @@ pub(super) struct View {
     pub silent: Option<Duration>,
     /// Statuses per second.
     pub rate: f64,
-    /// Bytes outside of frames.
+    /// Number of received bytes that do not belong to a valid frame.
     pub bad_bytes: u64,
     /// Result of the last key, shown until the next key is pressed.
     pub reply: String,
-    /// Scroll positions of causes and joints.
+    /// Scroll positions of the causes and the joints.
     pub scroll: Scroll,
-    /// Last positions of each joint. NaN: the joint was not measured.
+    /// Last positions of each joint. The value is NaN if the joint was not measured.
     position: [VecDeque<f64>; 6],
     torque: [VecDeque<f64>; 6],
 }
@@ -87,7 +87,7 @@ impl View {
         Failure { message, ..failure }
     }
 
-    /// Draws all parts that fit.
+    /// Draws all parts of the view that fit.
     pub(super) fn draw(&mut self, frame: &mut Frame<'_>) {
         if too_small(frame, KEYS) {
             return;
@@ -97,7 +97,7 @@ impl View {
         let edge = if framed { 2 } else { 0 };
         let inner = area.width.saturating_sub(2 * edge);
         let head = self.head(inner, frame.area().height >= LINK);
-        // The joints always have some rows. With enough space they have all their rows.
+        // The joint table always has some rows. If enough space is available, the table shows all rows.
         let rows = if framed { 8 } else { LEAST_ROWS };
         let most = area.height.saturating_sub(head.len() as u16 + rows + 3 * edge);
         let (trouble, rest) = self.trouble().lines(inner, most.into());
@@ -124,7 +124,7 @@ impl View {
         frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
     }
 
-    /// Draws the causes that do not fit above, and the joints. Rows that do not fit can be scrolled.
+    /// Draws the joints, and the causes that do not fit into the head. Rows that do not fit can be scrolled.
     fn rows(&mut self, frame: &mut Frame<'_>, area: Rect, rest: Vec<Line<'static>>, framed: bool) {
         let Some(s) = &self.last else { return };
         let (edge, heads) = (if framed { 2 } else { 0 }, 1);
@@ -136,13 +136,13 @@ impl View {
             Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(area);
         frame.render_widget(Paragraph::new(above), causes);
         let (inner, skip) = (area.width.saturating_sub(2 * edge), first.saturating_sub(rest.len()));
-        // A head without a row below it is useless.
+        // A table heading without a row is useless.
         if table.height > heads + edge {
             frame.render_widget(joints::table(s, self.silent.is_some(), inner, framed, skip), table);
         }
     }
 
-    /// Returns the lines with the state, the place on the trajectory, and the link.
+    /// Returns the lines with the state, the position on the trajectory, and the link.
     fn head(&self, width: u16, link: bool) -> Vec<Line<'static>> {
         let Some(s) = &self.last else { return vec![Line::from(self.port.clone()).dark_gray()] };
         if self.silent.is_some() {

@@ -5,7 +5,7 @@ use ratatui::backend::TestBackend;
 
 use super::*;
 
-/// Sizes of terminals, from the smallest on.
+/// Terminal sizes, smallest first.
 const SIZES: [(u16, u16); 6] = [(40, 12), (60, 20), (80, 24), (90, 28), (120, 40), (200, 60)];
 
 /// Returns the status of a held arm whose joint 3 does not answer.
@@ -51,7 +51,7 @@ fn scrolled(view: &mut View, size: (u16, u16)) -> Vec<String> {
     }
 }
 
-/// Joins rows without their frames, so that wrapped words are found.
+/// Joins rows without their borders, so that the test can find wrapped texts.
 fn joined(rows: &[String]) -> String {
     let words: Vec<&str> = rows.iter().flat_map(|row| row.split_whitespace()).filter(|w| *w != "│").collect();
     words.join(" ")
@@ -64,7 +64,7 @@ fn a_joint_without_measurement_has_no_number_and_is_named_first() {
         let rows = drawn(&mut view, size);
         let text = rows.join("\n");
         let place = |words: &str| rows.iter().position(|row| row.contains(words));
-        // The failure comes first, then the next command, then state and joints.
+        // The view shows the failure first, then the next command, then the state and the joints.
         let named = place("joint 3 does not answer").unwrap_or_else(|| panic!("not named\n{text}"));
         let (next, state) = (place("next: jtc recover").unwrap(), place(" Error ").unwrap());
         assert!(named <= 1 && named < next && next < state, "{size:?}\n{text}");
@@ -81,8 +81,7 @@ fn a_joint_without_measurement_has_no_number_and_is_named_first() {
     }
 }
 
-/// For any number of errors, the view shows the first cause and the next command completely, and the user can scroll to
-/// the rest.
+/// For any number of errors, the view shows the first cause and the next command completely, and the user can scroll to the remaining rows.
 #[test]
 fn no_cause_is_cut_and_none_vanishes() {
     let mut s = Status {
@@ -117,8 +116,7 @@ fn no_cause_is_cut_and_none_vanishes() {
     }
 }
 
-/// A joint with a fault is the first row of the table. Words that fit are shown completely, and a number tells how many
-/// others there are.
+/// A joint with a fault is the first row of the table. Texts that fit are shown completely, and a number shows how many texts are omitted.
 #[test]
 fn a_joint_with_a_fault_leads_the_table() {
     let mut s = Status { state: ControllerState::Error.into(), errors: 0x98, ..Status::default() };
@@ -159,7 +157,7 @@ fn every_cause_is_explained() {
     }
 }
 
-/// Values from before the silence are not shown as current.
+/// Values from before the silence are not shown as present values.
 #[test]
 fn a_silent_controller_shows_no_old_value() {
     for size in SIZES {

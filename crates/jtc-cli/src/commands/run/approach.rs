@@ -13,7 +13,7 @@ pub(super) fn note(duration_s: f64, course: &Course, speed: MoveSpeed, out: &Out
     out.note(format!("approach: {duration_s:.1} s to the first point{of_speed}"));
 }
 
-/// Returns the failure of a run whose approach is not possible. With `--json`, prints its verdict.
+/// Returns the failure of a run if its approach is not possible. With `--json`, prints the verdict on the approach.
 pub(super) fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Failure {
     let verdict = match error {
         ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
@@ -31,7 +31,7 @@ pub(super) fn not_possible(error: ApproachError, course: &Course, out: &Output) 
     Failure::shown(failure.kind)
 }
 
-/// Returns the failure of the path to the first point. The trajectory itself is valid.
+/// Returns the failure for a refused path to the first point. The trajectory itself is valid.
 fn refused(why: &str, file: &str) -> Failure {
     let message = format!("the straight path from the arm to the first point of {file} is refused: {why}");
     let hint = format!(

@@ -1,4 +1,4 @@
-//! End of a run: its files, its figures, and the exit code.
+//! End of a run, with the output files, the results and the exit code.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ use super::super::run_report;
 use super::terminal::{Reel, Taken};
 use crate::link::LinkPort;
 
-/// Largest number of motions whose figures are kept, so that many runs do not fill the memory of a PC.
+/// Largest number of motions whose results are kept, so that many runs do not fill the memory of a PC.
 const KEPT: usize = 1000;
 
 /// A finished motion.
@@ -25,13 +25,13 @@ pub(super) struct Done {
     pub summary: Summary,
 }
 
-/// Finished motions: their number, and the figures of the last ones.
+/// Finished motions, with their number and the results of the last motions.
 #[derive(Default)]
 pub(super) struct Finished {
     kept: VecDeque<Done>,
     /// Number of runs, without approaches.
     runs: usize,
-    /// Number of runs and approaches whose figures were dropped.
+    /// Number of runs and approaches whose results were dropped.
     left_out: usize,
 }
 
@@ -85,7 +85,7 @@ pub(super) fn conclude(
     info.ending = Ending { outcome: word.into(), reason, ..Ending::default() };
     let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
-    // A lost file is reported even if the run failed. The failure of the run comes first.
+    // A lost file is reported even if the run failed. The failure of the run is reported first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }
@@ -153,7 +153,7 @@ fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     before.chain([last]).map(value).collect()
 }
 
-/// Returns a line for each motion whose figures are kept, with the values of its worst joint.
+/// Returns a line for each motion whose results are kept, with the values of its worst joint.
 fn each_run(runs: &[Value], left_out: usize) -> String {
     let row = |run: &Value| {
         let worst = |key: &str, scale: f64, digits: usize| {
@@ -183,7 +183,7 @@ mod tests {
 
     use super::*;
 
-    /// 100,000 runs use no more memory than the last thousand, and these keep their run numbers.
+    /// After 100,000 runs, only the results of the last thousand are in memory, with their run numbers.
     #[test]
     fn figures_of_the_last_motions_are_kept() {
         let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);

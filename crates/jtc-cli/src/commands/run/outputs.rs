@@ -10,7 +10,7 @@ use super::Course;
 use crate::failure::output_lost;
 use crate::tape::Tape;
 
-/// Files of a run, which are opened before the run.
+/// Output files of a run, which are opened before the run.
 pub(super) struct Outputs {
     record: Option<OutputFile>,
     report: Option<OutputFile>,
@@ -29,13 +29,13 @@ impl Outputs {
         Ok(Self { record, report })
     }
 
-    /// Begins the recording. If it was begun before, it starts again with an empty file.
+    /// Begins the recording. Begins the recording. If the recording has already begun, it starts again with an empty file.
     pub(super) fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
         self.record.as_mut().map(|file| Tape::begin(file, info, "the motion continues", out)).transpose()
     }
 
-    /// Completes all files. The loss of one file does not affect the other. Returns the names of the complete files,
-    /// and the failures.
+    /// Completes all files. Writes the output files. An error in one file does not affect the other file. Returns the names of the complete
+    /// files, and the failures of the other files.
     pub(super) fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
         let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
         let report =

@@ -1,4 +1,4 @@
-//! A run at the terminal: bars, keys, events for programs, and the recording.
+//! A run at the terminal, with progress bars, keys, events for programs and the recording.
 
 use std::cell::RefCell;
 use std::mem::take;
@@ -30,10 +30,10 @@ use crate::tape::Tape;
 pub(super) struct Reel {
     pub info: RecordingInfo,
     pub tape: Option<Tape>,
-    /// Start of its first motion, on the clock of the session.
+    /// Start of the first motion of the recording, on the clock of the session.
     start: Duration,
-    /// Earliest time of the next sample, s: right after the last sample. The time of a simulator that is faster than real time runs ahead
-    /// of the computer's time.
+    /// Earliest time of the next sample, s, which is directly after the last sample. If a simulator is faster than real time, its clock is
+    /// ahead of the clock of the computer.
     until_s: f64,
 }
 
@@ -43,9 +43,9 @@ impl Reel {
     }
 }
 
-/// Recording and figures of a run.
+/// Recording and results of a run.
 pub(super) struct Taken {
-    /// Motions before the last one.
+    /// Motions before the last motion.
     pub done: Finished,
     /// Samples of the last motion, oldest first, on the clock of the whole run.
     pub samples: Vec<Sample>,
@@ -53,7 +53,7 @@ pub(super) struct Taken {
     pub outputs: Outputs,
 }
 
-/// The command that runs motions.
+/// Terminal of a command that executes motions.
 pub(super) struct Terminal<'a, 'o> {
     course: &'a Course,
     job: &'a Job,
@@ -65,14 +65,14 @@ pub(super) struct Terminal<'a, 'o> {
     /// Recording, which begins with the first motion.
     reel: Option<Reel>,
     done: Finished,
-    /// Bar of the upload or of the motion.
+    /// Progress bar of the upload or of the motion.
     bar: Option<ProgressBar>,
-    /// Samples of the current motion. Their clock starts `offset_s` after the clock of the run.
+    /// Samples of the current motion. The clock of these samples starts `offset_s` after the clock of the run.
     samples: Rc<RefCell<Vec<Sample>>>,
     offset_s: f64,
     /// Samples of the motion that has ended.
     last: Vec<Sample>,
-    /// Runs that have finished.
+    /// Number of runs that have finished.
     runs: u32,
 }
 
@@ -102,15 +102,15 @@ impl<'a, 'o> Terminal<'a, 'o> {
         }
     }
 
-    /// Returns the recording and the figures of the run.
+    /// Returns the recording and the results of the run.
     pub(super) fn taken(self) -> Taken {
         let Self { job, outputs, reel, done, last: samples, .. } = self;
-        // Each motion begins the recording before the arm moves.
+        // The recording begins before the arm moves.
         let reel = reel.unwrap_or_else(|| Reel::new(RecordingInfo::of(&job.arm), None, Duration::ZERO));
         Taken { done, samples, reel, outputs }
     }
 
-    /// Begins the recording with the first motion. Returns the sink of its samples.
+    /// Begins the recording with the first motion. Returns the sink for the samples of the motion.
     fn record(&mut self, phase: Phase, source: String, now: Duration) -> Result<Option<SampleSink>, Failure> {
         let reel = match &mut self.reel {
             Some(reel) => reel,
@@ -133,7 +133,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
         Ok(reel.tape.as_ref().map(Tape::sink))
     }
 
-    /// Stores the figures of the motion that has ended. Its samples are already in the recording.
+    /// Stores the results of the motion that has ended. The samples of this motion are already in the recording.
     fn keep_figures(&mut self, phase: Phase) {
         let Some(reel) = &self.reel else { return };
         self.done.push(Done { phase, summary: Summary::of(&reel.info, &self.last) });
@@ -270,7 +270,7 @@ pub(super) fn cancelled(during: &str) -> Failure {
     Failure { message, ..Failure::of(&Error::Cancelled) }
 }
 
-/// Returns the failure if an output cannot be written before the arm has moved.
+/// Returns the failure if an output file cannot be written and the arm has not moved yet.
 fn not_started(failure: Failure) -> Failure {
     Failure { message: format!("{}; the motion was not started", failure.message), ..failure }
         .next("free disk space or choose another place, then run again")

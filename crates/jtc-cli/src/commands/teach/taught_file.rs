@@ -1,5 +1,4 @@
-//! Trajectory file of a hand-guided motion. The file is written during teaching, so that it is complete even if the
-//! program ends suddenly.
+//! Trajectory file of a hand-guided motion. The file is written during teaching, so that it is complete even if the program is killed.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -10,10 +9,10 @@ use jtc_host::waypoints::{self, thinned};
 
 use crate::failure::recording_broken_off;
 
-/// Movement below which the arm is considered at rest, rad.
+/// Largest movement at which the arm counts as at rest, rad.
 const STILL: f64 = 0.002;
-/// Interval of the controller's statuses, s. The rows have this interval. The host's clock only shows which statuses
-/// were lost.
+/// Interval of the controller's statuses, s. The rows of the file have this interval. The clock of the host is used only to detect lost
+/// statuses.
 const GRID_S: f64 = 0.04;
 /// Smallest number of rows of a motion.
 const LEAST: usize = 3;
@@ -22,25 +21,25 @@ const HEADER: &str = "t,q1,q2,q3,q4,q5,q6\n";
 /// Pose in the file.
 struct Row {
     position: [f64; 6],
-    /// Length of the file up to the end of this row, bytes.
+    /// Length of the file including this row, bytes.
     end: usize,
 }
 
-/// File with the rows of the motion, and one pose each of the rest before and after the motion.
+/// File with the rows of the motion, one pose at rest before the motion, and one pose at rest after the motion.
 pub(super) struct TaughtFile {
     name: String,
     output: Option<OutputFile>,
     file: Option<File>,
     text: String,
     rows: Vec<Row>,
-    /// First pose of the present rest, and the last slot of the grid in which the arm was at rest.
+    /// First pose of the present time at rest, and the number of the last grid interval at rest.
     rest: Option<([f64; 6], i64)>,
     start_slot: i64,
     last_slot: i64,
 }
 
 impl TaughtFile {
-    /// Takes an output that stays unchanged until the arm moves.
+    /// Creates the trajectory file from an output file, which stays unchanged until the arm moves.
     pub(super) fn new(output: OutputFile) -> Self {
         Self {
             name: output.name(),
@@ -54,7 +53,7 @@ impl TaughtFile {
         }
     }
 
-    /// Returns the name for users.
+    /// Returns the name of the file that is shown to the user.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -64,7 +63,7 @@ impl TaughtFile {
         self.file.is_some()
     }
 
-    /// Takes the pose at a time (s). If the arm has moved, the pose is in the file when the function returns.
+    /// Adds the pose at a time (s). If the arm has moved, the pose is written to the file before the function returns.
     pub(super) fn take(&mut self, time_s: f64, position: [f64; 6]) -> Result<(), Failure> {
         let slot = (time_s / GRID_S).round() as i64;
         if slot <= self.last_slot {
@@ -104,15 +103,15 @@ impl TaughtFile {
         self.rows.push(Row { position, end: self.text.len() });
     }
 
-    /// Returns the number of rows before the rest at the end.
+    /// Returns the number of rows before the final time at rest.
     fn in_motion(&self) -> usize {
         let Some(last) = self.rows.last() else { return 0 };
         let moving = self.rows.iter().rposition(|row| moved(&row.position, &last.position));
         moving.map_or(0, |i| i + 2).min(self.rows.len())
     }
 
-    /// Removes the rest at the end, and describes the content of the file. `None`: the arm was not moved, and no row
-    /// was written. With a tolerance (rad), waypoints replace the motion.
+    /// Removes the final time at rest, and describes the contents of the file. Returns `None` if the arm was not moved, so that no row was
+    /// written. If a tolerance (rad) is specified, waypoints replace the motion.
     pub(super) fn finish(self, thin: Option<f64>) -> Result<Option<String>, Failure> {
         let kept = self.in_motion();
         let Self { name, file, mut text, mut rows, .. } = self;
@@ -152,7 +151,7 @@ mod tests {
     use cli_kit::ErrorKind;
     use jtc_host::trajectory::Loaded;
 
-    /// Pose of joint motions that rest for 0.4 s, move to 0.5 rad in 1 s, and rest for 0.4 s.
+    /// Returns the pose at step `k` of a motion that rests for 0.4 s, moves to 0.5 rad in 1 s, and rests for 0.4 s.
     fn pose(k: u32) -> [f64; 6] {
         let u = ((f64::from(k) - 10.0) / 25.0).clamp(0.0, 1.0);
         [0.0, 0.5 * u * u * (3.0 - 2.0 * u), 0.0, 0.0, 0.0, 0.0]
@@ -186,7 +185,7 @@ mod tests {
         );
     }
 
-    /// At every speed, a straight path is reduced to its two ends. The old motion is removed from the file.
+    /// At every speed, a straight path is reduced to its two end points. The old motion is removed from the file.
     #[test]
     fn a_motion_by_hand_becomes_waypoints() {
         let dir = tempfile::tempdir().unwrap();

@@ -274,7 +274,7 @@ impl Following {
         }
     }
 
-    /// Takes a status. If the controller has restarted, it contains no trajectory and may have another arm.
+    /// Processes a status. If the controller has restarted, it contains no trajectory and may have another arm.
     fn look_at(&mut self, now: Duration, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.upload.forget();

@@ -26,7 +26,7 @@ struct Assembly {
 #[derive(Default)]
 pub(crate) struct Upload {
     current: Option<Assembly>,
-    /// New upload. Next upload. If the controller refuses its first segment, the previous upload stays valid.
+    /// New upload. If the controller refuses the first segment of this upload, the previous upload stays valid.
     next: Option<Assembly>,
     whole: Option<Arc<Trajectory>>,
 }

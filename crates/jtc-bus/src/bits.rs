@@ -1,4 +1,4 @@
-//! Bits of words. Bit words of the bus. Each word is a table with bit, name, text and meaning.
+//! Bit words of the bus. Each word is a table with bit, name, text and meaning.
 
 /// Declares words of bits. A row of a word has the meaning (as documentation), the name of the mask, the bit and its text.
 ///
@@ -79,7 +79,7 @@ bit_words! {
         SAFETY_LINE = 2, "safety line";
         /// Watch the bus.
         BUS_WATCHDOG = 3, "bus watchdog";
-        /// Trips on over-speed. Switches the over-speed trip on; if the bit is 0, the trip is off.
+        /// Trips on over-speed. If this bit is 0, the trip is off.
         OVER_SPEED_TRIP = 4, "over-speed trip";
         with
         /// Default of a joint, 0x17.

@@ -27,7 +27,7 @@ pub enum Target {
     /// The node keeps its present state.
     #[default]
     NoChange = 0,
-    /// Init. State Init. In Fault, this request also acknowledges the faults.
+    /// State Init. In Fault, this request also acknowledges the faults.
     Init = NodeState::INIT.code(),
     /// Ready to operate, with the motor off.
     Ready = NodeState::READY.code(),

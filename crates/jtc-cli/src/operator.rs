@@ -39,7 +39,7 @@ pub(crate) struct Operator<'a> {
     /// Events for programs.
     pub progress: Progress,
     stop: Stop,
-    /// Keyboard input. Keyboard, which is read only while the arm moves. At other times the terminal is unchanged.
+    /// Keyboard input, which is read only while the arm moves. At other times the terminal is unchanged.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,

@@ -59,8 +59,8 @@ impl Progress {
         session.observe(move |_, status| own.see(status));
     }
 
-    /// Takes a status. Reports a status. The first status is reported as `connected`. Changes of the state are reported at once. While the
-    /// arm moves or may be moved, measured values are reported at a limited rate.
+    /// Reports a status. The first status is reported as `connected`. Changes of the state are reported at once. While the arm moves or may
+    /// be moved, measured values are reported at a limited rate.
     pub(crate) fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);
         let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": labels::causes(s) });

@@ -98,8 +98,7 @@ impl Server {
         }
     }
 
-    /// Runs until `stop`. Runs the simulation, and calls `ready` when the controller has sent its first status. Returns the elapsed virtual
-    /// time, s.
+    /// Runs the simulation until `stop`. Calls `ready` when the controller has sent its first status. Returns the elapsed virtual time, s.
     pub(crate) fn run(
         &mut self,
         speed: SimSpeed,

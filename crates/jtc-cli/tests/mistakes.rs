@@ -64,7 +64,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     assert!(output.err.contains("the curve exceeds them: joint 1 by"), "{}", output.err);
 }
 
-/// Typed values are interpreted as the user means them, and errors use the words of the command.
+/// Option values are interpreted as the user expects, and errors name the options of the command.
 #[test]
 fn mistakes_in_options_are_named_with_what_helps() {
     let dir = Dir::new();

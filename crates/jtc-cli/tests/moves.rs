@@ -1,4 +1,4 @@
-//! Moves to poses, runs through waypoints, repeated, replayed and resumed runs, against the simulator.
+//! Tests with the simulator: moves to poses, motions through waypoints, and repeated, replayed and resumed runs.
 #![cfg(unix)]
 
 use crate::common;
@@ -20,7 +20,7 @@ fn arm(sim: &Sim) -> String {
     sim.file("arm.toml", include_str!("../../../arms/avena.toml"))
 }
 
-/// Without a given speed, a move and an approach are slow, and the speed is printed.
+/// If no speed is specified, a move and an approach are slow, and the command prints the speed.
 #[test]
 fn j52_a_move_without_a_speed_is_slow() {
     // The simulator runs in real time, because a run reports its duration.
@@ -49,7 +49,7 @@ fn j52_a_move_without_a_speed_is_slow() {
     assert!(!approach(&["--speed", "100"]).contains("of the limits"));
 }
 
-/// J-55: before an approach begins, the whole run is checked with the controller's arm, limits and payload.
+/// J-55: the whole run is checked with the arm, limits and payload of the controller before an approach begins.
 #[test]
 fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let sim = Sim::start(&FAST);
@@ -61,7 +61,7 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let motion = format!("{folder}/motion.csv");
     let elsewhere = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
     let refused = |sim: &Sim, kind: &str| {
-        // The speed is low, because the simulated arm does not carry the payload that was set.
+        // The speed is low, because the simulated arm has no real payload.
         sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "20"]).ends(0);
         let refused = sim.json(&["traj", "run", &motion, "--approach"], 4);
         let kinds: Vec<_> =
@@ -78,8 +78,7 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     loaded.jtc(&["traj", "run", &motion, "--approach", "--speed", "100"]).ends(0);
 }
 
-/// Moves to a flange pose in joint space, and from there on a straight line. Impossible moves are refused before the
-/// arm moves.
+/// The arm moves to a flange pose in joint space, and then on a straight line. Impossible moves are refused before the arm moves.
 #[test]
 fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
     let sim = ready();
@@ -105,7 +104,7 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
     let there = flange(&place(&sim));
     assert!((there.position[1] - 0.2).abs() < 3e-3, "{there:?}");
     assert!((there.rotation[1][0] - 10f64.to_radians().sin()).abs() < 5e-3, "{there:?}");
-    // Reads the positions that were commanded during the move.
+    // The test reads the positions that were commanded during the move.
     let text = std::fs::read_to_string(&record).unwrap();
     let mut lines = text.lines().skip_while(|line| !line.contains("set_position_rad"));
     let head: Vec<&str> = lines.next().expect("a header").split(',').collect();
@@ -154,8 +153,7 @@ fn an_arm_moves_between_positions_and_the_poses_that_were_saved() {
     at(&sim, [10f64.to_radians(), 0.0, 0.0, 0.0, 0.0, (-20f64).to_radians()]);
     let list = jtc(&["--json", "pose", "list", "--arm", &arm]).ends(0).json();
     assert_eq!(list["poses_rad"].as_object().unwrap().len(), 2);
-    // An existing pose is overwritten only on request. After a pose is removed, the file is as before, except for its
-    // end.
+    // An existing pose is overwritten only if the user requests this. After a pose was removed, only the end of the file is different.
     let refused = sim.jtc(&["pose", "save", "up", "--arm", &arm]).ends(4);
     assert!(refused.err.contains("pose \"up\" exists already"), "{}", refused.err);
     sim.jtc(&["pose", "save", "up", "--arm", &arm, "--overwrite"]).ends(0);
@@ -210,7 +208,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
     assert!(moved.code == 1 && run.code == 1 && run.err.ends_with(&moved.err), "{}{}", moved.err, run.err);
 }
 
-/// A command runs the motion of a waypoint file several times, with the figures of each run.
+/// A command executes the motion of a waypoint file several times, and reports the results of each run.
 #[test]
 fn waypoints_are_run_several_times() {
     let sim = ready();
@@ -229,8 +227,8 @@ fn waypoints_are_run_several_times() {
         }
     }
     assert!(std::fs::metadata(&page).unwrap().len() > 1000);
-    // The recording contains the trajectory and all runs in sequence, even if the time of the simulator runs ahead of
-    // the computer's.
+    // The recording contains the trajectory and all runs in sequence, even if the clock of the simulator is ahead of the clock of the
+    // computer.
     let recording = Recording::read(std::path::Path::new(&record)).unwrap();
     let points: Vec<u32> = recording.samples.iter().filter(|s| s.is_operating()).map(|s| s.point).collect();
     assert_eq!(points.windows(2).filter(|pair| pair[1] < pair[0]).count(), 2, "{points:?}");
@@ -241,7 +239,7 @@ fn waypoints_are_run_several_times() {
     assert_eq!(again["outcome"], "finished");
 }
 
-/// The example with lines is planned as its text says, and runs.
+/// The example with straight lines can be planned as its text describes, and executed.
 #[test]
 fn the_example_of_lines_is_run() {
     let sim = ready();
@@ -259,7 +257,7 @@ fn the_example_of_lines_is_run() {
     }
 }
 
-/// A path that does not end at its start is repeated only with an approach.
+/// A path that does not end at its start point is repeated only with an approach.
 #[test]
 fn an_open_path_is_repeated_with_approaches() {
     let sim = ready();
@@ -304,7 +302,7 @@ fn another_arm_is_led_through_waypoints() {
     }
 }
 
-/// Returns a description with the origins, axes, masses and limits of a UR5. Its bodies are rods.
+/// Returns a description with the origins, axes, masses and limits of a UR5. The links of the arm are rods.
 fn ur5() -> String {
     let half = std::f64::consts::FRAC_PI_2;
     let joints = [
@@ -333,7 +331,7 @@ fn ur5() -> String {
     text + "</robot>"
 }
 
-/// J-33: a move is stopped on its path like a run, and the arm comes to rest.
+/// J-33: like a run, a move is stopped on its path, and the arm comes to rest.
 #[test]
 fn j33_a_move_is_stopped_on_its_path() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -347,12 +345,11 @@ fn j33_a_move_is_stopped_on_its_path() {
     assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()));
     let here = place(&sim);
     assert!((0.02..1.4).contains(&here[0]), "{here:?}");
-    // On the path of this move the other joints stay at rest.
+    // All joints except joint 1 stay at rest during this move.
     assert!(here[1..].iter().all(|q| q.abs() < 3e-3), "{here:?}");
 }
 
-/// J-55: with an arm file that differs from the controller's arm, no joint moves. Without an arm file, the controller's
-/// own limits apply.
+/// J-55: with an arm file that differs from the controller's arm, no joint moves. Without an arm file, the limits of the controller apply.
 #[test]
 fn j55_a_move_for_another_arm_is_refused() {
     let sim = ready();
@@ -370,7 +367,7 @@ fn j55_a_move_for_another_arm_is_refused() {
     at(&sim, [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// A hand leads the arm. The motion is turned into waypoints and planned, or is replayed as measured.
+/// A hand guides the arm. The motion is converted to waypoints and planned, or it is replayed as measured.
 #[test]
 fn a_motion_by_hand_is_waypoints_or_run_again() {
     let dir = tempfile::tempdir().unwrap();
@@ -386,7 +383,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     let planned = jtc(&["--json", "plan", &taught, "-o", &out, "--blend", "0.02"]).ends(0).json();
     assert_eq!(planned["waypoints"].as_u64(), Some(count));
     sim.jtc(&["traj", "run", &out, "--approach"]).ends(0);
-    // The replay moves like the hand: 0.3 rad and back.
+    // The replayed motion is the motion of the hand, which is 0.3 rad and back.
     let replay = ["traj", "replay", &recording, "--measured", "--approach"];
     let mut patience = Patience::begin();
     let output = loop {
@@ -406,7 +403,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     }
 }
 
-/// Returns a motion of joint 1 in 3 s, forward and back. Gravity has no torque about joint 1.
+/// Returns a motion of joint 1 in 3 s, forward and back. Gravity causes no torque at joint 1.
 fn lead() -> String {
     let row = |i: i32| {
         let q = 0.15 - 0.15 * (std::f64::consts::TAU * f64::from(i) / 300.0).cos();

@@ -1,4 +1,4 @@
-//! Commands without a controller: exit codes, JSON, filters.
+//! Tests of commands that need no controller, with their exit codes, JSON output and filters.
 
 use crate::common;
 
@@ -7,7 +7,7 @@ use common::{jtc, jtc_with, motion};
 #[test]
 fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["traj", "rum", "x"]).ends(2);
-    // The nodes must be given, and a bit mask is refused. The port is not even opened.
+    // The user must specify the nodes, and a bit mask is refused. The command does not open the port.
     jtc(&["reset", "--port", "/nowhere/tty"]).ends(2);
     let output = jtc(&["reset", "3", "--port", "/nowhere/tty"]).ends(2);
     assert!(output.err.contains("--joints 3") && output.err.contains("--joints 1,2"), "{}", output.err);
@@ -20,7 +20,8 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
 }
 
-/// Wrong usage also gives a JSON answer, if JSON was requested before the command, after it, or by its variable.
+/// Errors in the usage are also reported as JSON if JSON was requested before the command, after the command, or by the environment
+/// variable.
 #[test]
 fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     for words in
@@ -35,7 +36,7 @@ fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
 }
 
-/// Options that every command has may be typed anywhere.
+/// Options that every command has may be typed before or after the command.
 #[test]
 fn the_port_may_stand_before_the_command() {
     for words in [
@@ -94,7 +95,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     assert!(output.out.contains(&format!("next: jtc traj run '{spaced}' --speed 50")), "{}", output.out);
     let output = jtc(&["traj", "check", file]).ends(4);
     assert!(output.out.contains(&format!("jtc traj check {file} --speed ")), "{}", output.out);
-    // The run is refused before any file or port is opened. The port does not even exist.
+    // The run is refused before any file or port is opened. The port of this test does not exist.
     let output = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
     assert_eq!(output.json()["outcome"], "refused");
     let output = jtc(&["--json", "traj", "info", file]).ends(0);
@@ -138,10 +139,10 @@ fn decode_knows_frames_of_both_directions() {
     let output = jtc_with(&["--json", "decode"], "9B0B0007 03 7D9E").ends(0);
     assert_eq!(output.json()["frame"], "TrajSetExecStatus");
     assert_eq!(output.json()["type"], 0x0B);
-    // No frame is lost because of noise before and after it.
+    // Noise before and after a frame does not cause the loss of the frame.
     let output = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
     assert!(output.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", output.out);
-    // Bit 2 of the mask is joint 3.
+    // In the bit mask, bit 2 is joint 3.
     let output = jtc_with(&["decode"], "9B 10 00 0A 04 00 00 00 AD BE").ends(0);
     assert!(output.out.contains("ResetCanDevices: node 2 (joint 3)"), "{}", output.out);
     jtc_with(&["decode"], "hello").ends(2);
@@ -165,7 +166,7 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
     assert!(output.err.contains("already uses"), "{}", output.err);
     run(&["--record", &path("no/where.mcap")]).ends(2);
     run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--overwrite"]).ends(4);
-    // Overwriting is allowed, but the port does not exist. The old file stays unchanged, and no empty file is left.
+    // Overwriting is allowed, but the port does not exist. The old file is unchanged, and no empty file was created.
     run(&["--record", &old, "--report", &path("new.html"), "--overwrite"]).ends(3);
     assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
     assert!(!std::path::Path::new(&path("new.html")).exists());
@@ -208,8 +209,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
     }
-    // Neither a second demo nor a report overwrites existing files without the option; a refused command runs no
-    // simulation.
+    // A second demo and a report do not overwrite existing files without the option. A refused command does not run a simulation.
     std::fs::write(out.join("picture.svg"), "precious").unwrap();
     let output = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
     assert!(
@@ -224,7 +224,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     let file = out.join("recording.mcap");
     let page = out.join("report.html");
     jtc(&["report", file.to_str().unwrap(), "--out", page.to_str().unwrap()]).ends(4);
-    // The recording gives the same figures again.
+    // A report from the recording contains the numbers of the first report.
     let again = jtc(&["--json", "report", file.to_str().unwrap()]).ends(0).json();
     for (a, b) in again["joints"].as_array().unwrap().iter().zip(value["joints"].as_array().unwrap()) {
         let rms = |v: &serde_json::Value| v["rms_error_mrad"].as_f64().unwrap();
@@ -232,7 +232,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     }
 }
 
-/// If the result cannot be printed, the command fails. A reader that has closed its end is not a failure.
+/// If the result cannot be printed, the command fails. If the reader has closed the pipe, the command does not fail.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
@@ -252,7 +252,7 @@ fn a_result_that_cannot_be_printed_is_an_error() {
     }
 }
 
-/// Each example is written, and is accepted by the command that the example suggests.
+/// The command that an example suggests accepts the example file.
 #[test]
 fn examples_are_files_that_the_named_commands_take() {
     let dir = tempfile::tempdir().unwrap();
@@ -301,7 +301,7 @@ fn help_knows_pages_and_commands() {
     assert!(output.err.contains("traj") && output.err.contains("files"), "{}", output.err);
 }
 
-/// The decimal commas of a German spreadsheet are reported as an error, and a file in degrees is read.
+/// Decimal commas of a German spreadsheet are reported as an error. A file in degrees can be read.
 #[test]
 fn decimal_commas_are_named_and_degrees_are_read() {
     let dir = tempfile::tempdir().unwrap();

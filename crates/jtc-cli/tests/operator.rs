@@ -1,4 +1,4 @@
-//! A user at a terminal while an arm moves: keys, signals, and a terminal that is restored afterwards.
+//! Tests of a user at a terminal while an arm moves, with keys, signals, and the restored terminal.
 #![cfg(unix)]
 
 use crate::common;
@@ -14,7 +14,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
 use test_kit::patience::Patience;
 
-/// Returns a terminal: the user's end, and the command's.
+/// Creates a terminal. Returns the side of the user and the side of the command.
 fn terminal() -> (File, OwnedFd) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -34,7 +34,7 @@ fn until(err: &mut impl BufRead, words: &str) {
     }
 }
 
-/// A command with a user at its terminal. The simulator runs in real time.
+/// Running command with a simulated user at its terminal. The simulator runs in real time.
 struct Session {
     sim: Sim,
     child: Child,
@@ -44,7 +44,7 @@ struct Session {
 }
 
 impl Session {
-    /// Starts `jtc --json` with these words, and waits until it has printed `ready`.
+    /// Starts `jtc --json` with these arguments, and waits until the command has printed `ready`.
     fn start(sim: Sim, words: &[&str], ready: &str) -> Self {
         let (person, slave) = terminal();
         let mut child = sim
@@ -60,7 +60,7 @@ impl Session {
         session
     }
 
-    /// Starts a run, and waits until the arm is just about to move.
+    /// Starts a run, and waits until immediately before the motion.
     fn run() -> Self {
         let sim = Sim::start(&["--no-throttle"]).with_parameters();
         let (file, record) = (sim.path("motion.csv"), sim.path("run.csv"));
@@ -68,7 +68,7 @@ impl Session {
         Self::start(sim, &["traj", "run", &file, "--record", &record], "space pauses")
     }
 
-    /// Starts a recording of an arm in teaching.
+    /// Starts `jtc teach record`, and waits until the arm is in Teaching.
     fn teaching() -> Self {
         let sim = Sim::start(&["--no-throttle"]).held();
         let file = sim.path("taught.csv");
@@ -79,12 +79,12 @@ impl Session {
         cli_kit::testing::signal(&self.child, signal);
     }
 
-    /// Waits until it has printed `words`.
+    /// Waits until the command has printed `words`.
     fn until(&mut self, words: &str) {
         until(self.err.as_mut().expect("somebody listens"), words);
     }
 
-    /// Waits for its end.
+    /// Waits until the command ends.
     fn end(mut self) -> Ended {
         let code = self.child.wait().unwrap().code().unwrap_or(-1);
         let (mut out, mut err) = (String::new(), String::new());
@@ -130,7 +130,7 @@ fn stands(sim: &Sim) {
     }
 }
 
-/// J-33: whenever the user or the system ends the command, the arm is first stopped on its path.
+/// J-33: if the user or the system ends the command, the arm is first stopped on its path.
 #[test]
 fn j33_every_signal_stops_on_the_path_and_then_ends() {
     for signal in ["-INT", "-TERM", "-HUP"] {
@@ -146,7 +146,7 @@ fn j33_every_signal_stops_on_the_path_and_then_ends() {
     }
 }
 
-/// Space pauses, space resumes, `s` stops.
+/// The space bar pauses and resumes the motion, and `s` stops the motion.
 #[test]
 fn j33_keys_pause_resume_and_stop() {
     let mut run = Session::run();
@@ -173,7 +173,7 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     let mut run = Session::run();
     run.signal("-INT");
     run.until("stopping on the path");
-    // Signals within 0.1 s are treated as one, so the test waits longer.
+    // Signals within 0.1 s count as one signal, so the test waits longer.
     std::thread::sleep(std::time::Duration::from_millis(150));
     run.signal("-INT");
     let Ended { code, value, err, sim } = run.end();
@@ -187,8 +187,8 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     sim.jtc(&["traj", "stop"]);
 }
 
-/// Teaching: if both a terminal and a wrapper send a signal, the two are treated as one. A second press ends the
-/// command with a message about the controller.
+/// If both a terminal and a wrapper program send a signal during Teaching, the two signals count as one. A second Ctrl-C ends the command
+/// with a message about the controller.
 #[test]
 fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching() {
     for close in [true, false] {
@@ -205,13 +205,13 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
             assert!(!close && code == 5, "{code} {value}");
             assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
         } else {
-            // The first signal took effect before the second one came. The arm was not moved, and is held again.
+            // The first signal took effect before the second signal arrived. The arm was not moved, and the controller holds it again.
             assert_eq!((code, state.as_str()), (2, Some("HoldPos")), "{value}");
         }
     }
 }
 
-/// Interrupts a command when these words are on its stderr. Returns its exit code and answer.
+/// Interrupts a command when its stderr contains the text `at`. Returns the exit code and the JSON result of the command.
 fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) {
     let mut child = sim
         .command(&[&["--json"], words].concat())
@@ -223,20 +223,20 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     let mut err = BufReader::new(child.stderr.take().unwrap());
     until(&mut err, at);
     cli_kit::testing::signal(&child, "-INT");
-    // From here on stderr is not read. A full pipe must not block the command.
+    // After this point, the test does not read stderr. A full pipe must not block the command.
     let mut out = String::new();
     child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
     let code = child.wait().unwrap().code().unwrap_or(-1);
     (code, serde_json::from_str(out.trim()).unwrap_or_else(|e| panic!("{e}: {out:?}")))
 }
 
-/// Ctrl-C in each wait before the motion: the arm does not move, and the command reports that with exit code 5.
+/// After Ctrl-C in any wait before the motion, the arm does not move. The command reports this with exit code 5.
 #[test]
 fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     let sim = Sim::start(&[]);
     let file = sim.file("motion.csv", &slow_motion(200));
     let run = ["traj", "run", &file];
-    // The parameters are set first. From then on the drives need some seconds.
+    // The test sets the parameters first. Enabling the drives then takes some seconds.
     sim.jtc(&["params", "use-defaults"]).ends(0);
     let waits = [("waiting until", "wait for the drives"), ("uploading", "upload")];
     for (at, during) in waits {
@@ -253,7 +253,8 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     }
 }
 
-/// Ctrl-C while a jog waits for the drives: the command reports that no jog was sent. This differs from a jog by 0.
+/// After Ctrl-C while a jog waits for the drives, the command reports that no jog was sent. The report is different from the report of a
+/// jog by 0 rad.
 #[test]
 fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     let sim = Sim::start(&[]);
@@ -302,15 +303,15 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
     assert!(status["joints"][0]["position_rad"].as_f64().unwrap() < 0.7, "{status}");
 }
 
-/// Ctrl-C in the waits of `recover`: the command sends no further requests, but stops a motion. Also tests its output
-/// in each state.
+/// After Ctrl-C in a wait of `recover`, the command sends no further requests, but it stops a motion. The output of the command is also
+/// tested in each state.
 #[test]
 fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     let cancelled = |sim: &Sim, words: &[&str], at: &str| {
         let (code, value) = interrupted(sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
     };
-    // After a start of the controller, the command waits for the drives, and one is never enabled.
+    // After a start of the controller, the command waits for the drives, but one drive is never enabled.
     let fault = "format = 2\n[[fault]]\nkind = \"ignores-state\"\njoint = 1\nat_s = 0\n";
     cancelled(
         &Sim::with_faults(&["--no-throttle"], fault),
@@ -320,7 +321,7 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     // The emergency stop is pressed during teaching, after `teach on` has received a status with Teaching.
     let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 5\n";
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
-    // The arm is in motion, and no program follows it.
+    // The arm is in motion, but no program monitors the motion.
     let file = sim.file("motion.csv", &slow_motion(600));
     let (_person, slave) = terminal();
     let mut run = sim
@@ -334,7 +335,7 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     run.wait().unwrap();
     cancelled(&sim, &["recover"], "stopping the motion");
     stands(&sim);
-    // The emergency stop stays pressed.
+    // The emergency stop button stays pressed.
     sim.jtc(&["teach", "on"]).ends(0);
     reaches(&sim, "Error");
     cancelled(&sim, &["recover"], "release the emergency stop (waiting)");

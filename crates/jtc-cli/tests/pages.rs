@@ -1,5 +1,4 @@
-//! The commands of README.md and of the pages of docs/ are run as written, against `jtc sim`, and must print the output
-//! on the page.
+//! Runs the commands of README.md and of the pages of docs/ against `jtc sim`. The commands must print the output on the page.
 #![cfg(target_os = "linux")]
 
 #[test]

@@ -1,4 +1,4 @@
-//! `jtc payload`: the payload of the arm (J-60).
+//! Tests of `jtc payload`, the payload of the arm (J-60).
 
 use crate::common;
 
@@ -17,9 +17,8 @@ fn mass(value: &Value) -> f64 {
     value["mass_kg"].as_f64().unwrap()
 }
 
-/// Returns two magnitudes of the torque that the control law adds to the model at joint 2 (N·m), from a recording of
-/// the simulator. The first is taken before the model torque of the held arm changes by more than 2 N·m, the second at
-/// the end.
+/// Returns two magnitudes of the torque that the control law adds to the model at joint 2 (N·m), from a recording of the simulator. The
+/// first value is from the time before the model torque of the held arm changes by more than 2 N·m. The second value is from the end.
 fn missing(recording: &str) -> (f64, f64) {
     let mut lines = recording.lines().filter(|line| !line.starts_with('#'));
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -39,7 +38,7 @@ fn missing(recording: &str) -> (f64, f64) {
     ((rows[changed - 300][2] - rows[changed - 300][1]).abs(), (last[2] - last[1]).abs())
 }
 
-/// The integral part holds 3 kg that the controller does not know. When the payload is set, the model holds them.
+/// The integral part of the control law carries an unknown payload of 3 kg. After the payload is set, the model carries the 3 kg.
 #[test]
 fn j60_a_payload_that_is_given_is_carried() {
     let dir = tempfile::tempdir().unwrap();
@@ -62,7 +61,7 @@ fn j60_a_payload_that_is_given_is_carried() {
     assert!(before > 8.0 && after < 0.5 * before, "{before} N·m became {after} N·m");
 }
 
-/// A refusal reports the joint and its torque, and no setting changes.
+/// A refused request reports the joint and its torque, and changes no setting.
 #[test]
 fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
@@ -99,7 +98,7 @@ fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
     assert!(none.err.contains("nothing was sent"), "{}", none.err);
 }
 
-/// A path that the arm cannot follow with its payload is refused before any frame is sent.
+/// If the arm cannot follow a path with its payload, the path is refused before any frame is sent.
 #[test]
 fn j60_a_run_is_checked_with_the_payload() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();

@@ -1,4 +1,4 @@
-//! `jtc plan`: trajectories through waypoints, and refusals.
+//! Tests of `jtc plan`: trajectories through waypoints, and refused plans.
 
 use crate::common;
 
@@ -12,7 +12,7 @@ fn json(words: &[&str], code: i32) -> Value {
     jtc(&[&["--json", "plan"], words].concat()).ends(code).json()
 }
 
-/// Returns time and positions of each line of a trajectory.
+/// Returns the time and the positions in each line of a trajectory file.
 fn rows(file: &str) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(file).unwrap();
     let mut lines = text.lines();
@@ -22,7 +22,7 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
     );
     lines
         .map(|line| {
-            // Values have 17 significant digits: one before the point and 16 after it.
+            // Values have 17 significant digits, one before the decimal point and 16 after it.
             for cell in line.split(',').skip(1) {
                 let digits = cell.trim_start_matches('-').split_once('e').expect("an exponent").0;
                 assert_eq!(digits.len(), 18, "{cell}");
@@ -32,7 +32,7 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// `--deg` converts the blend as well as the positions. A waypoint that a rounded corner misses is reported.
+/// `--deg` converts the blend as well as the positions. The command reports each waypoint that a rounded corner does not pass.
 #[test]
 fn a_blend_is_in_the_unit_of_the_positions() {
     let dir = Dir::new();
@@ -55,7 +55,7 @@ fn a_blend_is_in_the_unit_of_the_positions() {
     }
 }
 
-/// `plan` keeps the margin and prints it, and both `plan` and `traj check` warn below 10 %. A margin out of range is
+/// `plan` keeps and prints the torque margin. `plan` and `traj check` print a warning if the margin is below 10 %. A margin out of range is
 /// refused, and the error contains the range.
 #[test]
 fn a_plan_leaves_the_margin_that_is_asked_for() {
@@ -97,8 +97,8 @@ fn a_plan_leaves_the_margin_that_is_asked_for() {
     }
 }
 
-/// The trajectory passes the check of a run, is at rest at its ends, and passes the waypoints within the blend
-/// distance. Without a speed limit it is at least as fast. The output matches the file.
+/// The trajectory passes the check of a run and is at rest at its ends. Its distance from the waypoints is at most the blend distance.
+/// Without a speed limit, the motion is at least as fast. The printed values match the file.
 #[test]
 fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     let dir = Dir::new();
@@ -144,7 +144,7 @@ fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     assert!(jumps < stops && blended < stops && half > 1.5 * blended, "{durations:?}");
 }
 
-/// Units, poses and JSON give the same motion.
+/// Waypoints in other units, as poses and as JSON result in identical motions.
 #[test]
 fn the_forms_of_waypoints_are_the_same_motion() {
     let dir = Dir::new();
@@ -171,7 +171,7 @@ fn the_forms_of_waypoints_are_the_same_motion() {
     assert!(durations.iter().all(|d| (d - durations[0]).abs() < 1e-9), "{durations:?}");
 }
 
-/// Times of the file are kept exactly to the millisecond. Without a time the motion is as fast as possible.
+/// The motion keeps the times in the file exactly to the millisecond. If the file contains no times, the motion is as fast as possible.
 #[test]
 fn given_times_are_kept() {
     let dir = Dir::new();
@@ -244,7 +244,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     // The hint contains suggestions.
     let output = jtc(&["plan", &pose, "--arm", &arm, "-o", &out]).ends(2);
     assert!(output.err.contains("did you mean \"above-table\"?"), "{}", output.err);
-    // An output file that exists, or that is the input, is refused.
+    // An output file is refused if it exists or if it is the input file.
     jtc(&["plan", &good, "-o", &out]).ends(0);
     let output = jtc(&["plan", &good, "-o", &out]).ends(4);
     assert!(
@@ -256,7 +256,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     jtc(&["plan", &good, "-o", &good, "--overwrite"]).ends(4);
 }
 
-/// Many waypoints are a normal motion; a motion that does not fit in a trajectory is refused.
+/// A motion through many waypoints can be planned. A motion that does not fit in a trajectory is refused.
 #[test]
 fn ten_thousand_waypoints_are_planned_or_too_long() {
     let dir = Dir::new();
@@ -278,7 +278,7 @@ fn ten_thousand_waypoints_are_planned_or_too_long() {
     );
 }
 
-/// The page shows the motion, the limits, and the limiting constraints over time; it needs no other file.
+/// The page shows the motion, the limits, and the limiting constraints over time. The page needs no other file.
 #[test]
 fn the_report_names_what_binds_when() {
     let dir = Dir::new();

@@ -1,5 +1,4 @@
-//! Recordings of a run, of the simulator and of the demo: after the program was killed, with a full disk, and after a
-//! second run.
+//! Tests of the recordings of runs, the simulator and the demo, for killed programs, full disks and second runs.
 #![cfg(unix)]
 
 use crate::common;
@@ -17,8 +16,8 @@ fn json(words: &[&str]) -> serde_json::Value {
     jtc(&[&["--json"], words].concat()).ends(0).json()
 }
 
-/// The simulator records each millisecond of a motion that is commanded over the serial port. The recording can be read
-/// while the simulator runs and after `kill -9`, and the motion can be run again.
+/// The simulator records each millisecond of a motion that is commanded over the serial port. The recording can be read while the simulator
+/// runs and after `kill -9`. The motion can be replayed.
 #[test]
 fn the_simulator_records_each_millisecond() {
     for name in ["sim.mcap", "sim.csv"] {
@@ -65,7 +64,7 @@ fn a_simulator_that_is_ended_completes_its_recording() {
     assert!(!info["notes"].to_string().contains("completed"), "{info}");
 }
 
-/// If the recorder is killed during a motion, the recording lacks only the last moments.
+/// If the recording program is killed during a motion, only the last 0.2 s can be missing in the recording.
 #[test]
 fn a_run_that_is_killed_leaves_its_recording() {
     for name in ["run.mcap", "run.csv"] {
@@ -84,7 +83,7 @@ fn a_run_that_is_killed_leaves_its_recording() {
         run.wait().unwrap();
         let info = json(&["traj", "info", &record]);
         let seen = info["duration_s"].as_f64().unwrap();
-        // An MCAP file contains the whole trajectory, 6 s at 20 %, even if only a part of it was run.
+        // An MCAP file contains the whole trajectory, 6 s at 20 %, even if only a part of the trajectory was executed.
         assert!(
             if name == "run.mcap" { (seen - 30.0).abs() < 0.1 } else { (1.0..30.0).contains(&seen) },
             "{info}"
@@ -128,8 +127,8 @@ fn a_full_disk_is_found_before_anything_moves() {
     assert!(output.err.contains("No space left") && output.out.is_empty(), "{}", output.err);
 }
 
-/// The disk becomes full during the motion: this is reported at once, the motion continues to its end, and the exit
-/// code shows the loss.
+/// If the disk becomes full during a motion, the command reports this at once. The motion continues to its end, and the exit code shows the
+/// loss.
 #[test]
 fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good() {
     let sim = ready(&["--speed", "max", "--no-throttle"]);
@@ -137,7 +136,7 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
     std::fs::write(&file, motion(0.2)).unwrap();
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
-    // The reader reads only the header.
+    // The reader of the recording reads only its header.
     let reader = std::thread::spawn({
         let pipe = pipe.clone();
         move || {

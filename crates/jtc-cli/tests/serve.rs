@@ -1,4 +1,4 @@
-//! `jtc serve`: an agent, and every other command through it.
+//! Tests of `jtc serve`, and of every other command through this agent.
 #![cfg(unix)]
 
 use crate::common;
@@ -48,7 +48,7 @@ fn another_terminal_looks_and_stops_while_one_runs() {
     assert_eq!(report["outcome"], "stopped", "{report}");
 }
 
-/// On the agent's own computer neither Stop nor Pause needs a token.
+/// On the computer of the agent, a Stop and a Pause do not need a token.
 #[test]
 fn no_token_file_keeps_a_stop_away() {
     let agent = Agent::start(&["--sim", "--baud", "921600"]);
@@ -84,7 +84,7 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
     assert!(log.out.contains("HoldPos"), "{}", log.out);
     let second = run(agent.command(&["serve", "--listen", "127.0.0.1:0"], &port), &[], "").ends(3);
     assert!(second.err.contains(&agent.url), "{}", second.err);
-    // The killed agent leaves a file with an address without a listener.
+    // The file of the killed agent still exists, but no program listens at its address.
     Command::new("kill").args(["-KILL", &agent.child.id().to_string()]).status().expect("kill");
     std::thread::sleep(std::time::Duration::from_millis(200));
     run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
@@ -104,7 +104,7 @@ fn the_operators_token_is_printed_on_a_terminal_alone() {
         "--token-file",
         tokens.to_str().expect("a name"),
     ];
-    // The first start creates the token. The second start is asked for the link.
+    // The first start creates the token. At the second start, the user requests the link.
     for begun in 0..2 {
         let mut command = command_in(&dir);
         let mut child =
@@ -149,7 +149,7 @@ fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
     assert!(open.err.contains("chmod 600"), "{}", open.err);
 }
 
-/// Writes two arm files: one with another name, and one with gains that no frame can carry.
+/// Writes two arm files. The first has another name; the second contains gains that no frame can transmit.
 fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     let avena = include_str!("../../../arms/avena.toml");
     let file = |name: &str, text: String| {
@@ -163,8 +163,7 @@ fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     ]
 }
 
-/// Both simulators use a given arm in the same way: the controller has it stored. An arm that a controller cannot store
-/// is refused.
+/// In both simulators, the specified arm is stored in the controller. An arm that a controller cannot store is refused.
 #[test]
 fn an_arm_is_simulated_as_by_jtc_sim() {
     let dir = tempfile::tempdir().expect("a directory");

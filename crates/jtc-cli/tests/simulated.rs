@@ -1,4 +1,4 @@
-//! Commands against `jtc sim` over its pseudo-terminal, in free-running virtual time.
+//! Tests of commands with `jtc sim` over its pseudo-terminal, in free-running virtual time.
 #![cfg(unix)]
 
 use crate::common;
@@ -41,7 +41,7 @@ fn a_port_that_is_served_is_not_taken_over() {
     );
     assert_eq!(std::fs::read_link(&sim.port).unwrap(), to);
     sim.jtc(&["status"]).ends(0);
-    // The terminal of another program now has the number of a killed simulator's terminal.
+    // The terminal of another program now has the number of the terminal of a killed simulator.
     let shell =
         rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR | rustix::pty::OpenptFlags::NOCTTY).unwrap();
     rustix::pty::grantpt(&shell).unwrap();
@@ -59,7 +59,7 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(status["joints"].as_array().unwrap().len(), 6);
     assert!(status["missing_parameters"].as_array().unwrap().len() == 3, "{status}");
 
-    // No motion can run yet, and the output suggests the next step.
+    // The controller cannot execute a motion yet, and the output suggests the next step.
     let file = sim.file("motion.csv", &motion(0.25));
     let output = sim.jtc(&["--json", "traj", "run", &file]).ends(1);
     assert!(output.json()["error"]["hint"].as_str().unwrap().contains("params"), "{}", output.out);
@@ -93,7 +93,7 @@ fn from_power_up_to_a_recorded_motion() {
 
     let status = sim.json(&["status"], 0);
     assert_eq!((status["state"].as_str(), status["trajectory"].as_str()), (Some("HoldPos"), Some("Finish")));
-    // J-34: without a pause there is no motion to resume.
+    // J-34: a motion can be resumed only after a pause.
     let output = sim.jtc(&["traj", "resume"]).ends(4);
     assert!(
         output.err.contains("no motion is paused") && output.err.contains("trajectory Finish"),
@@ -104,7 +104,7 @@ fn from_power_up_to_a_recorded_motion() {
     let output = sim.jtc(&["traj", "resume"]).ends(4);
     assert!(output.err.contains("trajectory Stop") && output.err.contains("jtc traj run"), "{}", output.err);
     sim.jtc(&["traj", "pause"]).ends(1);
-    // While the arm is held, a reset needs a confirmation. In teaching no joint is reset at all.
+    // While the arm is held, a reset needs a confirmation. In Teaching, a joint cannot be reset even with confirmation.
     let output = sim.jtc(&["reset", "--joints", "2"]).ends(4);
     assert!(output.err.contains("joint 2") && output.err.contains("--yes"), "{}", output.err);
     sim.jtc(&["gripper", "on"]).ends(0);
@@ -119,7 +119,7 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(output.json()["reset"], serde_json::json!(["joint 2"]));
 }
 
-/// A stream ends without an error when its reader has closed it.
+/// A stream ends without an error when its reader has closed the pipe.
 #[test]
 fn monitor_ends_with_its_reader() {
     use std::io::BufRead;
@@ -131,7 +131,7 @@ fn monitor_ends_with_its_reader() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
-/// J-55: the defaults are used only on request.
+/// J-55: `recover` uses the defaults only if the user requests them.
 #[test]
 fn j55_recover_of_a_fresh_controller_needs_to_know_whose_numbers() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -176,10 +176,10 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     let output = sim.jtc(&["--json", "traj", "run", &file, "--record", &record, "--report", &page]).ends(5);
     let value = output.json();
     assert_eq!(value["outcome"], "fault");
-    // The first failure is reported first, with its joint and the values around it.
+    // The first failure is reported first, with its joint and the values before and after it.
     assert_eq!(value["failure"]["joint"], 3, "{}", value["failure"]);
     assert!(value["failure"]["causes"][0].as_str().unwrap().starts_with("joint 3: "), "{}", value["failure"]);
-    // The fault occurs at 500 ms. Statuses come every 40 ms, and after the fault their times are arrival times.
+    // The fault occurs at 500 ms. Statuses arrive every 40 ms. After the fault, their times are arrival times.
     let at_ms = value["failure"]["at_ms"].as_f64().unwrap();
     assert!((440.0..700.0).contains(&at_ms), "{}", value["failure"]);
     let text = std::fs::read_to_string(&page).unwrap();
@@ -197,8 +197,7 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     assert_eq!(output.json()["status"]["state"], "HoldPos", "{}", output.out);
 }
 
-/// A fault during the approach is recorded and reported like any other. The report says that it occurred in the
-/// approach.
+/// A fault during the approach is recorded and reported like any other fault. The report states that the fault occurred in the approach.
 #[test]
 fn a_fault_on_the_approach_is_recorded_and_named() {
     let sim = Sim::with_faults(&["--speed", "max"], &FAULT.replace("at_point = 500", "at_point = 200"))
@@ -266,7 +265,7 @@ fn typed_events_happen_and_mistakes_are_named() {
 #[test]
 fn the_arm_can_be_taught_by_hand() {
     let mut sim = Sim::start(&["--speed", "max"]).with_parameters();
-    // Moves to 0.3 rad in 2 s. Joint 1 rotates about the vertical axis, so it stays at its position when it is
+    // The trajectory moves joint 1 to 0.3 rad in 2 s. Joint 1 rotates about the vertical axis, so the joint keeps its position when it is
     // released.
     let rows = (0..=200).map(|i| {
         let q = 0.15 - 0.15 * (std::f64::consts::PI * f64::from(i) / 200.0).cos();
@@ -295,7 +294,7 @@ fn a_fault_file_that_counted_from_0_is_refused() {
     );
 }
 
-/// A drive faults half a second into the motion.
+/// A drive reports a fault 0.5 s after the start of the motion.
 const FAULT: &str = r#"
 format = 2
 [[fault]]
@@ -306,8 +305,8 @@ at_point = 500
 for_s = 0.1
 "#;
 
-/// The example motion runs from the start position of the simulator; with the example faults, the push and the noise
-/// are tolerated, and the run ends when a drive falls silent.
+/// The example motion runs from the start position of the simulator. With the example faults, the controller tolerates the push and the
+/// noise, and the run ends when a drive stops answering.
 #[test]
 fn the_examples_run_in_the_simulator() {
     let dir = tempfile::tempdir().unwrap();
@@ -327,11 +326,10 @@ fn the_examples_run_in_the_simulator() {
     assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", output.err);
 }
 
-/// A recorded motion can be run again, and the new recording shows the same motion.
+/// A recorded motion can be replayed. The recording of the replay contains the same motion.
 #[test]
 fn a_recording_is_looked_at_checked_and_run_again() {
-    // The simulator runs in real time. At full speed, a loaded computer receives too few positions of the motion for
-    // the way back to its start.
+    // The simulator runs in real time. At full speed, a busy computer receives too few positions to plan the return path to the start.
     let sim = Sim::start(&["--no-throttle"]).held();
     jtc(&["example", "motion", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
     let motion = sim.path("motion.csv");
@@ -347,10 +345,11 @@ fn a_recording_is_looked_at_checked_and_run_again() {
     }
 }
 
-/// A host whose frame comes byte by byte does not delay the arm: statuses continue meanwhile.
+/// A host that sends a frame byte by byte does not delay the arm, and statuses still arrive.
 #[test]
 fn time_goes_on_while_a_frame_arrives() {
-    // In real time a status comes every 25 ms, so at least 12 come meanwhile. A single tick per piece would give only 6.
+    // In real time a status arrives every 25 ms, so at least 12 statuses arrive during the frame. With a single tick per part of the frame,
+    // only 6 statuses would arrive.
     for (options, least) in [(&["--no-throttle"][..], 8), (&["--speed", "max", "--no-throttle"], 50)] {
         let sim = Sim::start(options);
         let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&sim.port).unwrap();
@@ -362,8 +361,8 @@ fn time_goes_on_while_a_frame_arrives() {
                 && send.send(count).is_ok()
             {}
         });
-        // The start of a trajectory segment of 1000 bytes is sent repeatedly. So even after a gap that ends a frame, a
-        // new frame is incomplete.
+        // The start of a trajectory segment of 1000 bytes is sent repeatedly. Even after a gap that ends a frame, the next frame is
+        // therefore incomplete.
         let start = [0x9B, 0x0A, 0x03, 0xE8];
         port.write_all(&start).unwrap();
         std::thread::sleep(std::time::Duration::from_millis(1));
@@ -379,8 +378,7 @@ fn time_goes_on_while_a_frame_arrives() {
     }
 }
 
-/// The support carries the arm until its drives are enabled, and after an error. The first line of the output mentions
-/// the support.
+/// The support holds the arm until its drives are enabled, and after an error. The first line of the output mentions the support.
 #[test]
 fn the_support_of_the_arm_is_chosen() {
     for (options, note, falls_first, falls_later) in [
@@ -396,7 +394,7 @@ fn the_support_of_the_arm_is_chosen() {
         let line = sim.error_line();
         assert!(line.starts_with(note), "{options:?}: {line}");
         let sim = sim.with_parameters();
-        // Largest position of any joint, before the drives are enabled and after the error.
+        // The variables are the largest positions of any joint before the drives are enabled and after the error.
         let (mut first, mut later) = (0.0f64, 0.0f64);
         for _ in 0..600 {
             let status = sim.json(&["status"], 0);
@@ -420,8 +418,8 @@ fn the_support_of_the_arm_is_chosen() {
     }
 }
 
-/// Simulates elastic gears, and drives with their own speed limit. With a limit of 0.05 rad/s, the drives trip during
-/// an ordinary motion.
+/// Simulates elastic gears, and drives with a separate speed limit. With a speed limit of 0.05 rad/s, the drives trip during a normal
+/// motion.
 #[test]
 fn gears_and_drives_of_the_simulated_arm_are_chosen() {
     let sim = Sim::start(&["--speed", "max", "--gear-stiffness", "20000"]).held();

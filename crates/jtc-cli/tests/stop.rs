@@ -1,5 +1,5 @@
-//! `jtc stop` from a second terminal: the arm stops in every phase of the program that has the port, and that program
-//! does not move the arm again.
+//! Tests of `jtc stop` from a second terminal. The arm stops in every phase of the program that has opened the port, and this program does
+//! not move the arm again.
 #![cfg(unix)]
 
 use crate::common;
@@ -16,7 +16,7 @@ use jtc_host::session::Flow;
 use jtc_host::{CheckOptions, CheckedTrajectory, Error, LinkError, PortError, Session};
 use serde_json::Value;
 
-/// A simulated controller, and the commands of a user with a separate folder for sockets.
+/// Simulated controller, and a user whose commands have a separate folder for sockets.
 struct Cell(Sim);
 
 impl Cell {
@@ -51,8 +51,7 @@ impl Cell {
         child
     }
 
-    /// Like `start`, but waits first for a line with this text, and then for an event of a motion that has run for
-    /// `seconds` of its path.
+    /// Like `start`, but waits for a line with this text. Then waits for an event with a path time of at least `seconds`.
     fn moving(&self, words: &[&str], text: &str, seconds: f64) -> Child {
         let behind = std::cell::Cell::new(text.is_empty());
         self.start(words, |line| {
@@ -62,8 +61,8 @@ impl Cell {
         })
     }
 
-    /// Stops the arm. Checks that the Stop has stopped this program, and that the program ends with exit code 5.
-    /// Returns the JSON of the program and of the Stop.
+    /// Stops the arm. Checks that the Stop has stopped this program, and that the program ends with exit code 5. Returns the JSON results
+    /// of the program and of the Stop.
     fn stops(&self, child: Child) -> (Value, Value) {
         let stopped = self.jtc(&["--json", "stop"]).ends(0).json();
         let pid = child.id();
@@ -85,7 +84,7 @@ impl Cell {
     }
 }
 
-/// Checks that the command ends with this code, and returns its output.
+/// Checks that the command ends with this exit code, and returns its output.
 fn ends(child: Child, code: i32) -> Value {
     let Output { status, stdout, .. } = child.wait_with_output().unwrap();
     let text = String::from_utf8(stdout).unwrap();
@@ -115,7 +114,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm is at rest; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
-    // The message tells which requests the program may still make.
+    // The message states which requests the program may still send.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
@@ -146,7 +145,7 @@ fn a_move_is_stopped() {
     assert_eq!(ended["outcome"], "stopped", "{ended}");
 }
 
-/// On a line that is as slow as a real line, the upload takes many seconds. After the Stop it has no effect.
+/// On a simulated line with the speed of a real serial line, the upload takes many seconds. After the Stop, the upload has no effect.
 #[test]
 fn an_upload_does_not_go_on_after_a_stop() {
     let cell = Cell(Sim::start(&[]).held());
@@ -216,17 +215,16 @@ fn a_pause_reaches_the_program_too() {
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let paused = cell.jtc(&["traj", "pause"]).ends(0);
     assert!(paused.out.contains("pausing on the path; jtc traj run"), "{}", paused.out);
-    // After the arm has come to rest, no motion is executed any more.
+    // After the arm has come to rest, the controller no longer executes a motion.
     let mut tries = (0..100).map(|_| cell.jtc(&["traj", "pause"]));
     let refused = tries.find(|again| again.code != 0).expect("the arm comes to rest").ends(1);
     assert!(refused.err.contains("trajectory Pause"), "{}", refused.err);
-    // A paused motion does not continue, and its program ends.
+    // A paused motion does not continue after a Stop, and its program ends.
     cell.jtc(&["stop"]).ends(0);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
-/// Like a Python program, the program has the port for longer than one motion, and may be busy with other work while
-/// the arm moves.
+/// Like a Python program, the program keeps the port open for longer than one motion. It may be busy with other work while the arm moves.
 #[test]
 fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let cell = Cell::held();
@@ -239,7 +237,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let checked = CheckedTrajectory::check(&loaded.trajectory, &arm, &status.positions(), &options).unwrap();
     session.upload(&checked, |_| Flow::Continue).unwrap();
     session.execute(&checked).unwrap();
-    // Meanwhile the program does not read.
+    // During this time, the program does not read from the port.
     std::thread::sleep(Duration::from_millis(1500));
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!(stopped["arms"][0]["moved"], true, "{stopped}");
@@ -255,7 +253,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     assert!(session.teach(true).is_err_and(halted));
     session.jog(&[0.0; 6]).unwrap();
-    // A new request three seconds later is accepted.
+    // The agent accepts a new request three seconds later.
     std::thread::sleep(Duration::from_millis(3100));
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     session.ask_to_move().unwrap();
@@ -272,7 +270,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
         assert_eq!(direct.out.trim_end(), words);
         let value = cell.jtc(&["--json", "traj", "stop"]).ends(0).json();
         assert_eq!((&value["command"], &value["arms"][0]["moved"]), (&"stop".into(), &false.into()));
-        // The Stop goes through a program that only watches.
+        // A program that only shows the status forwards the Stop.
         let mut monitor = cell.command(&["--json", "monitor"]).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         let mut out = BufReader::new(monitor.stdout.take().unwrap());
@@ -287,7 +285,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     cell.jtc(&["recover", "--defaults"]).ends(0);
     nothing("HoldPos", "Null");
     cell.jtc(&["traj", "run", &file]).ends(0);
-    // The first Stop ends a finished trajectory.
+    // The first Stop resets the state of a finished trajectory.
     let direct = cell.jtc(&["stop"]).ends(0);
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
     nothing("HoldPos", "Stop");
@@ -300,7 +298,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
 }
 
-/// A Stop cannot hold an arm that has neither brakes nor torque. While the arm falls, the Stop fails.
+/// A Stop cannot hold an arm that has neither brakes nor torque. While the arm falls, the Stop command reports a failure.
 #[test]
 fn an_arm_that_falls_without_torque_does_not_stand() {
     let stops = |cell: &Cell, state: &str| {
@@ -327,7 +325,7 @@ fn an_arm_that_falls_without_torque_does_not_stand() {
     let file = cell.0.file("motion.csv", &slow_motion(50));
     cell.jtc(&["traj", "run", &file]).ends(5);
     stops(&cell, "Error");
-    // Without torque the controller is in Init, with drives that were enabled before.
+    // The controller is in Init without torque. Its drives were enabled before.
     let cell = Cell(Sim::start(&["--no-throttle"]).held());
     cell.jtc(&["disable", "--yes"]).ends(0);
     stops(&cell, "Init");
@@ -350,7 +348,7 @@ fn the_socket_of_a_program_that_was_killed_is_passed_over() {
     cell.stops(child);
 }
 
-/// The program is suspended (SIGSTOP): no frame can be sent, and the message mentions the emergency stop.
+/// The program is suspended (SIGSTOP), so no frame can be sent, and the message mentions the emergency stop.
 #[test]
 fn a_program_that_does_not_answer_is_named() {
     let cell = Cell::held();
@@ -373,7 +371,7 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     let file = cell.0.file("motion.csv", &slow_motion(100));
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let socket = std::fs::read_dir(cell.0.path("openjtc")).unwrap().flatten().next().unwrap().path();
-    // The first client connects and is silent, the second sends an invalid request, the third disconnects after its
+    // The first client connects and sends nothing. The second client sends an invalid request, and the third client disconnects after its
     // request.
     let silent = std::os::unix::net::UnixStream::connect(&socket).unwrap();
     for words in [vec![b'x'; 10_000], b"{\"halt\":\"execute\",\"by\":\"x\"}\n".to_vec()] {
@@ -400,7 +398,7 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     cell.stands();
 }
 
-/// Without a given port, a Stop goes to all arms whose ports are open in programs of this user.
+/// If no port is specified, a Stop is sent to all arms whose ports are open in programs of this user.
 #[test]
 fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     let cell = Cell::held();
@@ -439,7 +437,7 @@ impl Two {
     }
 }
 
-/// The controller continues the motion of a killed program. The socket that the program has left identifies the arm.
+/// The controller continues the motion of a killed program. The socket of the killed program still exists and identifies the arm.
 #[test]
 fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     let mut two = Two::moving();

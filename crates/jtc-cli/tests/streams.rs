@@ -1,4 +1,4 @@
-//! Events of `--json`: stderr shows events as they happen, stdout only the result.
+//! Tests of the events of `--json`. Events are written to stderr when they happen, and only the result is written to stdout.
 #![cfg(unix)]
 
 use crate::common;
@@ -52,7 +52,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert!(places.is_sorted(), "{places:?} {}", output.err);
     let full = events.iter().rfind(|e| name(e) == "uploading").unwrap();
     assert_eq!((full["fraction"].as_f64(), &full["phase"]), (Some(1.0), &Value::from("motion")));
-    // A motion of 2.4 s gives more than one sample, but not one sample per status.
+    // A motion of 2.4 s causes more than one sample event, but fewer events than statuses.
     let samples: Vec<&Value> = events.iter().filter(|e| name(e) == "sample").collect();
     assert!((3..=20).contains(&samples.len()), "{}", samples.len());
     assert_eq!(samples[0]["position_rad"].as_array().unwrap().len(), 6);
@@ -117,14 +117,14 @@ fn the_demo_has_events_and_all_events_are_documented() {
     }
 }
 
-/// A blocked reader of the events (`2>&1 >report.json | less`) does not keep a run from moving or receiving Ctrl-C.
+/// If the reader of the events is blocked (`2>&1 >report.json | less`), the run still moves and reacts to Ctrl-C.
 #[test]
 fn j33_a_reader_that_does_not_read_holds_no_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
     let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // Fills the pipe to its capacity.
+    // This write fills the pipe to its capacity.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();

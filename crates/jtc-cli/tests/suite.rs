@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, with each file as a module. So only one program must be linked.
+//! Test program with all tests of the crate. Each file is a module. Only one program must therefore be linked.
 mod again;
 mod arms;
 mod bench;

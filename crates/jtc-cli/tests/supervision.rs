@@ -1,5 +1,5 @@
-//! Host supervision (J-59) as described in docs/arm.md: motions of `jtc` run to their end, and if the program is
-//! killed, the motion is paused.
+//! Tests of host supervision (J-59) as described in docs/arm.md. Motions of `jtc` run to their end, and a motion is paused if its program
+//! is killed.
 #![cfg(unix)]
 
 use crate::common;
@@ -7,7 +7,7 @@ use crate::common;
 use common::{Sim, agent::Agent, moving_while};
 use test_kit::patience::Patience;
 
-/// Returns an arm that a controller with host supervision holds.
+/// Returns a simulated arm that is held by a controller with host supervision.
 fn supervised(host_timeout_ms: u32) -> Sim {
     let sim = Sim::start(&[]);
     let arm = include_str!("../../../arms/avena.toml");
@@ -17,7 +17,7 @@ fn supervised(host_timeout_ms: u32) -> Sim {
     sim.held()
 }
 
-/// Motion of 8 s.
+/// Motion with a duration of 8 s.
 const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n8,0.4,0,0,0,0,0\n";
 
 #[test]
@@ -38,7 +38,7 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     let mut child = moving_while(&sim, &["traj", "run", &file], 0.5);
     child.kill().unwrap();
     child.wait().unwrap();
-    // A program that only watches does not keep the motion running.
+    // A program that only shows the status does not prevent the pause of the motion.
     loop {
         let status = sim.json(&["status"], 0);
         let (state, trajectory) = (status["state"].as_str(), status["trajectory"].as_str());
@@ -50,7 +50,7 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     }
 }
 
-/// Only the previous agent knows the timeout. A new agent reads it before it forwards requests.
+/// Only the previous agent knows the timeout. A new agent reads the timeout before it forwards requests.
 #[test]
 fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let sim = supervised(3000);

@@ -1,5 +1,4 @@
-//! The part of docs/troubles.md about `jtc`: the real program runs each case, mostly against `jtc sim`. `UPDATE_DOCS=1`
-//! updates it.
+//! Runs each case about `jtc` in docs/troubles.md with the real program, mostly against `jtc sim`. `UPDATE_DOCS=1` updates it.
 #![cfg(target_os = "linux")]
 
 mod files;
@@ -10,7 +9,7 @@ use test_kit::page::Page;
 
 use crate::desk::{Desk, Line};
 
-/// Adds the files of the cases.
+/// Adds the files that the cases need.
 fn with_files(desk: Desk) -> Desk {
     files::write(desk.dir());
     desk
@@ -141,7 +140,7 @@ fn moving(page: &mut Page) {
     let pushed = ready(&["--speed", "max", "--faults", fault.to_str().unwrap()]);
     pushed.run(run);
     let mut doctor = pushed.run("jtc doctor").blurred();
-    // The simulated time runs at full speed, so the age may be seconds or hours.
+    // The simulated time passes at full speed, so the age may be seconds or hours.
     for unit in ["s", "min", "h", "days"] {
         doctor.text = doctor.text.replace(&format!("… {unit} ago"), "… s ago");
     }

@@ -1,5 +1,5 @@
-//! Environment variables: no variable can cause a motion, a reset or flashing, answer a question, or override a check.
-//! Variables in effect are shown.
+//! Tests of environment variables. A variable cannot cause a motion, a reset or flashing, confirm an action, or override a check. The
+//! command reports the variables that have an effect.
 #![cfg(target_os = "linux")]
 
 use crate::common;
@@ -7,16 +7,15 @@ use crate::common;
 use cli_kit::testing::{CommandOutput, run};
 use common::{Dir, Sim, command, jtc};
 
-/// Runs `jtc` with one more variable.
+/// Runs `jtc` with one additional environment variable.
 fn with((name, value): (&str, &str), words: &[&str]) -> CommandOutput {
     let mut command = command();
     command.env(name, value);
     run(command, words, "")
 }
 
-/// In older versions some variables changed a motion or a result. Such a variable is refused before a port is opened
-/// (which would give exit code 3). If it were only ignored, the arm would move elsewhere, faster or longer than the
-/// user expects.
+/// In older versions some variables changed a motion or a result. The command refuses such a variable before it opens a port (which would
+/// cause exit code 3). If the variable were ignored, the motion could be different, faster or longer than the user expects.
 #[test]
 fn a_variable_that_shaped_a_motion_refuses_the_command() {
     let dir = Dir::new();
@@ -60,8 +59,8 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
     }
 }
 
-/// In older versions some variables caused a motion or a reset, answered a question or overrode a check. Such a
-/// variable has no effect, and one line reports this.
+/// In older versions some variables caused a motion or a reset, confirmed an action or overrode a check. Such a variable has no effect now,
+/// and one output line reports this.
 #[test]
 fn no_variable_acts() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -75,7 +74,7 @@ fn no_variable_acts() {
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
         output
     };
-    // Parameters are missing, and only a typed option supplies them.
+    // Parameters are missing. Only an option on the command line can supply them.
     ignored("JTC_DEFAULTS", "1", &["recover", "--port", &port], 4);
     ignored("JTC_ARM", &arm, &["recover", "--port", &port], 4);
     assert_eq!(sim.json(&["status"], 0)["state"], "Init");
@@ -89,14 +88,14 @@ fn no_variable_acts() {
     ignored("JTC_TO_FLANGE", "0.6,0,0.4,0,0,0", &["move", "--port", &port], 2);
     ignored("JTC_FORCE", "1", &["example", "motion", "-o", &dir], 4);
     ignored("JTC_OCCURRED", "1", &["clear", "--port", &port], 0);
-    // The variable has another name now.
+    // The name of the variable has changed.
     let output = ignored("JTC_OUT", &dir, &["example", "no-such-example"], 2);
     assert!(output.err.contains("use --out or JTC_EXAMPLE_DIR"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(existing).unwrap(), "mine");
     assert_eq!(sim.json(&["status"], 0)["state"], "HoldPos");
 }
 
-/// Eight words mean on and off, in upper or lower case.
+/// The variables accept eight words for on and off, in upper or lower case.
 #[test]
 fn on_off_variables_take_eight_words_and_nothing_else() {
     for (variable, words) in [
@@ -119,7 +118,7 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// A variable in effect is reported in one line on stderr, unless the option is typed before or after the command.
+/// The command reports a variable that has an effect in one line on stderr. It does not if the option is typed before or after the command.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -138,7 +137,7 @@ fn a_variable_in_effect_is_shown() {
     assert!(wrong.err.contains("--baud is set by the variable JTC_BAUD=fast"), "{}", wrong.err);
 }
 
-/// `--force` of older scripts means `--overwrite`. The help does not show it.
+/// `--force` of older scripts means `--overwrite`. The help text does not contain `--force`.
 #[test]
 fn force_is_taken_for_overwrite() {
     let dir = Dir::new();

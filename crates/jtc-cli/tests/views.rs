@@ -1,4 +1,4 @@
-//! `jtc` at a terminal: the live view from start to end, and a run with its bar.
+//! Tests of `jtc` at a terminal, with the live view from start to end, and a run with its progress bar.
 #![cfg(unix)]
 
 use crate::common;
@@ -20,7 +20,7 @@ fn moving(sim: &Sim) {
     run.wait().unwrap();
 }
 
-/// The view stops a motion whose command has ended, shows the Stop, and restores the terminal.
+/// The view can stop a motion whose command has ended. The view shows the Stop and restores the terminal.
 #[test]
 fn j33_the_stop_key_of_the_view_stops() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -37,7 +37,7 @@ fn j33_the_stop_key_of_the_view_stops() {
     assert!(terminal.is_as_before());
 }
 
-/// For every cause of its end, the view ends at once and restores the terminal.
+/// For every cause, the view ends at once and restores the terminal.
 #[test]
 fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -48,10 +48,10 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         signal(&child, name);
         assert_eq!(terminal.ends(&mut child), 0, "{name}");
         assert!(terminal.is_as_before() && !terminal.picture.text().contains("thread"), "{name}");
-        // The screen from before the view is shown again.
+        // The terminal shows its previous screen again.
         assert!(String::from_utf8_lossy(&terminal.bytes).contains("\u{1B}[?1049l"), "{name}");
     }
-    // The window is closed, once in a session that gets the signal and once in a session that ignores it.
+    // The test closes the terminal window, once in a session that receives the signal and once in a session that ignores the signal.
     for nohup in [false, true] {
         let mut terminal = Terminal::new(60, 20);
         let mut monitor = sim.command(&["monitor"]);
@@ -68,7 +68,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         terminal.hang_up();
         assert_eq!(terminal.ends(&mut child), 0, "nohup: {nohup}");
     }
-    // Without a terminal the output is in lines. The output ends when the reader has read enough.
+    // Without a terminal, the command prints one line per status. The output ends when the reader closes the pipe.
     let mut child = sim.command(&["monitor"]);
     let mut child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut line = String::new();
@@ -92,8 +92,8 @@ fn a_small_terminal_says_so_and_its_keys_work() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// Text that is printed while a bar is drawn appears above the bar, and no part of the bar is left. A key without
-/// effect reports this.
+/// Text that is printed during a progress bar appears above the bar, and no part of the bar remains. The command reports if a key has no
+/// effect.
 #[test]
 fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -113,7 +113,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let text = terminal.picture.text();
     assert!(!text.contains('━') && !text.contains('╸') && !text.contains("keys:"), "{text}");
     assert!(text.contains("stopping on the path") && text.contains("stopped"), "{text}");
-    // No word of the result is cut at the edge of the terminal.
+    // The words of the result are complete at the edge of the terminal.
     let words: Vec<&str> = text.split_whitespace().collect();
     for whole in ["statuses,", "frames", "damaged"] {
         assert!(words.contains(&whole), "{whole}: {text}");

@@ -1,7 +1,7 @@
 //! Lists the agents of this user on this computer, so that a command can find the agent that owns its port.
 //!
-//! Each agent has a file in a folder to which no other user can write, and holds a lock on the file. A killed agent
-//! leaves an unlocked file, and another program may then listen at its address.
+//! Each agent has a locked file in a folder to which no other user can write. The file of a killed agent is unlocked, and another program
+//! may then listen at its address.
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -45,19 +45,19 @@ pub fn register(agent: &Registered) -> io::Result<Option<Registration>> {
     let Some(folder) = runtime::create()? else { return Ok(None) };
     let path = folder.join(format!("{}.json", std::process::id()));
     let mut file = File::create(&path)?;
-    // Locked before any content is written, because readers ignore an agent without a lock.
+    // The file is locked before any content is written, because readers ignore unlocked files.
     file.try_lock().map_err(io::Error::other)?;
     file.write_all(serde_json::to_string(agent)?.as_bytes())?;
     Ok(Some(Registration { path, _lock: file }))
 }
 
-/// Returns the running agents.
+/// Returns the agents that are running.
 pub fn registered() -> Vec<Registered> {
     let files = runtime::folders().into_iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten();
     files.flatten().filter_map(|file| alive(&file.path())).collect()
 }
 
-/// Returns the agent of this file if the file is locked; the file of a killed agent is not.
+/// Returns the agent of this file if the file is locked. The file of a killed agent is unlocked.
 fn alive(path: &Path) -> Option<Registered> {
     let mut file = File::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {

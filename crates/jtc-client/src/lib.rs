@@ -22,28 +22,28 @@ use tungstenite::{Connector, Message, WebSocket, client_tls_with_config};
 const CONNECTING: Duration = Duration::from_secs(5);
 /// Longest time for which an agent may leave a message unread.
 const STALL: Duration = Duration::from_secs(5);
-/// Characters that must be escaped in a value in a URL: all except the unreserved characters (RFC 3986, 2.3).
+/// Characters that must be escaped in a value in a URL, which are all except the unreserved characters (RFC 3986, 2.3).
 const RESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// Identity and options of a client.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Name that users see; if it is empty, they see the address of the client.
+    /// Name of the client that users see. If the name is empty, users see the address of the client.
     pub name: String,
-    /// Token; with `None` the client has only the access that needs no token.
+    /// Token of the client. With `None`, the client has only the access that needs no token.
     pub token: Option<String>,
-    /// Policy for its motion after it disconnects: `continue` (the default), `pause` or `stop`.
+    /// Policy for the motion of the client after it disconnects: `continue` (the default), `pause` or `stop`.
     pub policy: Option<&'static str>,
-    /// File with trusted certificates (PEM) for agents at `https://`; with `None`, the certificates of the system.
+    /// File with trusted certificates (PEM) for agents at `https://`; with `None`, the certificates of the system are trusted.
     pub certificates: Option<PathBuf>,
 }
 
-/// The agent's first message.
+/// First message of the agent.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize)]
 pub struct Hello {
     /// Name of the port that the agent owns.
     pub port: String,
-    /// Rate of the serial line, Bd, if it has one.
+    /// Bit rate of the serial line, Bd, if the port is a serial line.
     pub baud: Option<u32>,
     /// `true` if the arm is simulated.
     pub simulated: bool,
@@ -58,7 +58,7 @@ enum Notice {
     },
     Halted {
         number: u64,
-        /// Missing if the agent is older and does not count Stops of other clients.
+        /// Numbers of Stops and Pauses of other clients. They are missing if the agent is older and does not count them.
         of_others: Option<Halts>,
     },
     #[serde(other)]
@@ -74,7 +74,7 @@ pub struct AgentPort {
     /// Bytes that were received but not read yet.
     received: Vec<u8>,
     denied: Option<String>,
-    /// Number of the last Stop or Pause that this client knows, if there was one.
+    /// Number of the last Stop or Pause that this client knows, if any occurred.
     halted: Option<u64>,
     /// Numbers of Stops and Pauses of other clients.
     halts: Halts,
@@ -186,7 +186,7 @@ impl AgentPort {
                 Ok(Notice::Denied { why }) => self.denied = Some(why),
                 Ok(Notice::Halted { number, of_others }) => {
                     self.halted = Some(number);
-                    // If the agent sends no numbers, adding one is enough: it makes earlier requests invalid.
+                    // If the agent sends no numbers, the client adds one, which makes earlier requests invalid.
                     let one_more = Halts { all: self.halts.all + 1, stops: self.halts.stops + 1 };
                     self.halts = of_others.unwrap_or(one_more);
                 }
@@ -245,7 +245,8 @@ impl Port for AgentPort {
                 return Ok(0);
             }
         }
-        // Also reads messages that arrived meanwhile, because a caller that requests new data must not get old data.
+        // The function also reads messages that have arrived in the meantime, because a caller that requests new data must not receive old
+        // data.
         while self.received.len() < buffer.len() {
             match self.receive(Duration::ZERO) {
                 Ok(true) => {}

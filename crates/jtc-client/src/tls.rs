@@ -1,4 +1,4 @@
-//! TLS of a client: trusted certificates.
+//! TLS of a client, with its trusted certificates.
 use std::io;
 use std::net::TcpStream;
 use std::path::Path;
@@ -10,7 +10,7 @@ use rustls::{ClientConfig, RootCertStore};
 use tungstenite::Connector;
 use tungstenite::stream::MaybeTlsStream;
 
-/// Creates a connector that trusts the certificates in this file; without a file, those of the system.
+/// Creates a connector that trusts the certificates in this file. Without a file, it trusts the certificates of the system.
 ///
 /// # Errors
 ///
@@ -24,7 +24,7 @@ pub(crate) fn connector(file: Option<&Path>) -> io::Result<Connector> {
         }
         None => rustls_native_certs::load_native_certs().certs,
     };
-    // Some of the system's many certificates may be invalid.
+    // Some of the many certificates of the system may be invalid.
     let (added, _) = roots.add_parsable_certificates(certificates);
     if added == 0 {
         let whose = file.map_or("the system".into(), |path| path.display().to_string());

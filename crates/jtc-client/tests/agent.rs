@@ -1,4 +1,5 @@
-//! Sessions through an agent have all functions of a serial port, with several clients at the same time.
+//! Tests of sessions through an agent. A session has all functions of a serial port, and several clients can have sessions at the same
+//! time.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -19,7 +20,7 @@ fn hold(session: &mut Session<AgentPort>) {
     session.wait_ready(LONGEST).expect("it holds the arm");
 }
 
-/// Returns a checked motion of some seconds from the zero pose.
+/// Returns a checked motion that starts at the zero pose and takes some seconds.
 fn motion(percent: f64) -> CheckedTrajectory {
     let arm = Arm::avena();
     let to = [0.4, -0.3, 0.3, 0.4, -0.3, 0.4];
@@ -52,7 +53,7 @@ fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
     let refused = passer_by.teach(true).expect_err("a viewer");
     assert!(refused.to_string().contains("can only read and stop"), "{refused}");
 
-    // When anna has disconnected, bob gets the lease at once.
+    // When anna has disconnected, bob receives the lease at once.
     drop(anna);
     until("the end of her lease", || served.line.with(|line, _| line.lease().is_none()));
     bob.gripper(true).expect("nobody else commands");
@@ -85,13 +86,13 @@ fn a_stop_in_the_middle_of_an_upload_is_taken_and_the_upload_says_who_it_was() {
     );
 }
 
-/// A client that does not know about a Stop cannot move the arm with requests from before it, even if they arrive late.
+/// If a client does not know about a Stop, its requests from before the Stop cannot move the arm, even if they arrive late.
 #[test]
 fn what_a_client_was_asked_for_before_a_stop_moves_nothing_until_somebody_asks_anew() {
     let served = Served::start(921_600);
     let mut anna = served.operator("anna");
     hold(&mut anna);
-    // The controller may refuse the jog, but the agent does not.
+    // The controller may refuse the jog, but the agent forwards it.
     let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
         Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),
         _ => Ok(()),
@@ -169,8 +170,8 @@ fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
     assert_eq!(status.state, ControllerState::HoldPos);
 }
 
-/// A queued request from before a Stop is still treated as earlier, even if it is executed later, because a client
-/// knows the number of other clients' Stops.
+/// A queued request from before a Stop is refused even if the client sends it later. The client knows the number of Stops of other clients,
+/// so it can send the number of the time of the request.
 #[test]
 fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requested_after_them() {
     let served = Served::start(921_600);
@@ -191,7 +192,7 @@ fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requeste
     let _ = anna.stop();
     assert_eq!(served.get("POST /api/pause").0, 200);
     assert_eq!(known(&mut anna), Halts { all: 2, stops: 1 });
-    // Waits longer than the hold-off for a new request.
+    // The test waits longer than the hold-off before a new request.
     std::thread::sleep(Duration::from_millis(3_500));
     let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
         Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),

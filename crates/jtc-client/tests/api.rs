@@ -1,4 +1,4 @@
-//! HTTP interface for programs: lease, trajectories, runs, and events that can be read again after a disconnect.
+//! Tests of the HTTP interface for programs, with leases, trajectories, runs, and events that can be read again after a disconnect.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use jtc_host::{Arm, plan};
 use serde_json::{Value, json};
 use test_kit::patience::until;
 
-/// Returns a motion from the zero pose and back at this speed, as the text of a file.
+/// Returns the text of a trajectory file with a motion from the zero pose and back at this speed.
 fn there_and_back(percent: f64) -> String {
     let (arm, to) = (Arm::avena(), [0.3, -0.2, 0.2, 0.3, -0.2, 0.3]);
     let way = |from: &[f64; 6], to: &[f64; 6]| {
@@ -64,7 +64,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
         errors.len() == 6
             && errors.iter().all(|joint| joint["max_error_mrad"].as_f64().is_some_and(|e| e < 20.0))
     );
-    // Events can be read by their numbers, also repeatedly.
+    // Events can be read by their numbers more than once.
     let (_, all) = served.api(&format!("GET /api/events?after=0&job={job}"), None, None);
     let kinds: Vec<&str> = all["events"]
         .as_array()
@@ -105,7 +105,7 @@ fn somebody_else_stops_a_run_and_it_stays_so() {
     assert!(!moves(&served));
 }
 
-/// If an arm is stopped at rest while a motion is expected, it does not move.
+/// If a Stop arrives before the arm has begun to move, the arm does not move.
 #[test]
 fn a_run_that_was_stopped_before_it_moves_does_not_begin() {
     let served = Served::start(57_600);
@@ -132,7 +132,8 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         [("continue", "finished", None), ("stop", "stopped", None), ("pause", "running", Some("Pause"))]
     {
         let anna = Program::new(&served, "anna", 1.0, policy);
-        // Refused after the previous client's Stop or Pause. A jog that is requested repeatedly stays refused.
+        // The jog is refused after the Stop or Pause of the previous client. If the client repeats the request for the jog, it is still
+        // refused.
         let halted =
             || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": ([0.0; 6]) }))).1["code"] == "denied";
         while halted() {
@@ -142,7 +143,7 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
         let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
         event(&served, last, "executing");
-        // The program sends no more requests. The following requests do not renew its lease.
+        // The program sends no more requests. The following requests do not renew the lease of this program.
         let ended = || served.api(&format!("GET /api/jobs/{job}"), None, None).1;
         let paused =
             || served.line.with(|line, _| line.status().map(|(_, s)| s.trajectory.name().to_owned()));
@@ -170,7 +171,7 @@ fn the_lease_is_asked_for_given_and_lapses() {
     assert_eq!(bob.ask("PUT /api/lease", None).1["held"], false);
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     assert_eq!(bob.ask("PUT /api/lease", None).1["held"], true);
-    // When the lease has expired, another client gets it.
+    // When the lease has expired, another client receives the lease.
     std::thread::sleep(Duration::from_millis(1300));
     let carl = Program::new(&served, "carl", 30.0, "continue");
     assert_eq!(bob.ask("PUT /api/lease", None).1["held"], false);
@@ -192,7 +193,7 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
     {
         assert_eq!(as_viewer(request, None).0, 200, "{request}");
     }
-    // A request with a wrong key is refused, and so is one with the key but without the operator's token.
+    // A request with a wrong key is refused. A request with the right key but without the token of the operator is also refused.
     let anna = Program::new(&served, "anna", 30.0, "continue");
     for (token, key) in [(&served.tokens.operator, "x"), (&served.tokens.viewer, anna.key.as_str())] {
         let (status, error) = served.api_as(Some(token), "POST /api/clear", Some(key), None);
@@ -250,7 +251,7 @@ fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
         let (status, denied) = anna.ask(request, Some(body));
         assert_eq!((status, denied["code"].as_str()), (409, Some("denied")), "{request}: {denied}");
     }
-    // The hold-off also applies after a reconnect. Repeated requests extend it only if they are jogs.
+    // The hold-off also applies after a reconnect. Repeated requests extend the hold-off only if they are jogs.
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     let anna = Program::new(&served, "anna", 30.0, "continue");
     let asked = Instant::now();
@@ -300,7 +301,7 @@ fn an_arm_in_motion_is_recovered_and_the_policy_of_one_run_is_that_of_one_run() 
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 1 }));
     event(&served, last, "executing");
     assert_eq!(over(&served, job, || {})["stage"], "stopped", "by its lease's own policy");
-    // A client without the lease pauses bob's run, and bob's Stop then ends it.
+    // A client without the lease pauses bob's run, and the Stop of bob then ends the run.
     std::thread::sleep(Duration::from_secs(3));
     let bob = Program::new(&served, "bob", 30.0, "continue");
     let job = bob.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));

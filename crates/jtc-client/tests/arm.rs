@@ -1,4 +1,4 @@
-//! A whole arm of a controller by HTTP: read, uploaded, stored, and refused as a whole.
+//! Tests of a complete arm by HTTP. The arm is read, uploaded and stored, or refused completely.
 use crate::common;
 
 use common::Served;
@@ -15,7 +15,7 @@ fn arm(served: &Served) -> (Arm, Value) {
     (Arm::parse(found["text"].as_str().expect("a text")).expect("an arm file"), found)
 }
 
-/// Returns the delivered arm file with this replacement.
+/// Returns the text of the default arm file with this replacement.
 fn other(from: &str, to: &str) -> String {
     assert!(AVENA_TOML.contains(from), "{from}");
     AVENA_TOML.replacen(from, to, 1)
@@ -40,7 +40,7 @@ fn an_arm_is_read_given_and_stored_and_what_is_none_changes_nothing() {
         String::new(),
         text.replace("stop_ms = 400", "stop_ms = 5"),
         text.replace("stop_ms", "stop_mss"),
-        // Complete, but with a parameter that no controller accepts.
+        // This arm is complete, but contains a parameter that no controller accepts.
         text.replace("stop_ms = 400", "kp_max = 1"),
     ] {
         let (status, error) = anna.ask("PUT /api/arm", Some(json!({ "text": wrong })));
@@ -60,7 +60,7 @@ fn an_arm_is_read_given_and_stored_and_what_is_none_changes_nothing() {
     assert!(done["given"]["stored_number"].is_null());
     assert_eq!(event(&served, 0, "given").1["job"], job);
 
-    // The controller holds the arm now. Under torque, differences are refused and not applied.
+    // After the recovery, the controller holds the arm. Under torque, differences are refused and not applied.
     anna.recover();
     let job = anna.begin("PUT /api/arm", json!({ "text": AVENA_TOML }));
     let failed = anna.over(job);

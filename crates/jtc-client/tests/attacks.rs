@@ -1,4 +1,4 @@
-//! Attacks by clients without access rights, from the list in docs/security.md.
+//! Tests of attacks by clients without access rights, which docs/security.md lists.
 use crate::common;
 
 use common::Served;

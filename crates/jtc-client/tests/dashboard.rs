@@ -1,4 +1,4 @@
-//! Data for the dashboard: the arm as numbers, trajectories as points, commands, explanations of codes, reports.
+//! Tests of the data for the dashboard: arm parameters, trajectory points, commands, explanations of codes, and reports.
 use crate::common;
 
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use test_kit::patience::{Patience, until};
 
 const ZERO: [f64; 6] = [0.0; 6];
 
-/// Returns a motion from the zero pose to another pose at half of the limits, as the text of a file.
+/// Returns the text of a trajectory file with a motion from the zero pose to another pose at half of the limits.
 fn there() -> String {
     let way = plan::joint_move(&[0.0; 6], &[0.4, -0.2, 0.3, 0.0, 0.2, 0.1], &Arm::avena().config(), 50.0);
     way.expect("it is within the limits").to_exact_csv()
@@ -58,7 +58,7 @@ impl Port for Counted {
     }
 }
 
-/// Returns the controller's arm after the agent has read it.
+/// Returns the arm of the controller after the agent has read it.
 fn model(served: &Served) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -115,7 +115,7 @@ fn the_arm_is_shown_as_numbers_without_a_question_for_each_who_looks() {
     let asked = sent.load(Ordering::Relaxed) - before;
     assert!(asked < 1000, "{asked} bytes for a hundred who look within some seconds");
 
-    // A new arm is shown at once, before the next regular request.
+    // The agent shows a new arm at once, before its next regular request to the controller.
     let anna = Program::new(&served, "anna", 60.0, "continue");
     let slow = json!({ "settings": [{ "name": "velocity_max_rad_s", "joint": 2, "value": 0.25 }] });
     assert_eq!(anna.ask("PUT /api/settings", Some(slow)).0, 204);
@@ -194,8 +194,8 @@ fn codes_are_explained_by_name_number_and_words() {
     );
 }
 
-/// If a run fails midway, its errors have explanation pages, the commanded values are shown, and its report begins with
-/// the first failure.
+/// If a run fails in the middle, its errors have explanation pages and the commanded values are shown. The report begins with the first
+/// failure.
 #[test]
 fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_goes_well() {
     let arm = Arm::avena();
@@ -274,7 +274,7 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
         "{}",
         good.len()
     );
-    // The path ends before the arm has settled. Until then the controller holds the arm at the end of the path.
+    // The path ends before the arm has settled. Until the arm has settled, the controller commands the end point of the path.
     until("nothing is commanded", || controller()["commanded_rad"].is_null());
 
     // A stopped motion also has a report, and earlier reports are kept.

@@ -1,4 +1,4 @@
-//! Clients that use up all connections. A separate program, because they use many.
+//! Tests of clients that use up all connections. The tests are a separate program, because they open many connections.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 

@@ -1,4 +1,4 @@
-//! A Stop cancels earlier requests, even if parts of them arrive late.
+//! Tests that a Stop cancels earlier requests, even if parts of the requests arrive late.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -18,7 +18,7 @@ fn positions(served: &Served) -> Vec<f64> {
     joints.iter().map(|joint| joint["position_rad"].as_f64().expect("it is measured")).collect()
 }
 
-/// Sends the head of a request without its body.
+/// Sends the header of a request without its body.
 fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
     let mut stream = TcpStream::connect(served.address).expect("it listens");
     let head = format!(
@@ -42,7 +42,7 @@ fn a_request_that_began_before_a_stop_moves_nothing_however_late_its_body_comes(
     let mut late = begin(&served, "POST /api/moves", &anna.key, &body);
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(served.get("POST /api/stop").0, 200);
-    // Waits until the hold-off of three seconds has passed.
+    // The test waits until the hold-off of three seconds has passed.
     std::thread::sleep(Duration::from_millis(3_300));
     late.write_all(body.as_bytes()).expect("it reads");
     let mut answer = String::new();
@@ -79,8 +79,7 @@ fn a_stop_ends_an_arm_that_is_being_given_and_what_is_in_use_of_it_is_named() {
     assert_eq!(served.get("POST /api/stop").0, 200);
     let done = anna.over(job["number"].as_u64().expect("a number"));
     assert_eq!((&done["stage"], &done["error"]["code"]), (&json!("stopped"), &json!("stopped")), "{done}");
-    // The first frames were on the line before the Stop. The agent does not revert parameters that the controller has
-    // accepted.
+    // The first frames were sent before the Stop. The agent does not revert parameters that the controller has accepted.
     let (message, given) = (done["error"]["message"].as_str().expect("words"), &done["given"]);
     assert!(message.contains("the controller already uses: one setting"), "{done}");
     assert_eq!(message.contains("its name"), given["named"] == true, "{done}");
@@ -97,7 +96,7 @@ fn a_plan_that_nobody_waits_for_any_more_takes_no_number() {
         served.api("POST /api/plans", None, Some(body))
     };
     assert_eq!(keep("mine", two).0, 200);
-    // A path with many corners takes seconds to plan.
+    // Planning a path with many corners takes seconds.
     let mut many = String::from("q1,q2,q3,q4,q5,q6\n");
     for i in 0..400 {
         many += &format!(

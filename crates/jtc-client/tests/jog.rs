@@ -1,4 +1,4 @@
-//! Jogging over a slow connection: requests that arrive late move no joint.
+//! Tests of jogging over a slow connection. Requests that arrive late do not move a joint.
 use crate::common;
 
 use std::time::Duration;
@@ -8,7 +8,7 @@ use common::program::Program;
 use serde_json::{Value, json};
 use test_kit::patience::{Patience, until};
 
-/// Waits until the arm is held and can be jogged. While the joints take up their load, they cannot be jogged.
+/// Waits until the arm is held and can be jogged. The joints cannot be jogged until they carry their load.
 fn ready(anna: &Program<'_>) {
     anna.recover();
     let still = json!({ "rates_rad_s": vec![0.0; 6] });
@@ -22,7 +22,7 @@ fn seen(served: &Served) -> (u64, f64) {
     (status["at_ms"].as_u64().expect("a time"), position)
 }
 
-/// Requests a jog of the last joint. The request contains the status time that the user saw.
+/// Requests a jog of the last joint, and returns the response. The request contains the status time that the user saw.
 fn jog(anna: &Program<'_>, as_of_ms: u64, rate: f64) -> (u16, Value) {
     let body = json!({ "rates_rad_s": [0.0, 0.0, 0.0, 0.0, 0.0, rate] });
     anna.ask(&format!("POST /api/jog?as_of_ms={as_of_ms}"), Some(body))
@@ -46,7 +46,7 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
     let (now_ms, after) = seen(&served);
     assert!((after - before).abs() < 1e-3, "{before} {after}");
     assert!(now_ms >= old_ms + 1_200, "{old_ms} {now_ms}");
-    // A jog with the current time moves the joint.
+    // A jog with the time of the present status moves the joint.
     let mut patience = Patience::begin();
     loop {
         let (now_ms, position) = seen(&served);
@@ -62,7 +62,7 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
         let (status, error) = jog(&anna, as_of_ms, 0.0);
         assert_eq!(status, 204, "{error}");
     }
-    // Without a time, the agent does not know how old the status was for which the jog was requested.
+    // If a request contains no time, the agent does not know the age of the status that the user saw.
     let body = json!({ "rates_rad_s": vec![0.0; 6] });
     assert_eq!(anna.ask("POST /api/jog?as_of_ms=-1", Some(body.clone())).0, 400);
     assert_eq!(anna.ask("POST /api/jog", Some(body)).0, 204);
@@ -80,7 +80,7 @@ fn a_status_that_no_agent_has_shown_yet_is_none() {
     assert!((seen(&served).1 - before).abs() < 1e-3);
 }
 
-/// Late messages can be recognised as late, even if they arrive steadily.
+/// Clients can detect late messages, even if the messages arrive at regular intervals.
 #[test]
 fn each_status_of_a_stream_has_the_time_when_it_was_made() {
     let served = Served::start(921_600);

@@ -1,11 +1,11 @@
-//! A run executes the trajectory that the user saw. A stored trajectory is replaced only on request.
+//! Tests that a run executes the trajectory that the user saw. A stored trajectory is replaced only if the request asks for it.
 use crate::common;
 
 use common::Served;
 use common::program::Program;
 use serde_json::{Value, json};
 
-/// Returns a short motion of the base by `far_rad`.
+/// Returns a short motion of the base joint by `far_rad`.
 fn sway(far_rad: f64) -> String {
     let rows = (0..=200).map(|i| {
         let t = f64::from(i) * 0.01;
@@ -39,7 +39,7 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     let (status, kept) = put(&served, "7", "small", 0.1);
     assert_eq!(status, 200, "{kept}");
     let seen = digest(&kept);
-    // All responses contain the same digest.
+    // All responses contain equal digests.
     assert_eq!(digest(&get(&served, "/api/trajectories")[0]), seen);
     assert_eq!(digest(&get(&served, "/api/trajectories/7/points?most=2")), seen);
     let check = get(&served, "/api/trajectories/7/check");
@@ -84,7 +84,7 @@ fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
         get(&served, "/api/status")["controller"]["joints"][1]["position_rad"].as_f64().expect("a position")
     };
     let before = place();
-    // The trajectory reaches 2 rad/s in the middle, which storing it permits.
+    // The trajectory reaches 2 rad/s in the middle. Such a trajectory can be stored.
     assert_eq!(put(&served, "7", "too fast", 2.6).0, 200);
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
     let ended = anna.over(job);
@@ -116,7 +116,7 @@ fn what_is_new_replaces_nothing() {
     assert_eq!((status, error["code"].as_str()), (409, Some("taken")), "{error}");
     assert_eq!(digest(&get(&served, "/api/trajectories")[0]), digest(&kept));
     assert_eq!(put(&served, "7?new=perhaps", "yours", 0.2).0, 400);
-    // An empty slot is filled; a used slot is replaced only on request.
+    // A plan can be stored under a free number. A used number is replaced only if the request asks for it.
     let (status, planned) = plan(8, true);
     assert_eq!(status, 200, "{planned}");
     assert_eq!(digest(&planned["kept"]), digest(&get(&served, "/api/trajectories/8/points")));

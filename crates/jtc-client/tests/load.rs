@@ -1,4 +1,4 @@
-//! Many viewers and one lease holder: no client disturbs another, and a client that does not read is disconnected.
+//! Tests with many viewers and one lease holder. Clients do not disturb each other, and a client that does not read is disconnected.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 
@@ -48,7 +48,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
             })
         })
         .collect();
-    // These clients request all data but read none.
+    // These clients request all data but do not read it.
     let deaf: Vec<_> = ["stream", "line", "foxglove"]
         .iter()
         .flat_map(|path| (0..4).map(move |_| *path))
@@ -66,7 +66,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
     let begun = Instant::now();
     let outcome = anna.follow(|_| {
         if begun.elapsed() > Duration::from_secs(3) {
-            // Any client sends a Stop under full load.
+            // A client sends a Stop under full load.
             let _ = served.get("POST /api/stop");
         }
         Flow::Continue

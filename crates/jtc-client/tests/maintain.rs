@@ -1,5 +1,5 @@
-//! Recovery of a controller by HTTP: clearing and resetting nodes, using its own arm or an uploaded arm, and the
-//! results of the doctor.
+//! Tests of the recovery of a controller by HTTP, with clearing and resetting nodes, stored or uploaded arms, and the results of the
+//! doctor.
 use crate::common;
 
 use std::time::Duration;
@@ -89,7 +89,7 @@ fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let (healthy, found) = findings(&served);
     assert!(!healthy && found.iter().any(|f| f["what"] == "joint 2: motor-control fault"), "{found:?}");
 
-    // Clearing only another drive would not help, and is refused (J-21).
+    // A request that clears only other drives is refused, because it has no effect on this fault (J-21).
     is_for_the_one_who_commands(&served, "POST /api/clear", &json!({ "joints": [2] }));
     let (status, error) = anna.ask("POST /api/clear", Some(json!({ "joints": [5], "gripper": true })));
     assert_eq!((status, error["code"].as_str()), (409, Some("refused")), "{error}");
@@ -100,7 +100,7 @@ fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let cleared = until(&served, |controller| controller["state"] != "Error");
     assert_eq!(cleared["errors"], json!([]), "{cleared}");
     assert_ne!(cleared["errors_occurred"], json!([]), "those that have occurred stay");
-    // Without a body, and with an empty body, all occurred errors are cleared.
+    // A request without a body or with an empty body clears all occurred errors.
     for body in [None, Some(json!({}))] {
         assert_eq!(anna.ask("POST /api/clear", body).0, 204);
     }
@@ -116,7 +116,7 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": 35 }))).0, 204);
     assert_eq!(look(&served, "GET /api/speed"), (200, json!({ "percent": 35 })));
 
-    // An uploaded arm must be complete, and its parameters that no frame can transmit must be acceptable.
+    // An uploaded arm must be complete. Its parameters that cannot be sent in a frame must also be acceptable.
     is_for_the_one_who_commands(&served, "POST /api/recover", &json!({ "arm": AVENA_TOML }));
     let heavy = AVENA_TOML.replacen("mass_kg = 4", "mass_kg = 5", 1);
     let other = heavy.replacen("position_max_rad = 2.97", "position_max_rad = 2.5", 1);
@@ -150,7 +150,7 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     }
     assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "HoldPos");
 
-    // Returns to the controller's own arm without torque. The controller then holds the arm.
+    // The arm of the controller is selected again while the torque is off. After that, the controller holds the arm.
     assert_eq!(anna.ask("POST /api/disable", None).0, 204);
     until(&served, |controller| controller["state"] == "Init");
     assert_eq!(served.api("POST /api/arm/defaults", None, None).0, 403);

@@ -1,4 +1,4 @@
-//! Trajectories through waypoints that the agent plans: stored, run, and refused with the error.
+//! Tests of trajectories through waypoints that the agent plans. The trajectories are stored and executed, or refused with an error.
 use crate::common;
 
 use std::time::Duration;
@@ -25,7 +25,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     assert_eq!(planned["points"].as_u64(), Some(trajectory.points.len() as u64));
     let seconds = |planned: &Value| planned["duration_s"].as_f64().expect("a number");
     assert!((seconds(&planned) - trajectory.duration_s()).abs() < 1e-9);
-    // The motion passes the second waypoint at its time.
+    // The motion passes the second waypoint at the time in the response.
     let times = planned["waypoint_times_s"].as_array().expect("times");
     let at = times[1].as_f64().expect("a number") * 1000.0 / f64::from(trajectory.step_ms);
     assert!((trajectory.points[at.round() as usize].position[0] - 0.4).abs() < 1e-3);
@@ -37,7 +37,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     );
     assert!(planned["joints"][1]["torque_peak_nm"].as_f64().is_some_and(|torque| torque > 1.0), "{planned}");
 
-    // The default torque margin is kept. With a margin of 0 less torque is left, and the response contains a warning.
+    // The default torque margin is kept. With a margin of 0, the remaining torque is smaller, and the response contains a warning.
     let left = |planned: &Value| planned["margin"]["percent"].as_f64().expect("a margin");
     assert!(left(&planned) >= 15.0 && planned["warnings"] == json!([]), "{}", planned["margin"]);
     let tight = plan(json!({ "waypoints": SWING, "margin_percent": 0 })).1;
@@ -46,7 +46,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     let wide = plan(json!({ "waypoints": THREE, "margin_percent": 50 })).1;
     assert!(seconds(&wide) > seconds(&planned), "{}", seconds(&wide));
 
-    // A slower motion with rounded corners, stored under a number.
+    // The request plans a slower motion with rounded corners, and stores it under a number.
     let slower = plan(json!({ "waypoints": THREE, "speed_percent": 50 })).1;
     assert!(seconds(&slower) > 1.5 * seconds(&planned), "{}", seconds(&slower));
     let keep = json!({ "number": 4, "name": "bow" });
@@ -67,11 +67,11 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     let anna = Program::new(&served, "anna", 30.0, "continue");
     anna.recover();
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 4 }));
-    // Another motion can be planned while a motion runs.
+    // Another motion can be planned while a motion is executed.
     assert_eq!(plan(json!({ "waypoints": THREE })).0, 200);
     assert_eq!(anna.over(job)["stage"], "finished");
 
-    // Planned with the limits of the controller.
+    // The plan uses the limits of the controller.
     assert_eq!(anna.ask("POST /api/disable", None).0, 204);
     std::thread::sleep(Duration::from_millis(500));
     let slow = json!([{ "name": "velocity_max_rad_s", "joint": 1, "value": 0.1 }]);
@@ -79,7 +79,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     assert_eq!(status, 204, "{error}");
     let planned = plan(json!({ "waypoints": THREE })).1;
     assert!(seconds(&planned) > 8.0, "{}", seconds(&planned));
-    // Planned with a payload.
+    // The plan uses a payload.
     let heavy = json!({ "mass_kg": 2.0, "com_m": [0.0, 0.0, 0.1] });
     let loaded = plan(json!({ "waypoints": THREE, "payload": heavy })).1;
     let torque = |planned: &Value| planned["joints"][1]["torque_peak_nm"].as_f64().expect("a torque");

@@ -1,4 +1,4 @@
-//! The tests of the crate in one program, so that only one program is linked. Each file here is a module of it.
+//! Test program with the tests of the crate, so that only one program is linked. Each file in this directory is a module of the program.
 mod agent;
 mod api;
 mod arm;

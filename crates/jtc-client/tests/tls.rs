@@ -1,4 +1,4 @@
-//! TLS: a client that trusts the agent's certificate can connect, and no other client can.
+//! Tests of TLS. A client can connect only if it trusts the certificate of the agent.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -11,7 +11,7 @@ use jtc_agent::tls;
 use jtc_client::{AgentPort, Options};
 use jtc_host::{Diagnose as _, PortError, Session};
 
-/// Creates files with a certificate for this computer's own address and with its key.
+/// Creates a file with a certificate for the address of this computer, and a file with its key.
 fn certificate(dir: &tempfile::TempDir, name: &str, mode: u32) -> (PathBuf, PathBuf) {
     use std::os::unix::fs::PermissionsExt as _;
     let made = rcgen::generate_simple_self_signed(["127.0.0.1".to_owned(), "localhost".to_owned()]);
@@ -42,7 +42,7 @@ fn a_session_works_over_tls_where_the_certificate_is_trusted() {
     }
     session.gripper(true).expect("it commands");
 
-    // Trusting another agent's certificate, trusting no certificate, and connecting without TLS.
+    // The cases are trust in the certificate of another agent, trust in no certificate, and a connection without TLS.
     let (other, _) = certificate(&dir, "other", 0o600);
     for certificates in [Some(other), None] {
         let refused = AgentPort::open(&url, &options(certificates)).err().expect("it is not trusted");

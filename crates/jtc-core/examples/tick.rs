@@ -1,4 +1,5 @@
-//! Measures the time of one control tick in Operate and the memory of the controller. Prints one `name value` per line (ns, bytes).
+//! Measures the time of one control tick in Operate and the memory of the controller. The program prints one `name value` pair per line, in
+//! ns and bytes.
 use std::collections::VecDeque;
 use std::hint::black_box;
 
@@ -20,8 +21,8 @@ fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
 /// Ticks over which the drives average their speed.
 const WINDOW: usize = 10;
 
-/// Returns the answers of nodes that answer at once and follow their set values exactly. `position`: positions in the last ticks, rad,
-/// newest first.
+/// Returns the answers of nodes that answer at once and follow their set values exactly. `position` contains the positions in the last
+/// ticks, rad, newest first.
 fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f64; 6]>) -> Vec<Frame> {
     let at = |j: usize, ago: usize| position.get(ago).or(position.back()).map_or(0.0, |position| position[j]);
     let mut out = Vec::new();
@@ -62,7 +63,7 @@ fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f
 }
 
 fn main() {
-    // The path goes there and back twice in 1,499 steps of 10 ms, and is at rest at both ends (J-36).
+    // The path moves forward and back twice in 1,499 steps of 10 ms, and is at rest at both ends (J-36).
     let pace = 2.0 * std::f64::consts::TAU / 14.99;
     let points: Vec<RawPoint> = (0..1500i32)
         .map(|i| {

@@ -1,8 +1,8 @@
-//! State that the controller keeps from tick to tick, as bits. The flight recorder writes it in a snapshot (J-56), and a replay reads it.
+//! Encoding of the persistent state of the controller as bits. The flight recorder writes this state to a snapshot (J-56), and a replay
+//! reads it.
 //!
-//! [`bit_codec!`] lists the fields of a type. The compiler checks the list: a field that is missing in the list is a compile error, so
-//! that every snapshot has it. Reading never fails: bits that are not from a snapshot give some value, and [`BitSource::is_damaged`]
-//! reports that.
+//! [`bit_codec!`] lists the fields of a type. A field that is missing in the list is a compile error, so every snapshot is complete.
+//! Reading never fails. Bits that are not from a snapshot result in an arbitrary value, and [`BitSource::is_damaged`] then returns `true`.
 use jtc_bus::{JointReport, NodeState};
 use jtc_wire::{ControllerState, StopKind, TrajectoryState};
 
@@ -11,7 +11,7 @@ pub(crate) trait BitSink {
     /// Appends the lowest `bits` (0 to 32) of `value`. The higher bits must be zero.
     fn put(&mut self, value: u32, bits: u32);
 
-    /// Appends 64 bits, or a single bit if all of them are zero, as for joints at rest.
+    /// Appends 64 bits, or a single bit if all 64 bits are zero, as for joints at rest.
     fn put_double(&mut self, value: u64) {
         self.put((value != 0).into(), 1);
         if value != 0 {
@@ -25,9 +25,9 @@ pub(crate) trait BitSink {
 pub(crate) trait BitSource {
     /// Returns the next `bits` (0 to 32). Bits after the end are zero.
     fn take(&mut self, bits: u32) -> u32;
-    /// Records that bits were read that cannot have been written.
+    /// Marks the source as damaged, because the bits that were read cannot have been written.
     fn damage(&mut self);
-    /// Returns `true` if bits were read after the end, or bits that cannot have been written.
+    /// Returns `true` if bits after the end were read, or if the bits cannot have been written.
     fn is_damaged(&self) -> bool;
 }
 
@@ -35,11 +35,11 @@ pub(crate) trait BitSource {
 pub(crate) trait BitCodec: Sized {
     /// Appends the value.
     fn write<S: BitSink>(&self, to: &mut S);
-    /// Reads the value back.
+    /// Reads a value from a snapshot.
     fn read<S: BitSource>(from: &mut S) -> Self;
 }
 
-/// Makes a structure part of a snapshot: all of its fields, in this order.
+/// Implements [`BitCodec`] for a structure, with all its fields in the listed order.
 macro_rules! bit_codec {
     ($type:ty { $($field:ident),+ $(,)? }) => {
         impl $crate::bit_codec::BitCodec for $type {
@@ -111,7 +111,7 @@ impl BitCodec for u128 {
 
 impl BitCodec for usize {
     fn write<S: BitSink>(&self, to: &mut S) {
-        // All values in this program fit.
+        // All values in this program fit in 32 bits.
         to.put(*self as u32, 32);
     }
 
@@ -121,7 +121,7 @@ impl BitCodec for usize {
 }
 
 impl BitCodec for f64 {
-    // Not inlined, because a snapshot has hundreds of these values.
+    // The function is not inlined, because a snapshot contains hundreds of these values.
     #[inline(never)]
     fn write<S: BitSink>(&self, to: &mut S) {
         self.to_bits().write(to);
@@ -189,7 +189,7 @@ impl BitCodec for NodeState {
     }
 }
 
-/// Implements [`BitCodec`] for a code that is one byte with a fixed list of values.
+/// Implements [`BitCodec`] for a one-byte code with a fixed list of values.
 macro_rules! code {
     ($($type:ty),+) => {$(
         impl BitCodec for $type {

@@ -6,42 +6,42 @@ use crate::friction;
 use crate::limits::JointConfig;
 use crate::parameters::{PidGains, TableOf};
 
-/// Share of the velocity limit up to which friction has been measured. Above it a fitted curve may have any value.
+/// Share of the velocity limit up to which friction has been measured. Above this velocity, a fitted curve may have any value.
 const MEASURED: f64 = 0.5;
-/// Number of speeds at which a friction polynomial is checked. A cubic changes little between them.
+/// Number of speeds at which a friction polynomial is checked. A cubic changes only a little between two of these speeds.
 const SPEEDS: u8 = 16;
 
-/// Bounds of gains, masses and friction. No arm with these drives has values outside them, and such values could throw or drop the arm
-/// (J-06).
+/// Bounds of gains, masses and friction. Arms with these drives have no values outside these bounds. Values outside the bounds could throw
+/// or drop the arm (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterBounds {
-    /// Highest Kp, N·m/rad. No such drive is known to run with more than 28 000.
+    /// Highest Kp, N·m/rad. The known drives use at most 28 000.
     pub kp_max: f64,
-    /// Highest Ki, N·m/(rad·s). No such drive is known to run with more than 24 000.
+    /// Highest Ki, N·m/(rad·s). The known drives use at most 24 000.
     pub ki_max: f64,
-    /// Highest Kd, N·m·s/rad. No such drive is known to run with more than 300.
+    /// Highest Kd, N·m·s/rad. The known drives use at most 300.
     pub kd_max: f64,
-    /// Largest magnitude of IntMin and IntMax, rad·s. Up to 120 is in use.
+    /// Largest magnitude of IntMin and IntMax, rad·s. The known arms use up to 120.
     pub integral_max: f64,
-    /// Largest torque on a joint at rest, as a share of its torque limit, that bounds of the integral may force if they exclude zero.
+    /// Largest torque at rest that the bounds of the integral may cause if they exclude zero, as a share of the torque limit of the joint.
     pub integral_bias_max: f64,
-    /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, can hold 50 kg only up to a distance of 0.73 m.
+    /// Largest mass of a link, kg. A drive of 360 N·m, the full scale of the bus, can hold 50 kg only up to a distance of 0.73 m.
     pub link_mass_max: f64,
-    /// Largest moment or product of inertia of a link, kg·m²: the moment of a mass of 50 kg at a distance of 1.4 m.
+    /// Largest moment or product of inertia of a link, kg·m²: the moment of inertia of 50 kg at a distance of 1.4 m.
     pub link_inertia_max: f64,
-    /// Largest friction torque of a joint at any speed, as a share of its torque limit. A polynomial is checked without its temperature
-    /// factor. Values up to 1.19 are in use.
+    /// Largest friction torque of a joint at any speed, as a share of its torque limit. A friction polynomial is checked without its
+    /// temperature factor. The known arms use values up to 1.19.
     pub friction_max: f64,
-    /// Like `friction_max`, but for speeds up to half of the velocity limit. Values up to 0.82 are in use.
+    /// Like `friction_max`, but for speeds up to half of the velocity limit. The known arms use values up to 0.82.
     pub slow_friction_max: f64,
-    /// Largest friction torque along a motion instead of against it, up to half of the velocity limit, as a share of the torque limit.
-    /// Measurement noise can cause such a torque.
+    /// Largest friction torque in the direction of the motion, up to half of the velocity limit, as a share of the torque limit.
+    /// Measurement noise can cause a friction torque in this direction.
     pub friction_reversed_max: f64,
     /// Largest friction torque at standstill, as a share of the torque limit.
     pub rest_friction_max: f64,
 }
 
-/// A parameter beyond its bounds.
+/// Parameter that is out of its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfBounds {
     /// Name of the parameter, with its unit.
@@ -100,7 +100,7 @@ impl ParameterBounds {
         within("Kd (N·m·s/rad)", kd, 0.0, self.kd_max)?;
         within("IntMin (rad·s)", int_min, -self.integral_max, int_max)?;
         within("IntMax (rad·s)", int_max, int_min, self.integral_max)?;
-        // The integral nearest to zero.
+        // The value is the magnitude of the allowed integral that is nearest to zero.
         let least = int_min.max(0.0) - int_max.min(0.0);
         within(
             "torque that the bounds of the integral force on a joint at rest (N·m)",
@@ -122,7 +122,7 @@ impl ParameterBounds {
         Ok(())
     }
 
-    /// Checks the mass and inertia of a payload. The bounds are those of a link.
+    /// Checks the mass and inertia of a payload. The bounds of a link apply.
     pub fn check_payload(&self, payload: &Payload) -> Result<(), OutOfBounds> {
         OutOfBounds::unless_within("mass of the payload (kg)", payload.mass, 0.0, self.link_mass_max)?;
         let most = self.link_inertia_max;
@@ -153,24 +153,24 @@ impl ParameterBounds {
         .map_err(|e| OutOfBounds { velocity: Some(velocity), ..e })
     }
 
-    /// Checks a polynomial over the speed range of the joint. The temperature factor has bounds of its own (J-42).
+    /// Checks a friction polynomial over the speed range of the joint. The temperature factor has separate bounds (J-42).
     pub fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), OutOfBounds> {
         let [c0, c1, c2, c3, ..] = *coefficients;
         let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
         let step = joint.velocity_max / f64::from(SPEEDS);
-        // Arms often move slowly, so the first step is divided into as many steps again.
+        // Arms often move slowly, so the first speed step is divided into the same number of smaller steps.
         let slow = (1..SPEEDS).map(|k| step * f64::from(k) / f64::from(SPEEDS));
         slow.chain((1..=SPEEDS).map(|k| step * f64::from(k))).try_for_each(|v| {
-            // The sign is smoothed around standstill, so the torque there is zero.
+            // The sign of the speed is smoothed around standstill, so the torque at standstill is zero.
             self.check_friction(friction::polynomial(&without_temperature, v, 0.0, v), v, joint)
         })
     }
 
-    /// Checks a table at the velocities of its rows, and at standstill.
+    /// Checks a friction table at the velocities of its rows, and at standstill.
     pub fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), OutOfBounds> {
         for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
             for &torque in row {
-                // Standstill is checked below, because most tables have no row for it.
+                // Standstill is checked below, because most tables contain no row for standstill.
                 if velocity != 0.0 {
                     self.check_friction(torque.into(), velocity.into(), joint)?;
                 }

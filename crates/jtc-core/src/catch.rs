@@ -1,17 +1,18 @@
-//! Catching a load that the model lacks, when the joints are enabled (J-43).
+//! Control of a load that is missing in the model, when the joints are enabled (J-43).
 //!
-//! Such a load begins to fall when its joint is enabled. The joint then swings around the position at which it will be held. At the end of
-//! the first swing the control law needs up to 1.7 times the torque that the model lacks. If that is above the torque limit, the limit is
-//! commanded, which stops every load that it can hold. Meanwhile the set position *sags* towards the joint, by as much as the computed
-//! torque exceeds the limit. So the joint comes to rest at the position at which the limit has stopped it. If it were held at its old
-//! position instead, the joint would be thrown upwards and fall again; with little friction this would never end.
+//! A load that is missing in the model begins to fall when its joint is enabled. The joint then oscillates around the position at which it
+//! will be held. At the end of the first oscillation, the control law needs up to 1.7 times the missing torque of the model. If this torque
+//! is above the limit, the limit is commanded, which stops every load that the limit can hold. During this time the set position *sags*
+//! towards the joint, in proportion to the torque above the limit. The joint therefore comes to rest at the position at which the limit
+//! torque has stopped it. If the set position did not sag, the joint would be thrown upwards and fall again. With little friction, this
+//! oscillation would never end.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::deceleration::moves;
 use crate::limits::JointConfig;
 
 /// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. This time is longer than the
-/// reversal of a swing.
+/// low-speed phase at the reversal of a swing.
 const CALM_MS: u16 = 100;
 
 /// Speed below which growth of a swing is treated as noise, rad/s.
@@ -20,18 +21,18 @@ const FAST_SWING: f64 = 0.1;
 /// State of a joint whose load may need to be caught.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Catch {
-    /// Time left for the catch, ms. 0: the catch is over, or the joint was not enabled.
+    /// Remaining time of the catch, ms. The value is 0 if the catch is over or if the joint was not enabled.
     left_ms: u16,
-    /// Time left until the joint is considered caught, ms.
+    /// Remaining time until the joint is considered caught, ms.
     busy_ms: u16,
-    /// Since it was enabled, the joint has been calm for `CALM_MS` at least once.
+    /// `true` if the joint has been calm for `CALM_MS` at least once since it was enabled.
     settled: bool,
     /// Sag of the set position, rad. The sag grows in one direction only.
     sag: f64,
     /// Highest speed of the present half swing, with its sign, and of the half swing before it, rad/s.
     peak: f64,
     peak_before: f64,
-    /// The previous half swing was faster than the one before it.
+    /// `true` if the previous half swing was faster than the half swing before it.
     grew: bool,
 }
 
@@ -53,8 +54,8 @@ impl Catch {
         self.settled
     }
 
-    /// Runs one tick, with the measured velocity (rad/s). Returns `true` if a load may still be caught. A growing swing is not a load that
-    /// comes to rest but an unstable loop; it ends the catch.
+    /// Executes one tick with the measured velocity (rad/s). Returns `true` while the catch continues. A growing swing shows an unstable
+    /// control loop, so it ends the catch.
     pub(crate) fn step(&mut self, velocity: f64) -> bool {
         if self.settled && self.left_ms == 0 {
             return false;
@@ -64,7 +65,7 @@ impl Catch {
             self.busy_ms = CALM_MS;
             self.swing(velocity);
         } else {
-            // Noise around standstill is not a half swing: a fall after it has not grown from it.
+            // Noise around standstill does not count as a half swing, so a fall after the noise does not count as growth.
             self.busy_ms = self.busy_ms.saturating_sub(1);
             self.settled |= self.busy_ms == 0;
         }
@@ -90,8 +91,8 @@ impl Catch {
         (self.peak, self.peak_before, self.grew) = (0.0, 0.0, false);
     }
 
-    /// Runs one tick of a joint that has settled. Returns `true` if the joint has made three half swings, each faster than the one before
-    /// it.
+    /// Executes one tick for a joint that has settled. Returns `true` if the joint has made three half swings, each faster than the half
+    /// swing before it.
     pub(crate) fn watch(&mut self, velocity: f64) -> bool {
         if !self.settled || self.left_ms > 0 {
             return false;
@@ -102,19 +103,19 @@ impl Catch {
         self.grew && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
-    /// Ends the catch, because the joint has been brought to rest in another way.
+    /// Ends the catch, because the joint was stopped by another function.
     pub(crate) fn calm_down(&mut self) {
         *self = Self { settled: true, ..Self::default() };
     }
 
-    /// Returns `true` if a joint that has not settled yet swings with a growing amplitude, because its loop is unstable.
+    /// Returns `true` if a joint that has not settled yet oscillates with a growing amplitude, because its control loop is unstable.
     pub(crate) fn swing_grows(&self) -> bool {
         !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
     /// Returns the step of the set position, rad, if the computed torque exceeds the limit by `excess` (N·m) at a position error of `error`
-    /// (rad). Ends the catch if the sag would exceed the highest position error, or if the load pulls in the other direction, as in a swing
-    /// between both limits.
+    /// (rad). Ends the catch if the sag would exceed the highest position error. Also ends the catch if the load pulls in the other
+    /// direction, as in a swing between both limits.
     pub(crate) fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         // The set position moves at most to the measured position of the joint.
         let wanted = excess / kp;
@@ -151,8 +152,8 @@ mod tests {
             let mut catch = begun();
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
-            // Torque that only the derivative requires causes no sag. With a gain of zero the set position sags to the joint, but not
-            // further.
+            // Torque above the limit does not cause a sag if only the derivative requires it. With a position gain of zero, the set
+            // position sags only as far as the joint.
             assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
             assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
             assert!(catch.step(0.0), "it goes on");
@@ -190,7 +191,7 @@ mod tests {
         }
     }
 
-    /// Returns `true` if the catch continues after these velocities (rad/s), one per tick.
+    /// Returns `true` if the catch continues after these velocities (rad/s), one velocity per tick.
     fn goes_on(velocities: &[f64]) -> bool {
         let mut catch = begun();
         velocities.iter().all(|&velocity| catch.step(velocity))
@@ -205,7 +206,7 @@ mod tests {
         assert!(!goes_on(&[0.03, -0.05, 0.101]));
     }
 
-    /// After noise of the opposite sign, a load that begins to fall must be caught like any other.
+    /// After noise of the opposite sign, a load that begins to fall must be caught like any other load.
     #[test]
     fn j43_noise_around_standstill_is_no_half_of_a_swing() {
         for noise in [0.001, 0.01, 0.02] {
@@ -214,7 +215,7 @@ mod tests {
         }
     }
 
-    /// Gains on trial: a joint that has settled swings by itself only if its loop is unstable.
+    /// While gains are on trial, a settled joint oscillates without an external cause only if its control loop is unstable.
     #[test]
     fn j71_a_swing_that_grows_over_three_halves_is_seen_of_a_joint_that_has_settled() {
         let seen = |peaks: &[f64]| {

@@ -1,13 +1,13 @@
-//! The check of a trajectory while it is loaded, point by point, before the arm moves (J-36).
+//! Check of a trajectory during its upload, point by point, before the arm moves (J-36).
 //!
-//! Between two points (J-32) the commanded velocity is a cubic and the position a quintic. The derivative of the position is a quartic: the
-//! cubic plus a bump for the distance that the velocities do not explain. In Bernstein form each curve lies within the hull of a few
-//! control points. An interval passes at once if a rough estimate of its hulls is within the limits (`screen`). For any other interval the
-//! curves are halved until the hull is within the limits or a point of the curve is outside (`curve`).
+//! Between two points (J-32) the commanded velocity is a cubic and the position a quintic. The derivative of the position is a quartic. It
+//! is the cubic plus a bump for the distance that the velocities do not explain. In Bernstein form each curve lies within the hull of a few
+//! control points. An interval passes the check at once if a rough estimate of its hulls is within the limits (`screen`). For any other
+//! interval the curves are halved until the hull is within the limits or a point of the curve is outside (`curve`).
 //!
-//! Positions are rounded to steps of 96 µrad. The effect of this rounding on the derivative is not a fault of the path, so the distance of
-//! each interval is reduced by one step. `range` handles the effect on the positions themselves, and paths that begin outside the limits of
-//! a joint.
+//! Positions are rounded to steps of 96 µrad. The effect of this rounding on the derivative is not an error of the path. The check
+//! therefore reduces the distance of each interval by one step. `range` handles the effect of rounding on the positions, and paths that
+//! begin outside the limits of a joint.
 mod curve;
 mod range;
 mod screen;
@@ -29,31 +29,31 @@ use screen::{Screen, Steps};
 
 /// Highest speed at the first and the last point that is considered standstill, rad/s.
 pub const REST_SPEED: f64 = 0.02;
-/// One step of the wire format in rad, rad/s and rad/s².
+/// Steps of the wire format for position, velocity and acceleration, in rad, rad/s and rad/s².
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
-/// Highest number of halvings of curves in one interval, for all joints together. A curve is halved until its hull is within about a
-/// thousandth of its own height. Six joints at their limits in the same interval share the halvings. When these are used up, the check uses
-/// the hull.
+/// Highest number of halvings of curves in one interval, for all joints together. A curve is halved until the distance of its hull is about
+/// a thousandth of the height of the curve. Six joints at their limits in the same interval share the halvings. When all halvings are used,
+/// the check uses the hull.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// The position at a point, or of the quintic between two points, rad.
+    /// Position at a point, or position of the quintic between two points, rad.
     Position,
-    /// The velocity at a point, or of the cubic between two points, rad/s.
+    /// Velocity at a point, or velocity of the cubic between two points, rad/s.
     Velocity,
-    /// The acceleration at a point, rad/s².
+    /// Acceleration at a point, rad/s².
     Acceleration,
     /// Derivative of the position between two points, rad/s. The distance is first reduced by one int16 step.
     PositionSpeed,
-    /// The speed of the first or the last point, which must be at rest, rad/s.
+    /// Speed at the first or the last point, at which the joint must be at rest, rad/s.
     Rest,
-    /// A velocity outside the friction table in use, rad/s.
+    /// Velocity outside the friction table that the controller uses, rad/s.
     FrictionVelocity,
-    /// A bearing temperature outside the friction table in use, °C.
+    /// Bearing temperature outside the friction table that the controller uses, °C.
     FrictionTemperature,
 }
 
@@ -83,20 +83,20 @@ impl BitCodec for Quantity {
     }
 }
 
-/// First place at which a trajectory is outside its bounds (J-36).
+/// First point or interval at which a trajectory is outside its bounds (J-36).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
-    /// Index of the point, from 0.
+    /// Index of the point, counted from 0.
     pub point: u32,
     /// Fraction of the interval to the next point, 0..1.
     pub fraction: f64,
-    /// Index of the joint, base to wrist.
+    /// Index of the joint, counted from the base.
     pub joint: usize,
     /// Quantity that is outside its bounds.
     pub quantity: Quantity,
-    /// Its value, in the unit of the quantity.
+    /// Value of the quantity, in its unit.
     pub value: f64,
-    /// The bound that the value exceeds.
+    /// Bound that the value exceeds.
     pub limit: f64,
 }
 
@@ -112,7 +112,7 @@ struct JointBounds {
     friction: (f64, f64),
 }
 
-/// State of one check: its bounds and the last point.
+/// State of one check, with its bounds and the last point.
 #[derive(Clone, Debug)]
 pub struct TrajectoryCheck {
     bounds: [JointBounds; JOINTS],
@@ -128,9 +128,9 @@ pub struct TrajectoryCheck {
 /// State of the check after all points so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Passed {
-    /// Velocities of each joint.
+    /// Velocity range of each joint.
     pub speeds: [SpeedRange; JOINTS],
-    /// Joints that began outside their limits and have not come inside yet.
+    /// Joints that began outside their limits and have not moved inside yet.
     coming_in: [bool; JOINTS],
 }
 
@@ -149,7 +149,7 @@ impl Violation {
 }
 
 impl TrajectoryCheck {
-    /// Begins the check of a trajectory whose points are `step_ms` apart, with the friction `tables` if these are in use.
+    /// Begins the check of a trajectory whose points are `step_ms` apart, with the friction `tables` if the controller uses tables.
     pub fn new(config: &Config, step_ms: u16, tables: Option<&[TableOf<f32>; JOINTS]>) -> Self {
         let bounds = core::array::from_fn(|j| JointBounds {
             position: PathRange::of(config, j, step_ms),
@@ -169,13 +169,14 @@ impl TrajectoryCheck {
         }
     }
 
-    /// Continues a check after `points` points that have passed: `last` is the last of them, `passed` the state after them.
+    /// Continues a check after `points` points that have passed. `last` is the last of these points, and `passed` is the state after them.
     pub(crate) fn behind(mut self, points: u32, last: RawPoint, passed: Passed) -> Self {
         (self.points, self.last, self.last_steps, self.passed) = (points, last, (&last).into(), passed);
         self
     }
 
-    /// Checks the next point, and the interval from the last point to it. The check then continues from this point, even if it was refused.
+    /// Checks the next point, and the interval from the last point to it. The check then continues from this point, even if the point was
+    /// refused.
     pub fn take(&mut self, point: &RawPoint) -> Result<(), Violation> {
         let steps = Steps::from(point);
         let verdict = if self.points == 0 {
@@ -204,12 +205,12 @@ impl TrajectoryCheck {
         at_rest(&self.last, self.points.saturating_sub(1))
     }
 
-    /// Returns the state after the points taken so far.
+    /// Returns the state after the points that were checked so far.
     pub(crate) fn passed(&self) -> Passed {
         self.passed
     }
 
-    /// Returns for each joint whether it is outside its position limits, without the tolerance, at a point.
+    /// Returns `true` for each joint that is outside its position limits, without the tolerance, at a point.
     fn outside(&self, point: &RawPoint) -> [bool; JOINTS] {
         let positions = point.position_rad();
         core::array::from_fn(|j| !self.bounds[j].position.limits_contain(positions[j]))
@@ -221,7 +222,7 @@ impl TrajectoryCheck {
         at_rest(point, 0)
     }
 
-    /// Checks a point by itself, without the interval before it.
+    /// Checks a point without the interval before it.
     fn stands(&self, point: &RawPoint) -> Result<(), Violation> {
         let (at, before) = (SetPoint::from(point), self.last.position_rad());
         for (j, bounds) in self.bounds.iter().enumerate() {
@@ -245,7 +246,7 @@ impl TrajectoryCheck {
             outside(Quantity::Acceleration, a, (-bounds.acceleration, bounds.acceleration))?;
             outside(Quantity::FrictionVelocity, v, bounds.friction)?;
             if self.points == 0 {
-                // Every ramp of path time passes through standstill.
+                // Every ramp of path time passes through zero velocity.
                 outside(Quantity::FrictionVelocity, 0.0, bounds.friction)?;
             }
         }
@@ -301,8 +302,8 @@ impl TrajectoryCheck {
             if coming_in && !range.contains(p0) {
                 let (low, high) = range.inward(p0, VELOCITY_STEP + h * ACCELERATION_STEP);
                 let found = leaves(speed, low, high, &mut halvings);
-                // The place at which the curve turns outwards. If the curve is still inside there, the point at the start of the interval
-                // is reported.
+                // This is the position in the interval at which the curve turns outwards. If the curve is still inside at this position,
+                // the check reports the point at the start of the interval.
                 let place = |Leaves { at, .. }: Leaves| {
                     let value = interpolate(&a, &b, h, at).position[j];
                     let value = if range.contains(value) { p0 } else { value };
@@ -326,7 +327,8 @@ fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
     Ok(())
 }
 
-/// Checks that a trajectory with these `speeds`, which was loaded while another friction model was in use, is inside the present `tables`.
+/// Checks that a trajectory with these `speeds` is inside the present `tables`. The trajectory was loaded while the controller used another
+/// friction model.
 pub(crate) fn inside_tables(
     speeds: &[SpeedRange; JOINTS],
     tables: &[TableOf<f32>; JOINTS],

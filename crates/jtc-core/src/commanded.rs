@@ -1,25 +1,26 @@
-//! Set values of the last ticks. A measurement is compared with the set value of the same time (J-62).
+//! Set values (commanded positions and velocities) of the last ticks. A measurement is compared with the set value of the same time (J-62).
 //!
-//! A measurement is delayed: the drive read its encoder before it received the Move that it answered, and the command that follows from the
-//! measurement acts even later. The *due* position is the position that was commanded this *delay* ([`Config::delay_ticks`](crate::Config))
-//! ago; a joint that follows exactly would measure it now. The difference between the measured and the due position is therefore an error
-//! of the joint. This difference does not contain the distance that the joint has moved meanwhile.
+//! A measurement is delayed, because the drive has read its encoder before it received the Move that it answered. The command that follows
+//! from the measurement takes effect even later. The *due* position is the position that was commanded one *delay*
+//! ([`Config::delay_ticks`](crate::Config)) ago. A joint that follows exactly would measure the due position now. The difference between
+//! the measured and the due position is therefore an error of the joint. This difference does not include the distance that the joint has
+//! moved during the delay.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::SetPoint;
 use crate::{DT, JOINTS};
 
-/// Number of stored set values: a power of two, so that an index needs no comparison.
+/// Number of stored set values. It is a power of two, so that an index needs no comparison.
 const SLOTS: usize = 8;
 
-/// The last set values, in a ring.
+/// Ring buffer of the last set values.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Commanded {
     /// Positions, rad.
     position: [[f64; JOINTS]; SLOTS],
     /// Velocities, rad/s.
     velocity: [[f64; JOINTS]; SLOTS],
-    /// Slot of the present tick. The number wraps around.
+    /// Slot of the present tick. The slot number wraps around.
     now: u8,
 }
 
@@ -34,7 +35,7 @@ impl Commanded {
         self.now = self.now.wrapping_add(1);
     }
 
-    /// Stores the set values of the present tick. Call this each time that the tick changes them.
+    /// Stores the set values of the present tick. Call this function each time that the tick changes the set values.
     pub(crate) fn put(&mut self, point: &SetPoint) {
         let now = self.slot(0);
         (self.position[now], self.velocity[now]) = (point.position, point.velocity);
@@ -51,13 +52,13 @@ impl Commanded {
     }
 
     /// Returns the velocities (rad/s) that are due in the measurement of this tick. The set values of this tick are not known yet, so the
-    /// newest ones are those of the last tick.
+    /// newest set values are from the last tick.
     pub(crate) fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
         self.velocity(config.delay_ticks.max(1))
     }
 
-    /// Restarts a joint as if it had always been commanded to move at `velocity` (rad/s), and to be at `position` (rad) `ticks` ago. For a
-    /// delay of `ticks`, a measurement of that position is then due, and so are the measurements of the ticks that follow.
+    /// Resets the set values of a joint as if it had always been commanded to move at `velocity` (rad/s), with `position` (rad) as the set
+    /// position `ticks` ago. With a delay of `ticks`, the due position is then `position`, and it moves at `velocity` in the next ticks.
     pub(crate) fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
         for ago in 0..SLOTS as u8 {
             let slot = self.slot(ago);
@@ -68,13 +69,13 @@ impl Commanded {
         }
     }
 
-    /// Restarts all joints at rest.
+    /// Resets the set values of all joints to rest at `position` (rad).
     pub(crate) fn rest(&mut self, position: &[f64; JOINTS]) {
         (self.position, self.velocity) = ([*position; SLOTS], [[0.0; JOINTS]; SLOTS]);
     }
 
-    /// Shifts all stored set positions of a joint that has sagged by `way` (rad). A sag is not a motion, so the older positions change as
-    /// well.
+    /// Shifts all stored set positions of a joint by `way` (rad), after the joint has sagged by this distance. A sag is not a motion, so
+    /// the older set positions also change.
     pub(crate) fn shift(&mut self, joint: usize, way: f64) {
         for positions in &mut self.position {
             if let Some(position) = positions.get_mut(joint) {
@@ -102,7 +103,7 @@ mod tests {
     }
 
     proptest! {
-        /// Set values of earlier ticks can be read again, wherever the ring starts, and even if a tick stores its values twice.
+        /// Set values of earlier ticks can be read at every start position of the ring buffer, even if a tick stores its values twice.
         #[test]
         fn j62_the_last_set_values_are_kept(start in any::<u8>(), values in prop::collection::vec(-3.0..3.0f64, 8..300)) {
             let mut commanded = Commanded { now: start, ..Commanded::default() };
@@ -118,8 +119,8 @@ mod tests {
             }
         }
 
-        /// The measured position of a joint is due now. If the joint keeps its velocity, its position is also due in the ticks that follow.
-        /// Other joints do not change.
+        /// After the reset, the measured position of a joint is the due position. If the joint keeps its velocity, its position is also the
+        /// due position in the next ticks. The set values of other joints do not change.
         #[test]
         fn j44_j62_a_joint_that_begins_anew_has_no_error(
             start in any::<u8>(),
@@ -147,7 +148,7 @@ mod tests {
         }
     }
 
-    /// A sag shifts all stored positions, like the position errors that the PID controller stores.
+    /// A sag shifts all stored set positions, and also the position errors that the PID controller stores.
     #[test]
     fn j43_j62_a_sag_is_no_motion() {
         let mut commanded = Commanded::default();

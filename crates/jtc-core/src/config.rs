@@ -9,86 +9,87 @@ use crate::limits::JointConfig;
 /// Half of the drives' working area, in rad from zero in each direction (J-43).
 pub const WORKING_AREA: f64 = 2.9905;
 
-/// Settings of the device. A host reads and changes them by the table in [`crate::settings`] (J-53).
+/// Settings of the controller device. A host reads and changes the settings that the table in [`crate::settings`] lists (J-53).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Per joint, base to wrist.
+    /// Settings of each joint, from base to wrist.
     pub joints: [JointConfig; JOINTS],
     /// Acceleration of gravity in the base frame, m/s².
     pub gravity: [f64; 3],
-    /// A gripper is on the bus (J-20).
+    /// `true` if a gripper is on the bus (J-20).
     pub gripper: bool,
-    /// Behaviour of the gripper when the arm loses its torque, in Error and in Init. `true`: the pump is switched off until the host
-    /// switches it on again, and the gripper goes to ReadyToOperate, so that a part drops. `false`: an enabled gripper does not change, and
-    /// its pump keeps its last command, so that the gripper keeps its part.
+    /// Behaviour of the gripper when the arm loses its torque, in Error and in Init. If `true`, the pump is switched off until the host
+    /// switches it on again. The gripper changes to ReadyToOperate, so it drops its part. If `false`, an enabled gripper and the command of
+    /// its pump do not change, so the gripper keeps its part.
     pub pump_off_on_error: bool,
-    /// Full scale of the drives' velocity, rad/s (J-11).
+    /// Full-scale value of the velocity of the drives, rad/s (J-11).
     pub velocity_full_scale: f64,
-    /// Speed at which the drives stop with an error of their own while configuration bit 0x10 is set, rad/s (J-35).
+    /// Speed at which the drives report an error and stop if configuration bit 0x10 is set, rad/s (J-35).
     pub drive_speed_trip: f64,
-    /// Time over which the drives average their speed, ms. The controller compares positions and speed over this time (J-35). 0: no
-    /// comparison.
+    /// Time over which the drives average their speed, ms. The controller compares positions and speed over this time (J-35). With 0, it
+    /// does not compare them.
     pub drive_speed_window_ms: u8,
-    /// Torque that twists a gear by 1 rad, N·m/rad. The positions at the two ends of the gear may differ by the twist (J-35).
+    /// Torque that twists a gear by 1 rad, N·m/rad. The positions before and after the gear may differ by this elastic twist (J-35).
     pub gear_stiffness: f64,
-    /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, which is far coarser than the bus. While a joint is at rest,
-    /// the integral does not change within one such step (J-41).
+    /// Resolution of the joint encoders, rad. In the known drives it is 16 bits per revolution, which is much coarser than the resolution
+    /// on the bus. While a joint is at rest, the integral does not change within one encoder step (J-41).
     pub encoder_step: f64,
-    /// Age of a measurement when the command that follows from it takes effect, in ticks (J-62); 7 at most. The drives have a loop of 1 ms,
-    /// in which they read their encoder and apply the torque. A drive answers a Move that it receives between two loops with the reading of
-    /// the first loop, and applies the torque in the second. The controller uses the answer in its next tick, and the Move of that tick
-    /// takes effect in the third loop. So the delay is two loops after the reading, for any phase between the drive's loops and the
-    /// controller's ticks. An arm with a slower bus, or with drives that filter their positions, has a longer delay. 0: measurements are
-    /// compared with the present command.
+    /// Age of a measurement when the command that follows from it takes effect, in ticks (J-62); at most 7. The drives have a loop of 1 ms,
+    /// in which they read the encoder and apply the torque. A drive answers a Move that it receives between two loops with the encoder
+    /// value of the first loop, and applies the torque in the second loop. The controller uses the answer in its next tick, and the Move of
+    /// that tick takes effect in the third loop. The torque therefore takes effect two loops after the encoder was read, for any phase
+    /// between the loops of the drive and the ticks of the controller. An arm with a slower bus, or with drives that filter their
+    /// positions, has a longer delay. With 0, measurements are compared with the present command.
     pub delay_ticks: u8,
-    /// Configuration bits sent to every joint (J-11).
+    /// Configuration bits that the controller sends to every joint (J-11).
     pub joint_config_bits: u8,
-    /// Configuration bits sent to the gripper (J-11).
+    /// Configuration bits that the controller sends to the gripper (J-11).
     pub gripper_config_bits: u8,
     /// Ticks between statuses without a response (J-04).
     pub status_period_ms: u16,
-    /// Number of consecutive Moves without an answer or an acknowledgement that raises an error (J-14). Also the number of consecutive
-    /// Moves without a usable answer of one joint (J-35). Below this number the joint's motion is predicted (J-63).
+    /// Number of consecutive Moves without an answer or an acknowledgement that raises an error (J-14). The number also applies to
+    /// consecutive Moves without a usable answer of one joint (J-35). Below this number the joint's motion is predicted (J-63).
     pub missed_moves_max: u8,
     /// Time for which a node may be silent after its reset without an error, ms.
     pub node_boot_ms: u32,
     /// Longest time from READY to ENABLE, ms (J-16). This time is measured while enabling is requested.
     pub enable_timeout_ms: u32,
-    /// Highest speed at which joints are enabled, rad/s (J-16). Every joint must have been slower for `enable_still_ms`, so that a falling
-    /// arm is not stopped with a jolt.
+    /// Highest speed at which joints are enabled, rad/s (J-16). Every joint must have been slower than this speed for `enable_still_ms`, so
+    /// that a falling arm is not stopped abruptly.
     pub enable_speed_max: f64,
     /// Time for which the arm must have been slower than `enable_speed_max`, ms.
     pub enable_still_ms: u16,
-    /// Time after the torque was taken away in which joints are not enabled, ms. The motor control of the drives pauses for this time after
-    /// a stop. If enabling were requested earlier, the drives would enable only after the pause, when the arm may have begun to fall.
+    /// Time after the torque was switched off in which joints are not enabled, ms. The motor control of the drives pauses for this time
+    /// after a stop. If enabling were requested earlier, the drives would enable only after the pause, when the arm may have begun to fall.
     pub enable_rest_ms: u16,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
-    /// Length of the ramp of path time for pause, stop and resume, ms (J-33). The ramp is longer if the acceleration or torque limits
+    /// Duration of the ramp of path time for pause, stop and resume, ms (J-33). The ramp is longer if the acceleration or torque limits
     /// require it.
     pub ramp_ms: u16,
-    /// Measured speed that raises an error while torque is on, as a multiple of the joint's velocity limit (J-35).
+    /// Measured speed that raises an error while the torque is on, as a multiple of the velocity limit of the joint (J-35).
     pub overspeed_factor: f64,
-    /// Time for which a joint may exceed that speed before an error is raised, ms.
+    /// Time for which a joint may exceed the over-speed threshold before an error is raised, ms.
     pub overspeed_ms: u16,
-    /// Longest pause or stop if the torque limits allow it, ms (J-33).
+    /// Longest duration of a pause or stop if the torque limits allow it, ms (J-33).
     pub stop_ms: u16,
-    /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after that, the joints that move are
-    /// overloaded and lower their loads (J-33, J-70).
+    /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after this time, the moving joints
+    /// are overloaded and lower their loads (J-33, J-70).
     pub braking_ms_max: u16,
     /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above this share is
     /// considered a push (J-66).
     pub yield_torque_share: f64,
-    /// Time in which a computed torque may exceed its limit before the joint is overloaded, in ms of any 100 ms (J-43). During this time
-    /// the torque limit is commanded and the integral does not change. 0: the joint is overloaded in the first such tick. A single missing
-    /// point in a recorded trajectory makes a peak of a few milliseconds.
+    /// Time in which a computed torque may exceed its limit before the joint is overloaded, in ms within any 100 ms (J-43). During this
+    /// time the torque limit is commanded and the integral does not change. With 0, the joint is overloaded in the first tick with a torque
+    /// above its limit. A single missing point in a recorded trajectory causes a torque peak of a few milliseconds.
     pub torque_over_ms: u16,
-    /// If `true`, an overloaded joint releases the arm, as in the manual. Otherwise the controller reacts as in J-66 (J-43, J-66).
+    /// If `true`, an overloaded joint releases the arm, as the manual describes. Otherwise the controller reacts as described in J-66
+    /// (J-43, J-66).
     pub torque_release: bool,
-    /// A held stop ends only when the host has cleared it (J-69).
+    /// `true` if a held stop ends only when the host has cleared it (J-69).
     pub protective_stop_latches: bool,
-    /// Longest time after a joint was enabled for which its torque may stay at the limit without an overload, ms (J-43). The load of the
-    /// joint may be unknown at first, and must be caught.
+    /// Longest time after a joint was enabled for which its torque may stay at the limit without an overload, ms (J-43). At first, the load
+    /// of the joint may be unknown, and the controller must catch it.
     pub catch_ms_max: u16,
     /// Time over which a torque step at a change of state is blended out, ms (J-25, J-44).
     pub blend_ms: u16,
@@ -97,20 +98,21 @@ pub struct Config {
     pub teach_stiction: f64,
     /// Share of the joints' Coulomb friction that Teaching compensates (J-25).
     pub teach_friction: f64,
-    /// Highest speed of the flange in a jog, m/s (J-58). In Teaching, braking increases above this speed, up to its full value at twice the
-    /// speed (J-25). 0: no limit.
+    /// Highest speed of the flange in a jog, m/s (J-58). In Teaching, braking increases above this speed, up to its full value at twice
+    /// this speed (J-25). With 0, the speed is not limited.
     pub tool_speed_max: f64,
-    /// Time in which a motion can stop after the safety input has become 0, before the torque is taken away, ms (J-22). 0: the torque is
-    /// taken away at once.
+    /// Time in which a motion can stop after the safety input has become 0, before the torque is switched off, ms (J-22). With 0, the
+    /// torque is switched off at once.
     pub safety_input_ramp_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
-    /// Time without a valid frame from any host after which a motion is paused and teaching ends, ms (J-59); 0: never.
+    /// Time without a valid frame from any host after which a motion is paused and teaching ends, ms (J-59). With 0, host supervision is
+    /// off.
     pub host_timeout_ms: u16,
     /// Speed override, in seconds of path time per second, 0.05 to 1 (J-57). The speed override is not part of an arm.
     pub speed: f64,
-    /// Absent joints, for work on a bench (J-53). The controller expects no node for them, and executes no motion. This setting is not part
-    /// of an arm: at the start of the device no joint is absent.
+    /// Absent joints, for work on a bench (J-53). The controller does not expect nodes for absent joints, and does not execute a motion.
+    /// This setting is not part of an arm, and no joint is absent at the start of the device.
     pub absent: [bool; JOINTS],
     /// Position of each absent joint in the model, rad.
     pub absent_position: [f64; JOINTS],
@@ -121,8 +123,9 @@ pub struct Config {
 }
 
 impl Config {
-    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded: its position limits, clipped
-    /// to the working area while the drives are configured to keep to it (J-43). If `joint` is out of range, the range is empty.
+    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded. They are its position limits,
+    /// clipped to the working area if the drives are configured to keep to this area (J-43). If `joint` is out of range, the range is
+    /// empty.
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);
@@ -133,26 +136,26 @@ impl Config {
         }
     }
 
-    /// Returns `true` if the drives are configured to keep to their working area.
+    /// Returns `true` if the drives are configured to limit their motion to the working area.
     pub(crate) const fn keeps_to_working_area(&self) -> bool {
         self.joint_config_bits & config::WORKING_AREA != 0
     }
 }
 
-/// Reason why settings are refused: the drives cannot do what the limits allow.
+/// Reason why settings are refused, for example because the drives do not support the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// A position limit is outside the drives' working area (J-43).
+    /// A position limit is outside the working area of the drives (J-43).
     Position {
         /// Joint, from 1.
         joint: usize,
-        /// The position limit, rad.
+        /// Position limit, rad.
         value: f64,
         /// Half of the working area, rad.
         limit: f64,
     },
-    /// The lowest position is not below the highest one.
+    /// The lowest position is not below the highest position.
     Range {
         /// Joint, from 1.
         joint: usize,
@@ -183,7 +186,7 @@ pub enum ConfigError {
         joint: usize,
         /// The velocity limit times [`Config::overspeed_factor`], rad/s.
         value: f64,
-        /// Full scale of the drives' velocity, rad/s.
+        /// Full-scale value of the velocity of the drives, rad/s.
         limit: f64,
     },
     /// The over-speed threshold (J-35) is above the speed at which the drives trip.
@@ -251,11 +254,11 @@ impl core::fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 impl Config {
-    /// Checks that the drives can do what the joints' limits allow (J-35, J-43). Position limits must be inside the working area. The
-    /// drives must be able to report the over-speed threshold, and must not trip below it.
+    /// Checks that the drives support the limits of the joints (J-35, J-43). Position limits must be inside the working area. The drives
+    /// must be able to report the over-speed threshold, and must not trip below this threshold.
     ///
     /// # Errors
-    /// Returns the first joint whose limits the drives cannot do. A limit that is NaN is refused as well.
+    /// Returns the first joint whose limits the drives cannot do. A limit that is NaN is also refused.
     #[allow(clippy::neg_cmp_op_on_partial_ord)]
     pub const fn check(&self) -> Result<(), ConfigError> {
         let (value, limit) = (self.braking_ms_max, 2 * self.stop_ms as u32);

@@ -1,4 +1,4 @@
-//! The controller: its memory, and the changes of its state (J-20 to J-25).
+//! Memory and state changes of the controller (J-20 to J-25).
 use jtc_wire::{RawPoint, STATUS_LEN};
 
 use crate::check::{TrajectoryCheck, Violation};
@@ -21,23 +21,24 @@ use crate::telemetry::Observed;
 use crate::tick_overruns::TickOverruns;
 use crate::{ControllerState, TrajectoryState};
 
-/// The joint trajectory controller. `M` is the memory for the trajectory: [`crate::POINTS_MAX`] points.
+/// Joint trajectory controller. `M` is the memory for the trajectory, which contains [`crate::POINTS_MAX`] points.
 ///
-/// Parts with their own state are in separate modules: `nodes` (the bus), `received` (parameters), `store` (trajectory), `motion` (control
-/// law), `errors`. This type connects them. [`Controller::tick`] follows the figure of the manual from top to bottom.
+/// The parts that have a state are separate modules: `nodes` (the bus), `received` (parameters), `store` (trajectory), `motion` (control
+/// law), `errors`. `Controller` connects these parts. [`Controller::tick`] executes the steps of the figure in the manual from top to
+/// bottom.
 #[derive(Clone, Debug)]
 pub struct Controller<M> {
     pub(crate) config: Config,
     pub(crate) state: ControllerState,
     pub(crate) errors: Errors,
     pub(crate) nodes: Nodes,
-    // Received from the host.
+    // Parameters that the controller has received from the host.
     pub(crate) parameters: HostParameters,
     pub(crate) teaching: bool,
-    /// Milliseconds for which teaching has waited until the arm is held.
+    /// Time for which Teaching has waited until the arm is held, ms.
     pub(crate) teaching_waits_ms: u32,
     pub(crate) pump: bool,
-    // The trajectory and its execution.
+    // Store of the trajectory, followed by the fields of its execution.
     pub(crate) store: Store<M>,
     pub(crate) check: TrajectoryCheck,
     pub(crate) violation: Option<Violation>,
@@ -46,12 +47,12 @@ pub struct Controller<M> {
     pub(crate) phase: Phase,
     /// Ticks since a pause or stop was commanded on the path, until the arm is at rest (J-33).
     pub(crate) braking_ms: Option<u16>,
-    /// Ticks since the safety input stopped a motion. The torque is taken away at the end of this stop (J-22).
+    /// Ticks since the safety input stopped a motion. The torque is switched off at the end of this stop (J-22).
     pub(crate) safety_stop_ms: Option<u16>,
     pub(crate) motion: Motion,
     /// Cause of the last held stop (J-69).
     pub(crate) last_stop: LastStop,
-    // The link to the host.
+    // Progress of the present host command, followed by other fields of the link to the host.
     pub(crate) slice_progress: SliceProgress,
     pub(crate) overtaking: [Priority; HOST_LINES],
     pub(crate) uploads: [LineUpload; HOST_LINES],
@@ -64,7 +65,7 @@ pub struct Controller<M> {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Creates a controller in Start. The first tick changes to Init.
+    /// Creates a controller in Start. In the first tick, the state changes to Init.
     pub fn new(config: Config, points: M) -> Self {
         Self {
             state: ControllerState::Start,
@@ -97,18 +98,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises an internal error that no other bit explains: the device failed and was reset as a result (J-12). The error latches like any
-    /// other (J-21). The board calls this before the first tick.
+    /// Raises an internal error that no other bit explains, because the device failed and was therefore reset (J-12). The error latches
+    /// like any other error (J-21). The board calls this before the first tick.
     pub fn raise_internal(&mut self) {
         self.errors.raise_device();
     }
 
-    /// Returns the JtcStatus frame of the last tick whose outputs had `status` set; zeros before the first such tick.
+    /// Returns the JtcStatus frame of the last tick whose outputs had `status` set. Returns zeros before the first status.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         &self.status_frame
     }
 
-    /// Returns the reason why the check of J-36 refused the last segment or Execute; `None` if it was not refused.
+    /// Returns the reason why the check of J-36 refused the last segment or Execute; `None` if the check refused neither.
     pub fn violation(&self) -> Option<&Violation> {
         self.violation.as_ref()
     }
@@ -123,12 +124,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.nodes.ignored
     }
 
-    /// Returns `true` in a state that commands torque.
+    /// Returns `true` in a state in which the controller commands torque.
     pub(crate) fn powered(&self) -> bool {
         self.state.has_torque()
     }
 
-    /// Returns the state into which the controller brings the nodes in its present state.
+    /// Returns the state that the controller requests from the nodes in its present state.
     pub(crate) fn goal(&self) -> Goal {
         match self.state {
             ControllerState::Start | ControllerState::Init => Goal::Ready,
@@ -137,16 +138,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Chooses the state of this tick.
+    /// Selects the controller state of this tick.
     pub(crate) fn choose_state(&mut self) {
         let conditions = self.conditions();
         self.enter(next_state(self.state, &conditions));
     }
 
-    /// Evaluates the conditions that choose the state of this tick.
+    /// Evaluates the conditions that determine the controller state of this tick.
     fn conditions(&mut self) -> Conditions {
         let clearing = self.nodes.clearing();
-        // Init ends when every node is in ReadyToOperate. Later the nodes may also be enabled.
+        // Init ends when every node is in ReadyToOperate. After Init, the nodes may also be enabled.
         let mut initialised = self.parameters.missing() == 0
             && !clearing
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
@@ -160,7 +161,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            // J-60: HoldPos can find the load that the model lacks only after the payload is in the model.
+            // J-60: HoldPos can determine a load that is missing in the model only after the model includes the payload.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
                 && self.motion.may_be_taught(&self.config, self.errors.held_stop(), self.teaching_waits_ms),
@@ -187,7 +188,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
                 self.errors.end_held_stop();
-                // If the gripper does not keep its part, the pump stays off until it is commanded again.
+                // If the gripper does not keep its part, the pump stays off until the host switches it on again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
             ControllerState::HoldPos if last == ControllerState::Teaching => {
@@ -199,7 +200,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
         if last == ControllerState::Teaching {
-            // The torque that decelerates the arm continues in full.
+            // The torque that decelerates the arm is not reduced.
             self.motion.law.change_whole_torque();
         } else {
             self.motion.law.change_mode();
@@ -219,7 +220,7 @@ mod tests {
     use super::*;
     use crate::POINTS_MAX;
 
-    /// Checks the size of the part that the board's fast memory must hold: everything except the trajectory.
+    /// Checks the size of the controller without the trajectory, which must fit into the fast memory of the board.
     #[test]
     fn memory_beside_the_trajectory_fits_40_kib() {
         let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>() - size_of::<[RawPoint; POINTS_MAX]>();

@@ -1,5 +1,5 @@
-//! Deceleration to rest of a joint that still moves when position hold begins, because a hand was leading it, or because it sagged or fell
-//! while it was enabled (J-16, J-25).
+//! Deceleration of a joint that still moves when position hold begins (J-16, J-25). The joint moves because a hand was guiding it, or
+//! because it sagged or fell while it was enabled.
 use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
@@ -8,12 +8,12 @@ use crate::limits::JointConfig;
 
 /// Highest speed at which a joint is considered at rest, rad/s.
 const STANDING: f64 = 0.02;
-/// Highest deceleration of a joint that falls while it is enabled, rad/s². Gravity uses most of the torque of such a joint.
+/// Highest deceleration of a joint that falls while it is enabled, rad/s². Gravity requires most of the torque of a falling joint.
 const CATCH_DECELERATION: f64 = 3.0;
 /// Peak deceleration of a falling joint, as a multiple of the mean deceleration. The peak is in the middle of the motion.
 const STEEPEST: f64 = 1.5;
-/// Peak deceleration of a joint that was led, as a multiple of the mean deceleration. The peak is at the beginning, when the damping of
-/// Teaching already decelerates the joint.
+/// Peak deceleration of a joint that a hand was guiding, as a multiple of the mean deceleration. The peak is at the beginning, when the
+/// damping of Teaching already decelerates the joint.
 pub(crate) const STEEPEST_LED: f64 = 2.0;
 
 /// Returns `true` if a joint with this velocity (rad/s) moves.
@@ -26,24 +26,25 @@ pub(crate) fn moves(velocity: f64) -> bool {
 pub(crate) struct Deceleration {
     from: f64,
     velocity: f64,
-    /// 0 in the first tick, which commands the measured values. So the position error and its derivative begin at 0.
+    /// Elapsed time, ms. It is 0 in the first tick, which commands the measured values. The position error and its derivative therefore
+    /// begin at 0.
     elapsed_ms: f64,
     length_ms: f64,
-    /// The joint falls: no torque decelerates it at the beginning.
+    /// `true` if the joint falls, so that no torque decelerates it at the beginning.
     falls: bool,
 }
 
 bit_codec!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
-    /// Creates the deceleration of a joint that a hand leads, from a measured position (rad) and velocity (rad/s), within `length_ms`. The
-    /// velocity is clipped to the velocity limit.
+    /// Creates the deceleration of a joint that a hand guides. It starts at a measured position (rad) and velocity (rad/s) and takes
+    /// `length_ms`. The velocity is clipped to the velocity limit.
     pub(crate) fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }
     }
 
-    /// Creates the deceleration of a joint that falls. A faster joint takes longer.
+    /// Creates the deceleration of a joint that falls. The deceleration of a faster joint takes longer.
     pub(crate) fn falling(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
         let led = Self::led(from, velocity, f64::from(config.ramp_ms), limits);
         let length_ms = led.length_ms.max(STEEPEST * led.velocity.abs() / (CATCH_DECELERATION * DT));
@@ -60,18 +61,18 @@ impl Deceleration {
         self.from += way;
     }
 
-    /// Returns position, velocity and acceleration of the next tick, and `true` if the joint is at rest after it.
+    /// Returns position, velocity and acceleration of the next tick, and `true` if the joint is at rest after that tick.
     pub(crate) fn step(&mut self, limits: &JointConfig) -> ([f64; 3], bool) {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
         let (seconds, left) = (self.length_ms * DT, 1.0 - u);
-        // The velocity, its integral and its slope, as shares of v, v·T and v/T.
+        // The three values are the velocity, its integral and its slope, as shares of v, v·T and v/T.
         let (velocity, way, slope) = if self.falls {
             (1.0 - smooth(u), u - u * u * u + 0.5 * u * u * u * u, -6.0 * u * left)
         } else {
             (left * left, (1.0 - left * left * left) * (1.0 / 3.0), -2.0 * left)
         };
-        // The position never leaves the limits. A joint that is already outside does not go further out.
+        // The set position never leaves the limits. A joint that is already outside does not move further out.
         let position = (self.from + self.velocity * way * seconds)
             .max(limits.position_min.min(self.from))
             .min(limits.position_max.max(self.from));
@@ -88,12 +89,12 @@ mod tests {
 
     const RAMP_MS: f64 = 200.0;
 
-    /// Limits that are wide enough for every motion in these tests.
+    /// Returns limits that are wide enough for every motion in these tests.
     fn limits() -> JointConfig {
         JointConfig { position_min: -9.0, position_max: 9.0, ..Config::avena().joints[0] }
     }
 
-    /// Positions and velocities until the joint rests.
+    /// Returns the positions and velocities until the joint is at rest.
     fn ways(mut deceleration: Deceleration, limits: &JointConfig) -> Vec<(f64, f64)> {
         let mut ways = Vec::new();
         for _ in 0..5_000 {
@@ -145,7 +146,7 @@ mod tests {
             let most = decelerations(velocity);
             assert!((0.99 * CATCH_DECELERATION..1.001 * CATCH_DECELERATION).contains(&most), "{most}");
         }
-        // A slow joint takes the time of the ramp.
+        // The deceleration of a slow joint takes the time of the ramp.
         assert_eq!(
             ways(Deceleration::falling(0.0, 0.1, &config, &limits()), &limits()).len(),
             usize::from(config.ramp_ms) + 1
@@ -163,7 +164,7 @@ mod tests {
                     ways(Deceleration::led(end - 0.1 * outside, velocity, RAMP_MS, &limits), &limits);
                 let inward = velocity * outside < 0.0;
                 assert!(inside.iter().all(|(q, _)| (limits.position_min..=limits.position_max).contains(q)));
-                // A joint that is outside its limits at the start is not driven further out.
+                // A joint that is outside its limits at the start does not move further out.
                 let found = end + outside;
                 let beyond = ways(Deceleration::led(found, velocity, RAMP_MS, &limits), &limits);
                 let last = beyond[beyond.len() - 1].0;

@@ -1,4 +1,5 @@
-//! Defaults at the start of the device (rules, section 7). These defaults are generated from `arms/avena.toml` at build time.
+//! Default settings and parameters at the start of the device (rules, section 7). These defaults are generated from `arms/avena.toml` at
+//! build time.
 use jtc_dynamics::{ArmModel, Link, Origin, Payload};
 
 use crate::bounds::ParameterBounds;
@@ -6,7 +7,7 @@ use crate::config::Config;
 use crate::limits::JointConfig;
 use crate::parameters::{Friction, Parameters, PidGains, TableOf};
 
-/// The constants as the build script wrote them.
+/// Constants that the build script has generated.
 #[allow(clippy::excessive_precision)]
 mod arm {
     use super::*;
@@ -17,12 +18,12 @@ pub(crate) use arm::{MODEL, NAME, PID, POLYNOMIAL};
 
 /// Returns the default friction table of joint `j`.
 pub(crate) fn friction_table(j: usize) -> &'static TableOf<f32> {
-    // A single table may apply to all joints.
+    // If the arm file contains a single table, it applies to all joints.
     arm::TABLES.get(j).unwrap_or(&arm::TABLES[0])
 }
 
 impl Config {
-    /// Returns the default arm's settings.
+    /// Returns the settings of the default arm.
     pub const fn avena() -> Self {
         Self {
             joints: arm::JOINT_CONFIG,
@@ -71,7 +72,7 @@ impl Config {
     }
 }
 
-// The drives of the built-in arm can do what its limits allow.
+// The drives of the built-in arm must support its limits.
 const _: () = assert!(Config::avena().check().is_ok());
 
 impl Default for Config {
@@ -81,7 +82,7 @@ impl Default for Config {
 }
 
 impl Parameters {
-    /// Returns the default arm's parameters, with the friction polynomial.
+    /// Returns the parameters of the default arm, with the friction polynomial.
     pub const fn avena() -> Self {
         Self { model: MODEL, pid: PID, friction: Friction::Polynomial(POLYNOMIAL) }
     }

@@ -1,4 +1,4 @@
-//! Parts of the documents that tests generate from the code. With `UPDATE_DOCS=1` the tests write these parts.
+//! Parts of the documentation that tests generate from the code. With `UPDATE_DOCS=1` the tests write these parts.
 extern crate std;
 use std::format;
 use std::path::Path;

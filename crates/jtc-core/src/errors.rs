@@ -1,24 +1,24 @@
-//! Errors latch (J-21). This module stores the errors that have occurred, and the errors that hold the controller in Error.
+//! Errors latch (J-21). The module stores the errors that have occurred, and the errors that keep the controller in Error.
 use crate::bit_codec::bit_codec;
 use crate::{JOINTS, error};
 
 /// Latched and occurred errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Errors {
-    /// The safety input was low.
+    /// `true` if the safety input was low.
     emergency_input: bool,
-    /// The device itself failed.
+    /// `true` if the controller device failed.
     device: bool,
-    /// A node reported an error or misbehaved.
+    /// `true` if a node reported an error or violated the protocol.
     external_joints: bool,
-    /// Internal error word per joint.
+    /// Internal error word of each joint.
     joints: [u16; JOINTS],
     joints_occurred: [u16; JOINTS],
-    /// Causes of a held stop per joint, until the host clears them (J-69).
+    /// Causes of a held stop for each joint, until the host clears the stop (J-69).
     held: [u16; JOINTS],
-    /// CAN flags that are errors.
+    /// CAN flags that count as errors.
     can: u32,
-    /// Present CAN flags that are shown but are not errors.
+    /// Present CAN flags that are shown but do not count as errors.
     can_shown: u32,
     can_occurred: u32,
     occurred: u16,
@@ -53,7 +53,7 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Raises internal errors per joint; 0 for a joint without an error.
+    /// Raises the internal errors of each joint. The word of a joint without an error is 0.
     pub(crate) fn raise_joints(&mut self, bits: &[u16; JOINTS]) {
         if !any(bits) {
             return;
@@ -65,8 +65,8 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Adds the causes of a held stop to the occurred errors (J-69). If the stop `latches`, they are also shown as current until the host
-    /// clears them. The safety output stays 1.
+    /// Adds the causes of a held stop to the occurred errors (J-69). If the stop `latches`, the causes are also shown as current errors
+    /// until the host clears them. The safety output stays 1.
     pub(crate) fn hold_joints(&mut self, causes: &[u16; JOINTS], latches: bool) {
         for j in 0..JOINTS {
             self.joints_occurred[j] |= causes[j];
@@ -75,12 +75,13 @@ impl Errors {
         self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
     }
 
-    /// Adds the errors that a refused trajectory would have caused in motion (J-36) to the occurred errors. These errors are not latched.
+    /// Adds the errors that a refused trajectory would have caused in motion (J-36) to the occurred errors. The added errors are not
+    /// latched.
     pub(crate) fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
         self.hold_joints(bits, false);
     }
 
-    /// Returns `true` if a held stop is latched, so that nothing moves until the host clears it.
+    /// Returns `true` if a held stop is latched, so that the arm does not move until the host clears the stop.
     pub(crate) fn held_stop(&self) -> bool {
         any(&self.held)
     }
@@ -99,13 +100,14 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Shows the CAN flags of this tick that are not errors: the flags of the gripper (J-14). A flag disappears with its cause.
+    /// Shows the CAN flags of this tick that do not count as errors, which are the flags of the gripper (J-14). A flag is shown only as
+    /// long as its cause is present.
     pub(crate) fn show_can(&mut self, flags: u32) {
         self.can_shown = flags;
         self.can_occurred |= flags;
     }
 
-    /// Clears the current errors (ClearCurrentErrors): errors that still persist are raised again in the same tick.
+    /// Clears the current errors (ClearCurrentErrors). Errors that still persist are raised again in the same tick.
     pub(crate) fn clear_current(&mut self) {
         self.emergency_input = false;
         self.device = false;
@@ -120,7 +122,7 @@ impl Errors {
         *self = Self::default();
     }
 
-    /// Returns `true` if an internal error is latched, which holds the safety output at 0 (J-22).
+    /// Returns `true` if an internal error is latched, which keeps the safety output at 0 (J-22).
     pub(crate) fn internal(&self) -> bool {
         self.device || self.can != 0 || any(&self.joints)
     }
@@ -144,7 +146,7 @@ impl Errors {
         self.occurred
     }
 
-    /// Returns the current and the occurred word of a joint.
+    /// Returns the words of current and occurred errors of a joint.
     pub(crate) fn joint(&self, joint: usize) -> (u16, u16) {
         let of = |words: &[u16; JOINTS]| words.get(joint).copied().unwrap_or(0);
         (of(&self.joints) | of(&self.held), of(&self.joints_occurred))
@@ -155,7 +157,7 @@ impl Errors {
         (self.can | self.can_shown, self.can_occurred)
     }
 
-    /// Returns `true` if a CAN flag is an error.
+    /// Returns `true` if a CAN flag that counts as an error is set.
     pub(crate) fn can_error(&self) -> bool {
         self.can != 0
     }
@@ -172,8 +174,8 @@ mod tests {
 
     const INTERNAL: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
 
-    /// An error is in both words from the tick in which it is raised. The error stays in the word of occurred errors until the host clears
-    /// that word as well.
+    /// When an error is raised, both words show it in the same tick. The word of occurred errors contains the error until the host also
+    /// clears this word.
     #[test]
     fn j21_what_is_raised_has_occurred_until_that_is_cleared() {
         for (raise, word) in [

@@ -1,4 +1,4 @@
-//! The execution of a trajectory (J-30 to J-36): from Execute to standstill, at any point of the path.
+//! Execution of a trajectory (J-30 to J-36), from Execute to standstill at any point of the path.
 pub(crate) mod phase;
 
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, StopCause, StopKind};
@@ -12,10 +12,10 @@ use crate::{ControllerState, JOINTS, TrajectoryState, joint_error};
 use phase::Phase;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Starts the path: Execute from Stop or Finish.
+    /// Starts the path after Execute in Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
         let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
-        // Joints that are enabled later are checked again when they are enabled.
+        // If joints are not enabled yet, their positions are checked again when they are enabled.
         if !self.near(&first) || (self.motion.set.all_holding() && self.approach_to(&first).is_none()) {
             return Err(DataStatus::StartPositionMismatch);
         }
@@ -33,7 +33,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (0..JOINTS).all(|j| (self.nodes.positions()[j] - position[j]).abs() <= tolerance)
     }
 
-    /// Resumes the path: Execute from Pause. The arm must be at the paused point.
+    /// Resumes the path after Execute in Pause. The arm must be at the paused point.
     pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
         let paused = self.path_point();
         let there = self.motion.set.point.position == paused;
@@ -58,13 +58,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Returns the phase that moves the arm from the held position to `point` of the path. Returns `None` if a joint would leave its range,
-    /// or if the torque limits leave too little torque for an approach. An arm that is exactly at the first point needs no approach.
+    /// or if too little torque is available for an approach. An arm that is exactly at the first point needs no approach.
     fn approach_to(&mut self, point: &[f64; JOINTS]) -> Option<Phase> {
         let from = self.motion.set.point.position;
         if from == *point && self.clock.time == 0.0 {
             return Some(Phase::AtStart);
         }
-        // If the arm is outside its limits, the path may begin there (J-36).
+        // If the arm is outside its limits, the path may begin at its position (J-36).
         let within = |j: usize| {
             let (low, high) = PathRange::of(&self.config, j, self.store.step_ms()).of_path(from[j]);
             point[j] >= low && point[j] <= high
@@ -78,7 +78,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Some(Phase::approach(from, self.motion.approach_ms(point, &inputs)?))
     }
 
-    /// Ramps path time from standstill to the configured speed.
+    /// Accelerates path time along a ramp from standstill to the configured speed.
     fn go_on(&mut self) {
         self.clock.go(self.config.speed);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
@@ -93,7 +93,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Slows down the time of the path or of the approach, because this motion overloads a joint (J-75). Returns `false` if the arm is not
-    /// in such a motion, or is already stopping. In the tick in which the arm arrives, the overload needs no reaction.
+    /// on a path or an approach, or if it is already stopping. In the tick in which the arm arrives at its target, no reaction to the
+    /// overload is necessary.
     pub(crate) fn hold_back(&mut self) -> bool {
         if self.state != ControllerState::Operate {
             return false;
@@ -110,7 +111,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         true
     }
 
-    /// Runs one tick of a motion that is held back.
+    /// Executes one tick of a motion whose path time is slowed down.
     pub(crate) fn step_hold_back(&mut self) {
         if !self.motion.hold_back.is_watched() || !self.phase.goes_on() {
             return;
@@ -134,7 +135,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Pauses or stops the execution. TES stays Execute until standstill (J-33).
+    /// Pauses or stops the execution. The execution state (TES) stays Execute until standstill (J-33).
     pub(crate) fn leave_path(&mut self, command: ExecCommand) {
         let to = if command == ExecCommand::Pause { TrajectoryState::Pause } else { TrajectoryState::Stop };
         match &mut self.phase {
@@ -157,17 +158,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Allows braking with all available torque from now on.
+    /// Begins braking, for which all available torque is allowed.
     pub(crate) fn begin_braking(&mut self) {
         self.braking_ms = Some(0);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
-    /// Computes the set values of Operate.
+    /// Computes the set values in state Operate.
     pub(crate) fn walk(&mut self) {
         match self.phase {
             Phase::Waiting { elapsed_ms } => {
-                // Drives may take seconds to enable. Meanwhile the arm is held, and it may have sagged.
+                // Drives may take seconds to enable. During this time the arm is held, and it may have sagged.
                 self.motion.set.hold(&self.config);
                 if self.parameters.blend_left_ms() > 0 {
                     self.motion.law.payload_comes();
@@ -185,7 +186,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     match if self.near(&to) { self.approach_to(&to) } else { None } {
                         Some(phase) => self.phase = phase,
                         None => {
-                            // The host has been told that the arm would move, so the cause of this stop is kept.
+                            // The controller has accepted Execute, so it stores the cause of this stop for the host.
                             self.keep_cause(StopCause { kind: StopKind::Approach, ..StopCause::default() });
                             self.set_trajectory(TrajectoryState::Stop);
                         }
@@ -194,7 +195,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Phase::Approaching { from, length_ms, mut clock, leave } => {
                 if clock.time == 0.0 {
-                    // The arm was held until now, without friction compensation.
+                    // Until this tick, the arm was held without friction compensation.
                     self.motion.law.change_mode();
                 }
                 clock.advance(length_ms);
@@ -227,7 +228,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.clock.advance(f64::from(self.store.duration_ms()));
                 self.follow();
                 match leave {
-                    // The last point is at rest, so the arm stops there even if the rate is not zero.
+                    // The velocity at the last point is zero, so the arm stops at this point even if the rate of path time is not zero.
                     Some(trajectory) if self.clock.standing() || self.at_end() => {
                         self.clock.rest();
                         self.set_trajectory(trajectory);
@@ -250,7 +251,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.follow(&at, &mut self.clock, &self.config);
     }
 
-    /// Returns the positions at the present path time. Without a trajectory, for which Execute is refused, returns the held position.
+    /// Returns the positions at the present path time. Returns the held position if no trajectory is stored (Execute is then refused).
     fn path_point(&self) -> [f64; JOINTS] {
         self.store.at(self.clock.time).map_or(self.motion.set.point.position, |at| at.position)
     }
@@ -266,13 +267,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Runs one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues. Meanwhile all available torque
-    /// may brake. After `stop_ms` the remaining motion may be slow enough to be ignored. If path time or a jog still runs when the braking
-    /// time is over, torque cannot stop it: the joints that move are overloaded. If the arm is already held by then, and is moved from
-    /// outside, the ordinary limits apply.
+    /// Executes one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues. During the stop, all
+    /// available torque may be used for braking. After `stop_ms`, a remaining motion is ignored if it is slow enough. If path time or a jog
+    /// has not stopped when the braking time is over, the torque is not sufficient, and the moving joints are overloaded. If the arm is
+    /// already held at that time but is moved by an external force, the normal limits apply.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
-            // A jog has begun since then, or continues.
+            // A jog has begun since the stop, or continues.
             self.braking_ms = None;
         }
         let Some(ms) = self.braking_ms else { return false };

@@ -1,4 +1,4 @@
-//! Extensions of the protocol (J-50 to J-59): identity of the device, its settings, the arm as a unit, jogging.
+//! Extensions of the protocol (J-50 to J-59): identity and settings of the device, the arm as a unit, and jogging.
 mod answers;
 mod arm;
 mod image;
@@ -18,13 +18,13 @@ use crate::{Config, ControllerState, JOINTS, TrajectoryState};
 use state::{Extensions, LogRequest};
 pub use state::{Identity, firmware_hash};
 
-/// Highest number of values of a SetSettings frame that is accepted in every state.
+/// Highest number of values in a SetSettings frame that the controller accepts in every state.
 const LIVE_MAX: usize = 4;
 
-/// Highest number of values of a SetSettings frame while the arm is held or taught. A payload has ten values.
+/// Highest number of values in a SetSettings frame while the arm is held or in Teaching. A payload has ten values.
 const STANDING_MAX: usize = 16;
 
-/// Highest velocity of a jog while the encoders do not agree (J-35), rad/s. A host sends f32 values.
+/// Highest velocity of a jog while the two encoders of a joint disagree (J-35), rad/s. A host sends f32 values.
 const UNTRUSTED_MAX: f32 = 0.1;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
@@ -39,7 +39,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.identity.program = program;
     }
 
-    /// Returns the answer to an extension request. Send it if the outputs of the last tick had [`crate::Outputs::answer_line`] set.
+    /// Returns the frame with the answer to an extension request. Send this frame if the outputs of the last tick had
+    /// [`crate::Outputs::answer_line`] set.
     pub fn answer_frame(&self) -> &[u8] {
         self.extensions.answers.frame()
     }
@@ -64,8 +65,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::StoreArm => self.store_arm(),
             Command::Disable if self.settable() || self.holds_at_rest() => {
-                // J-53: without its parameters the controller goes to Init, without torque, and stays there. In Init and Error a host can
-                // then send another arm. Its parts need not match the parameters of the last arm (J-71).
+                // J-53: without its parameters the controller changes to Init, without torque, and stays in Init. In Init and Error a host
+                // can then send another arm. The parts of the new arm need not match the parameters of the last arm (J-71).
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
             }
@@ -97,7 +98,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.stops_held()
             && (set.jogging() || set.all_holding());
         if !free {
-            // A key that is held down during a held stop causes no motion when the stop is cleared.
+            // If a jog key is still pressed when a held stop is cleared, it does not cause a motion.
             if self.stops_held() && velocities.iter().any(|velocity| velocity != 0.0) {
                 self.extensions.refuse_jogs();
             }
@@ -107,7 +108,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let untrusted = self.nodes.untrusted() != 0;
         for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
             let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
-            // The wire format uses f32, so the limit itself may arrive as the next higher number. The comparison also refuses NaN.
+            // The wire format uses f32, so a velocity at the limit may arrive as the next higher number. The comparison also refuses NaN.
             let taken = velocity.abs() <= f64::from(joint.velocity_max as f32).max(joint.velocity_max);
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
             // J-53: an absent joint does not move.
@@ -122,7 +123,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 return Err(DataStatus::NotAllowed);
             }
         } else if !set.jogging() {
-            // No jog is active, so no jog must end.
+            // If no jog is active, a Jog with zero velocity has no effect.
             return Ok(());
         }
         let jogging = set.jogging();
@@ -141,7 +142,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.set.jog(&room.velocity, &room.acceleration, config);
                 Ok(())
             }
-            // The torque limits leave no torque for the jog, so it comes to rest.
+            // No torque is available for the jog, so the jog comes to rest.
             None if jogging => {
                 self.motion.set.end_jog();
                 Ok(())
@@ -150,7 +151,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Brings a jog to rest, and refuses the Jogs that follow it. Returns `true` if there was a jog.
+    /// Stops a jog, and refuses the Jogs that follow. Returns `true` if a jog was active.
     pub(crate) fn stop_jog(&mut self) -> bool {
         let jogging = self.motion.set.jogging();
         if jogging {
@@ -164,17 +165,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.state == ControllerState::HoldPos && self.at_rest()
     }
 
-    /// Returns `true` if the arm is at rest and no motion is commanded. The drives need not be enabled yet.
+    /// Returns `true` if the arm is at rest and no motion is commanded. The result does not depend on whether the drives are enabled.
     fn at_rest(&self) -> bool {
         !self.motion.set.coming_to_rest() && self.motion.set.moving(&self.nodes) == [false; JOINTS]
     }
 
-    /// Returns `true` while the torque is off. The settings of the arm change only then (J-53).
+    /// Returns `true` while the torque is off. The settings of the arm can change only while the torque is off (J-53).
     fn settable(&self) -> bool {
         matches!(self.state, ControllerState::Init | ControllerState::Error)
     }
 
-    /// Returns `true` if the arm is held or taught and no motion is commanded. Live settings that affect the torque may then change.
+    /// Returns `true` if the arm is held or in Teaching and no motion is commanded. In this state, live settings that affect the torque may
+    /// change.
     fn stands(&self) -> bool {
         match self.state {
             ControllerState::Teaching => true,
@@ -263,7 +265,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let all = |taken: fn(Live) -> bool| {
             values.iter().all(|value| settings::setting(value.setting).is_some_and(|row| taken(row.live)))
         };
-        // Every state has time for a few values in addition to its own work.
+        // In every state, a tick has time for a few values in addition to its normal computation.
         let all_live = values.len() <= LIVE_MAX && all(|live| live == Live::Always);
         let standing = self.stands()
             && values.len() <= STANDING_MAX
@@ -284,7 +286,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         if standing {
             if reloaded {
-                // If both payloads are empty, the payload does not change, even if its position does.
+                // If the old and the new payload are empty, the payload counts as unchanged, even if its position changes.
                 if config.payload.is_there() || self.config.payload.is_there() {
                     let heavier = config.payload.mass - self.config.payload.mass;
                     self.parameters.change_payload(&config, heavier);
@@ -311,10 +313,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         SliceOutcome::Done
     }
 
-    /// Uses these settings from now on. The controller must be in a state without torque.
+    /// Replaces the settings of the controller by these settings. The controller must be in a state without torque.
     fn use_settings(&mut self, config: Config) {
         if self.nodes.use_settings(&config, &self.config) {
-            // The pump does not start again by itself (J-23).
+            // The pump does not start again without a command (J-23).
             self.pump = false;
         }
         self.config = config;
@@ -322,8 +324,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// Reacts if no host has sent a valid frame for too long (J-59): path time comes to rest, and teaching ends. `done`: number of host
-    /// events that were done in this tick.
+    /// Stops path time and ends Teaching if no host has sent a valid frame for too long (J-59). `done` is the number of host events that
+    /// were processed in this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));

@@ -4,14 +4,14 @@ use crate::parameters::TableOf;
 
 /// Returns the torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
 ///
-/// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), with s as the smoothed sign of v. The temperature factor is clipped to 0.2..2,
-/// because the straight line that was fitted to the measured drives changes its sign near 60 °C: the compensation would then act as drag.
+/// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), with s as the smoothed sign of v. The temperature factor is clipped to 0.2..2. The
+/// straight line that was fitted to the measured drives changes its sign near 60 °C, and the compensation would then act as drag.
 pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }
 
-/// Like [`polynomial`]. The sign of the speed is a straight line around 0, and `sign_slope` is the reciprocal of the speed at which it
-/// reaches ±1, s/rad.
+/// Like [`polynomial`]. The smoothed sign of the speed is a straight line around 0. `sign_slope` is the reciprocal of the speed at which
+/// this line reaches ±1, s/rad.
 #[inline]
 pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
     // If the speed is NaN, the c1 term makes the torque NaN.
@@ -29,8 +29,8 @@ fn warmth(c: &[f64; 6], t: f64) -> f64 {
     within(1.0 + c[4] * (t - c[5]), 0.2, 2.0)
 }
 
-/// Returns the Coulomb friction of the table, N·m. A straight line through two slow speeds is extended to standstill, in both directions;
-/// the lower value is used. Returns zero if the table does not contain these speeds.
+/// Returns the Coulomb friction of the table, N·m. In both directions, a straight line through two slow speeds is extended to standstill.
+/// The lower of the two results is used. Returns zero if the table does not contain these speeds.
 pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
     const SLOW: f64 = 0.1;
     let at = |direction: f64| {
@@ -40,7 +40,7 @@ pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
     at(1.0).unwrap_or(0.0).min(at(-1.0).unwrap_or(0.0)).max(0.0)
 }
 
-/// Clips `x` without `clamp`, which compares. The board has an instruction for each of `max` and `min`.
+/// Clips `x` without `clamp`, because `clamp` needs comparisons. The processor of the board has instructions for `max` and `min`.
 fn within(x: f64, low: f64, high: f64) -> f64 {
     x.max(low).min(high)
 }
@@ -60,8 +60,8 @@ fn ends(axis: &[f32; 20]) -> (f64, f64) {
     (f64::from(*first), f64::from(*last))
 }
 
-/// Returns the bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. For a temperature outside the table the
-/// nearest column is used. Returns `None` for a velocity outside; both ends are inside.
+/// Returns the bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. For a temperature outside the table, the
+/// nearest column is used. Returns `None` for a velocity outside the table; both end values are inside.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let (slowest, fastest) = velocities(table);
     // A velocity that is outside only because of rounding in the interpolation between two points is considered inside.
@@ -73,13 +73,13 @@ pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let columns = row.array_windows().zip(next.array_windows());
     let (y, ([a, b], [c, d])) = locate(&table.temperature, columns, t)?;
     let [a, b, c, d] = [a, b, c, d].map(|&torque| f64::from(torque));
-    // First interpolates along the velocity at both temperatures of the cell, then between the temperatures.
+    // The first step interpolates along the velocity at both temperatures of the cell, and the second step between the temperatures.
     let (low, high) = (a + x * (c - a), b + x * (d - b));
     inside.then_some(low + y * (high - low))
 }
 
-/// Returns the position of `value` within its cell of an axis (0..1), and the element of `cells` for that cell. Returns `None` outside the
-/// axis.
+/// Returns the position of `value` within its cell of an axis (0..1), and the element of `cells` for that cell. Returns `None` if `value`
+/// is outside the axis.
 fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Option<(f64, T)> {
     let mut found = None;
     // The loop has no early exit, so that it takes the same number of instructions for every value.
@@ -92,7 +92,8 @@ fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Op
     Some(((value - f64::from(start)) / (f64::from(end) - f64::from(start)), cell))
 }
 
-/// Returns the temperature in °C. Drives send negative temperatures modulo 256, and no bearing reaches 200 °C.
+/// Returns the temperature that a byte from a drive represents, °C. Drives send negative temperatures modulo 256, and no bearing reaches
+/// 200 °C.
 pub(crate) fn celsius(byte: u8) -> f64 {
     let t = f64::from(byte);
     if byte >= 200 { t - 256.0 } else { t }
@@ -179,7 +180,8 @@ mod tests {
         assert_eq!([200, 246, 255].map(celsius), [-56.0, -10.0, -1.0]);
     }
 
-    /// A velocity that is outside the table by no more than rounding gets the torque at the end; twice as far outside is refused.
+    /// If a velocity is outside the table by at most the rounding tolerance, the torque at the end of the table is used. At twice this
+    /// distance, the velocity is refused.
     #[test]
     fn j36_j42_what_rounding_adds_to_a_velocity_has_the_torque_at_the_end() {
         let t = sample();

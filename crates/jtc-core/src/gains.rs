@@ -1,7 +1,8 @@
-//! Gains that match the inertia of the joints (J-71), and gains on trial.
+//! Check that gains match the inertia of the joints (J-71), and trial of new gains.
 //!
-//! The torques of the derivative and of the position error act with a delay, so a joint that is too light for its gains oscillates. The
-//! controller computes the least inertia that each joint feels in some fixed poses, one pose per tick, and compares the gains with it.
+//! The torques of the derivative and of the position error take effect with a delay, so a joint that is too light for its gains oscillates.
+//! The controller computes the smallest effective inertia of each joint in some fixed poses, one pose per tick. It compares the gains with
+//! this inertia.
 use core::f64::consts::TAU;
 
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -16,29 +17,30 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Age of the derivative's torque beyond [`Config::delay_ticks`], ticks. This age is half of the ticks over which the derivative is taken,
-/// plus half of the tick for which a torque is held.
+/// Delay of the torque of the derivative in addition to [`Config::delay_ticks`], ticks. This delay is half of the ticks over which the
+/// derivative is computed, plus half of the tick for which a torque is constant.
 const DERIVATIVE_AGE: f64 = 3.0;
-/// Age of the position error's torque beyond [`Config::delay_ticks`], ticks.
+/// Delay of the torque of the position error in addition to [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
-/// Factors of the required inertia: of Kd times the age of its torque, and of Kp times both ages. The result is 1.1 to 1.7 times the
-/// inertia at which the loop of one joint becomes stable, if Kp is at most half of the Kp that Kd can damp.
+/// Factors in the required inertia: the first for Kd times the delay of its torque, the second for Kp times both delays. The result is 1.1
+/// to 1.7 times the inertia at which the loop of one joint becomes stable, if Kp is at most half of the Kp that Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
-/// Highest sag of a joint, as a share of the position error limit, if new gains reduce the torque of its integral.
+/// Largest permitted sag of a joint if new gains reduce the torque of its integral, as a share of the position error limit.
 const SAG: f64 = 0.25;
 /// Least torque of the position gain at the position error limit, as a share of the torque limit.
 const STIFF: f64 = 0.03;
-/// Time over which new gains are blended in, and time for which they are on trial, ms.
+/// Time over which new gains are blended in, and duration of the trial of new gains, ms.
 const BLEND_MS: u16 = 500;
 const TRIAL_MS: u16 = 2_000;
-/// Time after new gains during which an unstable loop is attributed to them, ms.
+/// Time after new gains during which an unstable control loop is attributed to these gains, ms.
 const BLAMED_MS: u16 = 10_000;
-/// Factor that reduces the gains of a joint whose loop is unstable, and time after that within which a second instability is an error, ms.
+/// Factor that reduces the gains of a joint with an unstable control loop, and time after the reduction within which a second instability
+/// is an error, ms.
 const SOFTER: f64 = 0.3;
 const AGAIN_MS: u16 = 500;
 
-/// Position of each joint within its range in the poses after the first: points that fill the ranges evenly (Halton 1960).
+/// Position of each joint, as a share of its range, in the poses after the first pose. The points fill the ranges evenly (Halton 1960).
 const SHARES: [[f32; JOINTS]; POSES - 1] = shares();
 
 const fn shares() -> [[f32; JOINTS]; POSES - 1] {
@@ -74,7 +76,7 @@ fn pose(number: usize, config: &Config) -> JointVec {
     })
 }
 
-/// Least inertia that each joint feels while the other joints are free, in the poses computed so far, kg·m².
+/// Smallest effective inertia of each joint in the poses that were computed so far, while the other joints are free, kg·m².
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FeltInertia {
     joints: [f64; JOINTS],
@@ -86,7 +88,7 @@ impl FeltInertia {
     /// Start value before the first pose.
     pub(crate) const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
 
-    /// Computes the inertia in the pose with this number, for an arm without a payload.
+    /// Computes the effective inertias in the pose with this number, for an arm without a payload.
     #[inline(never)]
     pub(crate) fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
         let rotor = config.joints.each_ref().map(JointConfig::counted_rotor);
@@ -101,23 +103,23 @@ impl FeltInertia {
         self.joints.iter().all(|felt| felt.is_finite())
     }
 
-    /// Returns `true` if every joint is heavy enough for its gains.
+    /// Returns `true` if the inertia of every joint is sufficient for its gains.
     pub(crate) fn bears(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
         // The comparison also refuses NaN.
         gains.iter().zip(&self.joints).all(|(gains, felt)| *felt >= inertia_needed(gains, config.delay_ticks))
     }
 }
 
-/// Returns the least inertia (kg·m²) that each joint of an arm without a payload feels while the others are free. A controller with these
-/// settings computes it in the same way (J-71): in the zero pose and in sixteen poses within the position limits. For a drive without a
-/// configured rotor inertia, 0.7 kg·m² is used.
+/// Returns the smallest effective inertia (kg·m²) of each joint of an arm without a payload, while the other joints are free. Like a
+/// controller with these settings (J-71), the function uses the zero pose and sixteen poses within the position limits. For a drive without
+/// a configured rotor inertia, 0.7 kg·m² is used.
 pub fn least_felt_inertia(model: &ArmModel, config: &Config) -> [f64; JOINTS] {
     let mut felt = FeltInertia::NONE;
     (0..POSES).for_each(|number| felt.look(number, model, config));
     felt.joints
 }
 
-/// Returns the inertia (kg·m²) that a joint must feel before a controller accepts its gains (J-71).
+/// Returns the smallest effective inertia (kg·m²) at which a controller accepts these gains for a joint (J-71).
 pub fn inertia_needed(gains: &PidGains, delay_ticks: u8) -> f64 {
     let derivative = DT * (f64::from(delay_ticks) + DERIVATIVE_AGE);
     derivative * (PER_KD * gains.kd + PER_KP * gains.kp * position_delay(delay_ticks))
@@ -125,13 +127,13 @@ pub fn inertia_needed(gains: &PidGains, delay_ticks: u8) -> f64 {
 
 /// Returns the delay of the torque of the position error, s.
 fn position_delay(delay_ticks: u8) -> f64 {
-    // The delay is never shorter than the tick for which a torque is held.
+    // The delay is at least the tick for which a torque is constant.
     DT * (f64::from(delay_ticks) + POSITION_AGE).max(1.0)
 }
 
-/// Returns `true` if a held joint does not fall when it gets these gains (J-71). `p`: torque of its position error; `i`: torque of its
-/// integral, N·m. The position gain must make a minimum torque, and the torque that the integral can no longer hold must cause only a small
-/// position error.
+/// Returns `true` if a held joint does not fall when these gains are applied (J-71). `p` is the torque of the position error of the joint,
+/// and `i` is the torque of its integral, N·m. The position gain must produce a minimum torque. The torque that the integral can no longer
+/// produce must cause only a small position error.
 pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
     let held = p + i;
     let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
@@ -142,15 +144,15 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
 /// Gains that were received under torque, and the state of their trial.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
-    /// Gains before the trial, while they may be restored.
+    /// Gains before the trial, as long as the controller may restore them.
     before: Option<[PidGains; JOINTS]>,
-    /// Time for which all joints have been held during the trial, ms.
+    /// Time for which all joints have been held stable during the trial, ms.
     held_ms: u16,
-    /// Kp and Kd that were in use when the gains changed, and time left in which they are blended into the new ones, ms.
+    /// Kp and Kd at the time when the gains changed, followed by the remaining time of the blend to the new gains, ms.
     from: [[f32; 2]; JOINTS],
     blend_ms: u16,
-    /// Joints (a bit each) whose gains were reduced or restored because their loop was unstable, and time left in which the loop must not
-    /// become unstable again, ms.
+    /// Joints (one bit each) whose gains were reduced or restored because of an unstable control loop. The next field is the remaining time
+    /// in which a second instability is an error, ms.
     unstable: u8,
     again_ms: u16,
 }
@@ -159,20 +161,20 @@ bit_codec!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
 bit_codec!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
-    /// Begins a trial: a host sent the gains `given` under torque, in place of `before`.
+    /// Begins a trial, because a host has sent the gains `given` under torque. They replace the gains `before`.
     pub(crate) fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
-        // If the gains in `before` are themselves still on trial, they have not held the arm yet.
+        // If the gains in `before` are still on trial, they have not yet held the arm stable.
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
             self.before = Some(*before);
         }
-        // Gains that have held the arm before need no trial.
+        // Gains that have already held the arm stable need no trial.
         self.before = self.before.filter(|before| before != given);
         self.held_ms = 0;
     }
 
-    /// Ends the trial, because the arm is not held any more. If gains are on trial, returns the gains before them, because the new ones
-    /// have not held the arm.
+    /// Ends the trial, because the arm is no longer held. If gains are on trial, returns the gains before the trial, because the new gains
+    /// have not held the arm stable.
     pub(crate) fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
@@ -184,13 +186,13 @@ impl Trial {
         self.before = self.before.filter(may);
     }
 
-    /// Returns `true` if any of the times is running.
+    /// Returns `true` if one of the times of the trial has not elapsed.
     #[inline(always)]
     pub(crate) fn runs(&self) -> bool {
         self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
     }
 
-    /// Runs one tick under torque. `held`: all joints have settled, and none yields.
+    /// Executes one tick under torque. `held` is true if all joints have settled and no joint yields.
     pub(crate) fn step(&mut self, held: bool) {
         self.again_ms = self.again_ms.saturating_sub(1);
         self.blend_ms = self.blend_ms.saturating_sub(1);
@@ -205,7 +207,7 @@ impl Trial {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
-    /// Returns the gains of this tick while the gains `given` are blended in: Kp and Kd change gradually, the integral has changed at once.
+    /// Returns the gains of this tick while the gains `given` are blended in. Kp and Kd change gradually, but the integral changes at once.
     /// Returns `None` if the blend is over.
     pub(crate) fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
@@ -220,7 +222,7 @@ impl Trial {
         Some(blended)
     }
 
-    /// Begins a blend to other gains. The blend starts from the gains that act now, while `given` are in use.
+    /// Begins a blend to other gains. The blend starts from the gains that are effective now, while `given` are the configured gains.
     fn blend_from(&mut self, given: &[PidGains; JOINTS]) {
         let acting = self.blended(given).unwrap_or(*given);
         self.from = acting.map(|gains| [gains.kp as f32, gains.kd as f32]);
@@ -232,8 +234,9 @@ impl Trial {
         self.again_ms > 0 && self.unstable >> joint & 1 != 0
     }
 
-    /// Handles joints (a bit each) that fail with their `gains`; the loops of the `unstable` joints are unstable. If the gains must change,
-    /// returns the cause and the new gains: those before the trial or, if none are stored, softer gains for the unstable joints.
+    /// Handles joints (one bit each) that fail with their `gains`. `unstable` marks the joints with unstable control loops. If the gains
+    /// must change, returns the cause and the new gains. These are the gains before the trial or, if none are stored, softer gains for the
+    /// unstable joints.
     pub(crate) fn fails(
         &mut self,
         failed: u8,
@@ -252,7 +255,7 @@ impl Trial {
             (unstable != 0).then(|| (StopKind::Unstable, softer(gains, unstable, delay_ticks)))
         })?;
         self.blend_from(gains);
-        // The joints that fail get the new gains at once, without a blend.
+        // For the joints that fail, the new gains apply at once, without a blend.
         for j in 0..JOINTS {
             if failed >> j & 1 != 0 {
                 self.from[j] = [next.1[j].kp as f32, next.1[j].kd as f32];
@@ -262,13 +265,13 @@ impl Trial {
     }
 }
 
-/// Returns softer gains for the `joints` (a bit each). The damping of these gains is sufficient for their Kp.
+/// Returns softer gains for the `joints` (one bit each). The damping of these gains is sufficient for their Kp.
 fn softer(gains: &[PidGains; JOINTS], joints: u8, delay_ticks: u8) -> [PidGains; JOINTS] {
     core::array::from_fn(|j| match gains[j] {
         own if joints >> j & 1 == 0 => own,
         own => {
             let kp = SOFTER * own.kp;
-            // The delay of Kp uses at most half of Kd.
+            // The delay of the Kp torque cancels at most half of the damping by Kd.
             let kd = (SOFTER * own.kd).max(2.0 * kp * position_delay(delay_ticks));
             PidGains { kp, kd, ki: 0.0, ..own }
         }

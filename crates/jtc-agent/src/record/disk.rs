@@ -82,7 +82,7 @@ impl Disk {
         sent
     }
 
-    /// Begins a recording. Opens a recording. Like the other methods, this method never waits.
+    /// Begins a recording. Like the other methods, this method never waits.
     pub(super) fn open(&mut self, info: RecordingInfo) {
         self.lost = 0;
         self.send(Message::Begin(Box::new(info)), 0);

@@ -67,7 +67,7 @@ pub(super) struct Job {
 }
 
 impl Job {
-    /// Reads the files. Loads a trajectory file. Prints notes and warnings on stderr.
+    /// Reads the files. Prints notes and warnings on stderr.
     pub(super) fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         let arm = arm_of(args, out)?;
         let loaded = Loaded::load(file, Some(&arm.joint_names))?;

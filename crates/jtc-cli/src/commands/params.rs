@@ -219,7 +219,7 @@ fn as_text(set: &ParameterSet) -> String {
     text
 }
 
-/// Loads the files. Loads all files. Values of later files replace values of earlier files. Prints warnings on stderr.
+/// Loads the files. Values of later files replace values of earlier files. Prints warnings on stderr.
 fn load(files: &[PathBuf], out: &Output) -> Result<ParameterFile, Failure> {
     let read = ParameterFile::load_all(files)?;
     for warning in &read.warnings {

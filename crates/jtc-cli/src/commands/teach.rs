@@ -138,7 +138,7 @@ fn taught_no_more(status: &Status) -> Failure {
         .next("`jtc teach record FILE` starts a new recording")
 }
 
-/// Handles Ctrl-C. Handles signals. The first signal requests the end of the command. The second signal ends the command at once and
+/// Handles Ctrl-C and other signals. The first signal requests the end of the command. The second signal ends the command at once and
 /// reports the state at that moment.
 fn stop_at_once_with(
     out: Output,

@@ -23,7 +23,7 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Takes bytes. Adds received bytes. Bytes that are not a status (from a disturbed line) are passed on unchanged.
+    /// Adds received bytes. Bytes that are not a status (from a disturbed line) are passed on unchanged.
     pub(super) fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let n = self.partial.len();

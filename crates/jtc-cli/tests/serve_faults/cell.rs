@@ -1,4 +1,4 @@
-//! Simulated controller on a serial port, and its agent, each in its own process.
+//! Simulated controller on a serial port, and its agent, each in a separate process.
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, Stdio};
@@ -22,7 +22,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// Starts the processes. `tenths`: duration of the motion in tenths of a second.
+    /// Starts a simulated controller and an agent. `tenths` is the duration of the motion in tenths of a second.
     pub(super) fn new(baud: &str, tenths: i32) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let sim = Sim::start(&["--baud", baud]).with_parameters();
@@ -43,7 +43,7 @@ impl Cell {
         cell
     }
 
-    /// Starts a run through the agent. The policy applies when the program of the run is lost.
+    /// Starts a run through the agent. The policy applies when the program of the run is disconnected.
     pub(super) fn run(&self, policy: &str) -> Child {
         self.jtc(&["--json", "traj", "run", &self.motion, "--when-gone", policy, "--port", &self.url])
             .stdout(Stdio::piped())
@@ -58,7 +58,7 @@ impl Cell {
         command
     }
 
-    /// Returns the status of the controller through the agent.
+    /// Returns the status of the controller, which it requests through the agent.
     pub(super) fn status(&self) -> Value {
         self.status_at(&self.url)
     }
@@ -89,13 +89,13 @@ impl Cell {
         self.agent.wait().expect("it ends");
     }
 
-    /// Starts another agent in its place.
+    /// Starts another agent in place of the last agent.
     pub(super) fn next_agent(&mut self) {
         let port = &self.sim.as_ref().expect("it is there").port;
         (self.agent, self.url) = serve(&self.dir, port, &self.baud);
     }
 
-    /// Starts `jtc --json` with these words at the agent, and waits for this event.
+    /// Starts `jtc --json` through the agent with these arguments, and waits for this event.
     pub(super) fn at(&self, words: &[&str], event: &str) -> Program {
         let words = [&["--json"], words, &["--port", &self.url]].concat();
         let mut jtc = self.jtc(&words);
@@ -105,13 +105,13 @@ impl Cell {
         program
     }
 
-    /// Like [`Self::jtc`], waits for the end of a command that must succeed.
+    /// Runs a command like [`Self::jtc`], waits for its end, and checks that it succeeds.
     pub(super) fn done(&self, words: &[&str]) {
         let ended = self.jtc(&[words, &["--port", &self.url]].concat()).output().expect("it ran");
         assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
     }
 
-    /// Returns a program that uses only HTTP, with the operator's token.
+    /// Returns an HTTP client with the token of the operator.
     pub(super) fn http(&self) -> Http {
         let file = self.dir.path().join("state/openjtc/tokens.toml");
         let text = std::fs::read_to_string(file).expect("a token file");
@@ -187,7 +187,7 @@ impl Program {
         self.child.wait().expect("it ends");
     }
 
-    /// Waits until the program reports the lost link.
+    /// Waits until the program ends and reports the lost link.
     pub(super) fn ends_without_link(self) -> String {
         let Self { child, err } = self;
         let ended = child.wait_with_output().expect("it ends");

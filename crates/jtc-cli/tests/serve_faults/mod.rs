@@ -1,4 +1,4 @@
-//! Behaviour of the arm when a program, the agent or the controller is killed, in each phase of a job.
+//! Tests of the arm when a program, the agent or the controller is killed, in each phase of a job.
 #![cfg(unix)]
 
 mod cell;
@@ -21,7 +21,7 @@ fn a_program_that_is_killed_leaves_its_motion_to_its_policy() {
         run.wait().expect("it ends");
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
-        // The next client gets the lease at once.
+        // The next client receives the lease at once.
         let gripper = cell.jtc(&["gripper", "on", "--port", &cell.url]).output().expect("it ran");
         assert!(gripper.status.success(), "{}", String::from_utf8_lossy(&gripper.stderr));
     }
@@ -32,8 +32,8 @@ fn a_program_that_is_killed_in_its_upload_moves_nothing_whatever_its_policy() {
     for policy in ["continue", "stop"] {
         let cell = Cell::new("57600", 150);
         let mut run = cell.run(policy);
-        // The upload takes seconds. Now the controller has discarded the old motion, and has received only a part of
-        // the new one.
+        // The upload takes seconds. At this time the controller has discarded the old motion, and has received only a part of the new
+        // motion.
         std::thread::sleep(Duration::from_secs(2));
         assert!(run.try_wait().expect("a child").is_none() && !moves(&cell.status()), "it uploads");
         run.kill().expect("it runs");
@@ -56,7 +56,7 @@ fn an_agent_that_is_killed_leaves_the_motion_to_the_controller_and_says_so_to_it
     let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");
     let message = report["error"]["message"].as_str().unwrap_or_default().to_owned();
     assert!(message.contains("MAY BE MOVING"), "{report}");
-    // The controller has the whole motion and completes it, and every client can see this in the status.
+    // The controller has received the whole motion and completes it. The status shows this to every client.
     let port = cell.sim.as_ref().expect("it is there").port.to_str().expect("a name").to_owned();
     let baud = |words: &[&str]| {
         let mut command = cell.jtc(words);

@@ -1,4 +1,4 @@
-//! Phases other than upload and motion, and programs that use only HTTP.
+//! Tests of phases other than upload and motion, and of programs that use only HTTP.
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -41,20 +41,20 @@ pub(super) fn long_motion(cell: &Cell) -> String {
     file.to_str().expect("a name").to_owned()
 }
 
-/// Waits until the arm has moved, and then pauses.
+/// Waits until the arm has moved, and then pauses the motion.
 pub(super) fn pause(cell: &Cell) {
     cell.until("Execute", |status| trajectory(status) == "Execute");
     cell.done(&["traj", "pause"]);
     cell.until("Pause", |status| trajectory(status) == "Pause" && is_held(status));
 }
 
-/// Removes torque and parameters, so that `recover` must run all its steps.
+/// Switches off the torque and removes the parameters, so that `recover` must execute all its steps.
 fn disable(cell: &Cell) {
     cell.done(&["disable", "--yes"]);
     cell.until("Init", |status| state(status) == "Init");
 }
 
-/// Recovers the arm from any state, like a user after a fault.
+/// Recovers the arm from any state, as a user would do after a fault.
 fn recover(cell: &Cell) {
     cell.done(&["recover", "--defaults"]);
     cell.until("a held arm", is_held);
@@ -128,7 +128,7 @@ fn a_command_that_is_killed_leaves_what_it_has_begun_to_its_policy_or_as_it_is()
 /// Time without a request after which the lease lapses.
 const LASTS: Duration = Duration::from_millis(1500);
 
-/// A program that uses only HTTP, and is silent after its last request.
+/// HTTP client that sends nothing after its last request.
 pub(super) struct Silent<'a> {
     cell: &'a Cell,
     key: String,
@@ -152,7 +152,7 @@ impl<'a> Silent<'a> {
         answer
     }
 
-    /// Sends the program's last request: a job.
+    /// Sends the last request of the program, which starts a job.
     fn begins(self, request: &str, body: Value) -> Job<'a> {
         let last = self.cell.http().api("GET /api/status", None, None).1["last_event"].as_u64();
         let job = self.ask(request, body)["number"].as_u64().expect("a number");
@@ -160,7 +160,7 @@ impl<'a> Silent<'a> {
     }
 }
 
-/// A job whose client is silent.
+/// Job whose client sends no more requests.
 struct Job<'a> {
     cell: &'a Cell,
     job: u64,
@@ -191,8 +191,8 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
         assert_eq!(kept.0, 200, "{}", kept.1);
     }
 
-    // The client has seen the start of the check or of the upload. Which of the two it is depends on the speed of this
-    // computer.
+    // The client has seen the start of the check or of the upload. The speed of this computer determines if the client has seen the check
+    // or the upload.
     let job = Silent::come(&cell, "pause").begins("POST /api/runs", json!({ "trajectory": 7 }));
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");

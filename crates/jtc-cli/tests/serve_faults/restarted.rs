@@ -1,5 +1,5 @@
-//! First action of a new agent after the previous agent was killed: it applies the policy of the lease holder to an arm
-//! that still moves.
+//! Tests of a new agent after the previous agent was killed. The new agent first applies the policy of the lease holder to an arm that
+//! still moves.
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -8,8 +8,7 @@ use test_kit::patience::{Patience, until};
 use super::cell::{Cell, moves, trajectory};
 use super::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
-/// Checks the file before the agent is killed: it contains the policy and the cause of the motion. A separate thread
-/// writes it.
+/// Checks that the file contains the policy and the cause of the motion, before the agent is killed. A separate thread writes this file.
 fn is_left(cell: &Cell, policy: &str, what: &str) {
     let mut patience = Patience::begin();
     loop {
@@ -26,7 +25,7 @@ fn is_gone(cell: &Cell) {
     until("the end of the file: nothing moves", || cell.left().is_none());
 }
 
-/// Starts another agent, and returns its report.
+/// Starts another agent, and returns its report about the policy.
 fn next(cell: &mut Cell) -> Value {
     cell.kill_agent();
     follow(cell)
@@ -66,7 +65,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             (&json!(policy), &json!("motion"), &json!(true))
         );
         assert!(found["by"].as_str().is_some_and(|by| by.contains("jtc traj")), "{found}");
-        // The request was sent before any client was served.
+        // The agent sent the request before it served a client.
         let taken = [
             ("continue", "the motion continues"),
             ("pause", "a Pause was sent"),
@@ -82,7 +81,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
         if policy == "pause" {
-            // The motion can be resumed, so the policy is also stored for the agent after this one.
+            // The motion can be resumed, so the policy is also stored for the agent that follows this agent.
             is_left(&cell, policy, "motion");
             let found = next(&mut cell);
             assert_eq!(done(&found), "the motion stays paused");
@@ -91,7 +90,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             cell.until("Finish", |status| trajectory(status) == "Finish");
         }
         is_gone(&cell);
-        // Without a motion the agent has nothing to report.
+        // If no motion is in progress, the agent reports nothing.
         let before = cell.found().len();
         cell.kill_agent();
         cell.next_agent();

@@ -45,7 +45,7 @@ pub(super) fn write(dir: &Path) {
     save("gripper.urdf", &urdf(6, "revolute", gripper));
 }
 
-/// Returns a description of a robot with `joints` equal links, one above the other.
+/// Returns the description of a robot with `joints` equal links in a vertical chain.
 fn urdf(joints: usize, kind: &str, more: &str) -> String {
     let inertia = "<inertial><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial>";
     let mut text = format!("<robot name=\"robot\"><link name=\"link0\">{inertia}</link>\n");

@@ -1,4 +1,4 @@
-//! Many viewers and some clients that never read, in a separate process.
+//! Separate process with many viewers and some clients that never read.
 use std::io::Read as _;
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
@@ -10,7 +10,7 @@ use tungstenite::Message;
 
 use crate::common::socket;
 
-/// Number of viewers, with 25 statuses per second each; and paths for the clients that never read.
+/// Number of viewers, each of which receives 25 statuses per second, and URL paths of the clients that never read.
 pub(crate) const VIEWERS: usize = 50;
 const DEAF: [&str; 12] = [
     "stream", "line", "foxglove", "stream", "line", "foxglove", "stream", "line", "foxglove", "stream",
@@ -21,7 +21,7 @@ const DEAF: [&str; 12] = [
 pub(crate) struct Crowd(Child);
 
 impl Crowd {
-    /// Starts the clients. All of them are connected when this function returns.
+    /// Starts the clients. All clients are connected when this function returns.
     pub(crate) fn gather(address: SocketAddr) -> Self {
         let program = std::env::current_exe().expect("this program");
         let mut child = Command::new(program)
@@ -34,14 +34,14 @@ impl Crowd {
         Self(child)
     }
 
-    /// Ends the clients. Returns the statuses per second of the viewer that has received the fewest.
+    /// Ends the clients. Returns the status rate of the viewer that has received the fewest statuses, in statuses per second.
     pub(crate) fn dismiss(self) -> f64 {
         let ended = self.0.wait_with_output().expect("it ends");
         String::from_utf8_lossy(&ended.stdout).trim().parse().expect("a number")
     }
 }
 
-/// Runs the clients in their process until its stdin ends.
+/// Runs the clients in the separate process until its stdin ends.
 pub(crate) fn look(address: &str) {
     let address: SocketAddr = address.parse().expect("an address");
     let ended = Arc::new(AtomicBool::new(false));

@@ -1,5 +1,4 @@
-//! The serial line: a pseudo-terminal with the controller at its other end, and a model of a UART with this rate that
-//! transmits the agent's bytes.
+//! Serial line of the measurement. It is a pseudo-terminal to the controller and a model of a UART that transmits the bytes of the agent.
 use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -13,7 +12,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use crate::common::simulated;
 
-/// Rate of the line, Bd.
+/// Bit rate of the serial line, Bd.
 pub(crate) const BAUD: u32 = 115_200;
 const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 
@@ -22,18 +21,18 @@ const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 pub(crate) struct Stop {
     pub first_byte: Instant,
     pub last_byte: Instant,
-    /// Silence before the Stop, if it follows an abandoned frame.
+    /// Silence before the Stop, if the Stop follows an interrupted frame.
     pub gap: Option<Duration>,
 }
 
-/// Bytes that the agent has written to the line.
+/// Record of the bytes that the agent has written to the line.
 #[derive(Debug)]
 pub(crate) struct Seen {
     /// Time at which the line has transmitted all bytes.
     free_at: Instant,
     /// Number of bytes that are missing in the current frame.
     left: usize,
-    /// Largest number of bytes that waited for the line at the same time.
+    /// Largest number of bytes that waited for transmission at the same time.
     pub queued_most: usize,
     /// Number of bytes in frames since the last Stop.
     pub since_stop: usize,
@@ -63,7 +62,7 @@ impl Seen {
         self.since_stop += bytes.len();
         while !bytes.is_empty() {
             if self.left == 0 {
-                // The first piece of a frame contains at least its header.
+                // The first part of a frame contains at least its header.
                 self.left = usize::from(u16::from_be_bytes([bytes[2], bytes[3]]));
             }
             let taken = self.left.min(bytes.len());
@@ -79,7 +78,7 @@ pub(crate) struct Watched {
     seen: Arc<Mutex<Seen>>,
 }
 
-/// Access to the record of a line's bytes.
+/// Access to the record of the bytes on the line.
 #[derive(Clone)]
 pub(crate) struct Watch(Arc<Mutex<Seen>>);
 
@@ -106,8 +105,8 @@ pub(crate) fn begin() -> (Watched, Watch) {
     (Watched { port, seen: seen.clone() }, Watch(seen))
 }
 
-/// Runs the controller's end until this program ends. `_slave` is kept open, because the terminal would hang up without
-/// a host.
+/// Runs the controller side of the line until this program ends. `_slave` stays open, because the pseudo-terminal would report a hang-up
+/// without a host.
 fn control(master: &OwnedFd, _slave: &OwnedFd) {
     let flags = rustix::fs::fcntl_getfl(master).expect("flags");
     rustix::fs::fcntl_setfl(master, flags | OFlags::NONBLOCK).expect("flags");

@@ -1,7 +1,7 @@
-//! Measures the time until a Stop is on the line, and prints one JSON object. Run with `cargo run --profile dist -p
-//! jtc-client --example stops [N]` for N Stops under each load.
+//! Measures the time until a Stop is on the line, and prints one JSON object. Run the example with `cargo run --profile dist -p jtc-client
+//! --example stops [N]` for N Stops under each load.
 //!
-//! An agent owns a pseudo-terminal at 115,200 Bd with a simulated controller at its other end. The viewers are in a separate process.
+//! The agent owns a pseudo-terminal at 115,200 Bd, to which a simulated controller is connected. The viewers are in a separate process.
 #[cfg(unix)]
 #[path = "../../tests/common/mod.rs"]
 #[allow(dead_code, reason = "the tests use more")]

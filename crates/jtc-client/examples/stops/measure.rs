@@ -10,30 +10,29 @@ use crate::crowd::Crowd;
 use crate::line::{self, Watch};
 use crate::operator::Operator;
 
-/// Time between two Stops, long enough for the record of the first one. A random time up to `AT_ANY_TIME_US` is added,
+/// Time between two Stops, which is long enough for the response record of the first Stop. A random time up to `AT_ANY_TIME_US` is added,
 /// so that Stops occur at any phase of the statuses.
 const BETWEEN: Duration = Duration::from_millis(220);
 const AT_ANY_TIME_US: u64 = 120_000;
-/// Longest wait for an event; if it is missing then, the measurement has failed.
+/// Longest wait for an event. If the event has not occurred by then, the measurement has failed.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Number of bytes of an upload that are on the line before the Stop.
+/// Number of bytes of an upload that are sent on the line before the Stop.
 const UPLOADED: usize = 300;
 
 /// Measurements under one load, ms.
 #[derive(Default)]
 struct Samples {
-    /// Time from before the request connects to the first and to the last byte of the Stop on the line.
+    /// Time from the start of the request (before it connects) to the first and to the last byte of the Stop on the line.
     first: Vec<f64>,
     last: Vec<f64>,
-    /// Time from a request to its response, for a server that only answers.
+    /// Time from a request to its response, for a server that answers every request at once.
     bare: Vec<f64>,
-    /// Silence after an abandoned frame.
+    /// Silence after an interrupted frame.
     gaps: Vec<f64>,
     queued_most: usize,
 }
 
-/// Measures under each load and prints the results. If a measurement fails, its load is listed under `failed` with the
-/// cause.
+/// Measures `n` Stops under each load and prints the results. If a measurement fails, its load is listed under `failed` with the cause.
 pub(crate) fn print(n: usize) {
     let (port, watch) = line::begin();
     let served = Served::start_on(port, None, &[]);
@@ -57,7 +56,7 @@ pub(crate) fn print(n: usize) {
     println!("{}", Value::Object(figures));
 }
 
-/// Starts a server, with the same library and the same settings, that only answers.
+/// Starts a server that answers every request at once, with the library and the settings of the agent.
 fn bare_server() -> Http {
     let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
     let address = listener.local_addr().expect("it listens");
@@ -79,7 +78,7 @@ fn measure(
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     watch.look().queued_most = 0;
     for _ in 0..n {
-        // xorshift64, for a random time in the cycle of the statuses and a random position in a frame.
+        // The xorshift64 generator selects a random time in the status cycle and a random position in a frame.
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;

@@ -1,4 +1,4 @@
-//! The lease holder, which uploads one segment after the other.
+//! Lease holder that continuously uploads segments.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -11,9 +11,9 @@ use jtc_wire::{FRAME_MAX, RawPoint, fixed, trajectory};
 use crate::common::Served;
 use crate::line::Watch;
 
-/// Points per segment, which take five seconds on the line.
+/// Points per segment. The transmission of a segment takes five seconds.
 const POINTS: usize = 1600;
-/// If a segment is not on the line after this time, a Stop has removed it, and it will not be sent.
+/// Time after which a segment that is not on the line has been removed by a Stop and will not be sent.
 const AGAIN: Duration = Duration::from_millis(30);
 
 /// A client that holds the lease until it is dropped.

@@ -1,4 +1,4 @@
-//! An agent for a simulated controller in this process, and requests of any client.
+//! Agent for a simulated controller in this process, and functions for requests of any client.
 
 pub(crate) mod program;
 
@@ -24,14 +24,14 @@ use tungstenite::http::HeaderValue;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket, connect};
 
-/// Creates a simulated arm on a line with this rate.
+/// Creates a simulated arm on a serial line with this bit rate.
 pub(crate) fn simulated(baud: u32) -> LivePort {
     let arm = Arm::avena();
     let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
     LivePort::new(World::new(config))
 }
 
-/// Opens a viewer's WebSocket: `stream`, `line`, or `foxglove` with all its channels.
+/// Opens a WebSocket of a viewer, which is `stream`, `line`, or `foxglove` with all its channels.
 #[allow(dead_code, reason = "the test of a load and the example of stops take it, the suite does not")]
 pub(crate) fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     let mut request = format!("ws://{address}/api/{path}").into_client_request().expect("an address");
@@ -47,7 +47,7 @@ pub(crate) fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStrea
     socket
 }
 
-/// An agent that ends with the test.
+/// Agent that is stopped at the end of the test.
 pub(crate) struct Served {
     pub address: SocketAddr,
     pub tokens: Tokens,
@@ -68,7 +68,7 @@ impl std::ops::Deref for Served {
 }
 
 impl Served {
-    /// Starts an agent for a simulated arm on a line with this rate.
+    /// Starts an agent for a simulated arm on a serial line with this bit rate.
     pub(crate) fn start(baud: u32) -> Self {
         Self::start_with(baud, None, &[])
     }
@@ -87,7 +87,7 @@ impl Served {
         Self::start_with_store(port, tls, origins, Store::in_memory(), Arm::avena())
     }
 
-    /// Like [`Self::start_on`], with stored files and the given arm.
+    /// Like [`Self::start_on`], with stored files and the specified arm.
     pub(crate) fn start_with_store(
         port: impl Port + Send + 'static,
         tls: Option<Arc<rustls::ServerConfig>>,

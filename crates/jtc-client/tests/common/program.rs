@@ -1,11 +1,11 @@
-//! A program that holds the lease by HTTP.
+//! Program that holds the lease and uses HTTP.
 use serde_json::{Value, json};
 use test_kit::patience::Patience;
 use test_kit::written::text_with;
 
 use super::Served;
 
-/// A program that holds the lease.
+/// Program that holds the lease.
 pub(crate) struct Program<'a> {
     pub served: &'a Served,
     pub key: String,
@@ -36,13 +36,13 @@ impl<'a> Program<'a> {
         assert_eq!(done["stage"], "finished", "{done}");
     }
 
-    /// Waits for the end of the job and returns it. Renews the lease meanwhile.
+    /// Waits for the end of the job and returns the job. Renews the lease during this time.
     pub(crate) fn over(&self, job: u64) -> Value {
         over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
     }
 }
 
-/// Waits for the end of the job and returns it.
+/// Waits for the end of the job and returns the job.
 pub(crate) fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -73,8 +73,7 @@ pub(crate) fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
     }
 }
 
-/// Checks that the request is refused to a viewer, to an operator without the lease, and to an operator who waits for
-/// the lease.
+/// Checks that the request is refused to a viewer, to an operator without the lease, and to an operator that waits for the lease.
 pub(crate) fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value) {
     let ask =
         |token: &String, key: Option<&str>| served.api_as(Some(token), request, key, Some(body.clone()));

@@ -1,4 +1,4 @@
-//! The bounds of parameters (J-06): each bound can be reached, and no value beyond it is accepted.
+//! Tests of the bounds of parameters (J-06). A value at a bound is accepted, and a value beyond the bound is refused.
 use jtc_dynamics::Link;
 
 use super::*;
@@ -32,7 +32,7 @@ fn j06_a_bound_of_the_gains_is_allowed_and_nothing_beyond() {
     assert!(check(PidGains { int_min: 0.2, int_max: 0.1, ..none }).is_err());
 }
 
-/// Bounds that exclude zero put a torque on a joint at rest: Ki times the bound that is nearer to zero.
+/// Bounds of the integral that exclude zero cause a torque on a joint at rest, which is Ki times the bound that is nearer to zero.
 #[test]
 fn j06_an_integral_forces_a_quarter_of_the_torque_limit_at_most() {
     for (int_min, int_max, ki) in [(2.0, 9.0, 12.5), (-9.0, -2.0, 12.5), (-1.0, 9.0, 50_000.0)] {
@@ -43,7 +43,7 @@ fn j06_an_integral_forces_a_quarter_of_the_torque_limit_at_most() {
     }
 }
 
-/// Checks a table in which all friction torques are 0 except one.
+/// Checks a table in which only one friction torque is not 0.
 fn one_torque(velocity: f32, torque: f32) -> Result<(), OutOfBounds> {
     let mut table = TableOf {
         velocity: core::array::from_fn(|i| (i as f32 - 10.0) * 0.125),
@@ -58,7 +58,8 @@ fn one_torque(velocity: f32, torque: f32) -> Result<(), OutOfBounds> {
 
 #[test]
 fn j06_friction_is_bounded_by_where_it_is() {
-    // Three ranges: at rest, up to half of the velocity limit, and above. A torque against the motion is positive in both directions.
+    // The three ranges are standstill, up to half of the velocity limit, and above. A torque against the motion is positive in both
+    // directions.
     for (speed, low, high) in
         [(0.0, -25.0, 25.0), (0.125, -5.0, 100.0), (0.75, -5.0, 100.0), (0.875, -150.0, 150.0)]
     {
@@ -105,8 +106,8 @@ fn j06_a_polynomial_is_bounded_up_to_the_velocity_limit() {
             let c3 = most * 100.0 / (fastest * fastest * fastest);
             BOUNDS.check_polynomial(&[0.0, 0.0, 0.0, sign * c3, 0.0, 0.0], &joint()).map_err(|e| e.velocity)
         };
-        // A torque against the motion reaches the bound for high speeds first at the highest speed; a torque along the motion reaches the
-        // bound for slow speeds.
+        // A torque against the motion first reaches the bound for high speeds, at the highest speed. A torque along the motion first
+        // reaches the bound for slow speeds.
         let most = if sign > 0.0 { 1.5 } else { 0.05 * 8.0 };
         assert_eq!(cubic(0.999 * most), Ok(()));
         assert_eq!(cubic(1.001 * most), Err(Some(if sign > 0.0 { fastest } else { 0.5 * fastest })));
@@ -126,7 +127,7 @@ fn j06_masses_and_inertias_reach_their_bounds() {
     assert!(with(|link| link.inertia[4] = -100.0) && !with(|link| link.inertia[4] = -100.1));
 }
 
-/// Friction against the motion is reported as positive; at rest, without a motion, it is reported with its own sign.
+/// Friction against the motion is reported as positive. At rest, friction is reported with its actual sign.
 #[test]
 fn j06_what_is_refused_is_told_with_its_value() {
     for (velocity, torque, value) in
@@ -136,7 +137,7 @@ fn j06_what_is_refused_is_told_with_its_value() {
     }
 }
 
-/// Between standstill and a sixteenth of the velocity limit, the check uses as many speeds as above it.
+/// The check uses equal numbers of speeds below and above a sixteenth of the velocity limit.
 #[test]
 fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     let sixteenth = joint().velocity_max / 16.0;
@@ -148,7 +149,7 @@ fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     }
 }
 
-/// A row that is out of bounds is reported before the torque that the table gives at standstill.
+/// A row that is out of bounds is reported before the torque of the table at standstill.
 #[test]
 fn j06_of_a_table_the_first_row_in_motion_is_named() {
     let table = TableOf {

@@ -1,28 +1,29 @@
-//! Polynomials in Bernstein form: a curve over 0..1 lies within the hull of its control points (Farin 2002).
+//! Polynomials in Bernstein form. A curve over 0..1 lies within the hull of its control points (Farin 2002).
 
 /// Highest number of successive halvings of one curve. Each halving brings the hull about four times closer to the curve.
 const DEPTH: usize = 6;
 
-/// Place at which a curve leaves its bounds.
+/// Position at which a curve leaves its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Leaves {
-    /// Place in the interval, 0..1.
+    /// Position in the interval, 0..1.
     pub at: f64,
-    /// Value of the curve there. If the halvings did not suffice, the value of a control point, which the curve may not reach.
+    /// Value of the curve at this position. If the number of halvings was too small, the value is that of a control point, which the curve
+    /// may not reach.
     pub value: f64,
     /// The bound.
     pub bound: f64,
 }
 
-/// Returns the first place found at which the curve leaves `low..=high`. The place is exact at the ends of the curve and at its halving
-/// points. If the `halvings` are used up, the hull is checked instead, so that a curve that leaves the bounds never passes.
+/// Returns the first position that was found at which the curve leaves `low..=high`. The position is exact at the ends of the curve and at
+/// its halving points. If all `halvings` are used, the hull is checked instead, so that a curve that leaves the bounds never passes.
 pub(super) fn leaves<const N: usize>(
     curve: [f64; N],
     low: f64,
     high: f64,
     halvings: &mut u8,
 ) -> Option<Leaves> {
-    // Pieces that are not checked yet, from the end of the interval to its start.
+    // The stack contains the parts of the curve that are not checked yet, from the end of the interval to its start.
     let mut stack = [(curve, 0.0, 1.0); DEPTH + 1];
     let mut waiting = 1;
     while waiting > 0 {
@@ -38,7 +39,7 @@ pub(super) fn leaves<const N: usize>(
         if on_the_curve.is_some() {
             return on_the_curve;
         }
-        // A piece at the full depth does not fit on the stack.
+        // A part at the full depth does not fit on the stack.
         let (Some(left), true) = (halvings.checked_sub(1), waiting + 1 < stack.len()) else {
             return Some(Leaves { at: start + 0.5 * width, value, bound });
         };
@@ -55,7 +56,7 @@ pub(super) fn leaves<const N: usize>(
     None
 }
 
-/// Returns the control point that is furthest outside, and the bound that it exceeds.
+/// Returns the control point that is furthest out of the bounds, and the bound that the point exceeds.
 fn outside<const N: usize>(curve: &[f64; N], low: f64, high: f64) -> Option<(f64, f64)> {
     let lowest = curve.iter().fold(f64::INFINITY, |a, &b| a.min(b));
     let highest = curve.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
@@ -94,7 +95,7 @@ fn halve<const N: usize>(curve: [f64; N]) -> ([f64; N], [f64; N]) {
 mod tests {
     use super::*;
 
-    /// A parabola with its maximum, 0, at this place.
+    /// Returns a parabola whose maximum, 0, is at position `top`.
     fn parabola(top: f64) -> [f64; 3] {
         [-top * top, top - top * top, -(1.0 - top) * (1.0 - top)]
     }
@@ -110,10 +111,10 @@ mod tests {
         }
     }
 
-    /// Otherwise a piece would be skipped, and a violation in it would be missed.
+    /// At the full depth, the hull decides. Otherwise a part of the curve would be skipped, and a violation in this part would be missed.
     #[test]
     fn j36_at_the_full_depth_the_hull_decides() {
-        // The curve is above 1 from 0 to 0.006, which is less than half of the smallest piece.
+        // The curve is above 1 from 0 to 0.006, which is less than half of the smallest part.
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 255).expect("it leaves its bounds");
         assert_eq!((found.at, found.bound), (1.0 / 128.0, 1.0));
         assert!(found.value > 1.0 && found.value < 1.0001, "{found:?}");
@@ -127,7 +128,7 @@ mod tests {
         for (curve, named) in [
             ([0.0, 3.0, -2.0, 0.0], (3.0, 1.0)),
             ([0.0, 2.0, -3.0, 0.0], (-3.0, -1.0)),
-            // Equal distances: the upper bound is reported.
+            // If both bounds are exceeded by equal distances, the upper bound is reported.
             ([0.0, 2.0, -2.0, 0.0], (2.0, 1.0)),
         ] {
             let found = leaves(curve, -1.0, 1.0, &mut 0);

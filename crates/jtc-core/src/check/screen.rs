@@ -1,21 +1,21 @@
-//! The quick part of the check: bounds of the control points around a point, in single precision and in steps of the wire format.
+//! Quick part of the check. It computes bounds of the control points around a point, in single precision and in steps of the wire format.
 //!
 //! Each control point of an interval (J-32), except the one in the middle of the quintic's derivative, depends on the velocity and
-//! acceleration at one end only. So each of the six joints needs only a few dozen operations, and nearly every interval of a real path
-//! passes here. An interval that does not pass is not refused: the exact check decides.
+//! acceleration at one end only. Each of the six joints therefore needs only a few dozen operations, and nearly every interval of a real
+//! path passes this part. If an interval does not pass the quick part, the exact check decides.
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 
-/// Margin for rounding in single precision, in steps of the position and as a share of the speed limit.
+/// Margin for rounding in single precision, in position steps.
 const SLACK: f64 = 0.1;
 const SLACK_SHARE: f64 = 2e-6;
 /// Maximum of the quartic above the cubic, relative to the distance that the velocities do not explain.
 const BUMP: f32 = 1.875;
 
-/// A point as floats, in steps of the wire format.
+/// Point of a trajectory as floats, in steps of the wire format.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Steps {
     position: [f32; JOINTS],
@@ -41,10 +41,10 @@ pub(super) struct Screen {
     /// Speed limits, in position steps per interval.
     speed: [f32; JOINTS],
     acceleration: [f32; JOINTS],
-    /// Position steps per interval that correspond to one step of velocity, and to one step of acceleration.
+    /// Position steps per interval that correspond to one velocity step, and to one acceleration step.
     per_velocity: f32,
     per_acceleration: f32,
-    /// Velocity steps that one step of acceleration adds to a control point of the velocity.
+    /// Velocity steps that one acceleration step adds to a control point of the velocity.
     rise: f32,
 }
 
@@ -74,13 +74,13 @@ impl Screen {
         for j in 0..JOINTS {
             let (speed_a, speed_b) = (a.velocity[j].abs() * kv, b.velocity[j].abs() * kv);
             let (bend_a, bend_b) = (a.acceleration[j].abs() * ka, b.acceleration[j].abs() * ka);
-            // The control points of the position are at most this far from their point.
+            // `around` is the largest distance of the control points of the position from their trajectory point.
             let around = (0.4 * speed_a + 0.05 * bend_a).max(0.4 * speed_b + 0.05 * bend_b);
             let low = a.position[j].min(b.position[j]) - around;
             let high = a.position[j].max(b.position[j]) + around;
-            // Control points of the velocity.
+            // The next value is the largest magnitude of the control points of the velocity.
             let speed = (speed_a + bend_a * (1.0 / 3.0)).max(speed_b + bend_b * (1.0 / 3.0));
-            // The distance that the velocities do not explain, less one step.
+            // The next value is the distance that the velocities do not explain, less one step.
             let way = b.position[j] - a.position[j];
             let explained = 0.5 * kv * (a.velocity[j] + b.velocity[j])
                 + (1.0 / 12.0) * ka * (a.acceleration[j] - b.acceleration[j]);
@@ -93,7 +93,7 @@ impl Screen {
         good
     }
 
-    /// Returns the velocities (rad/s) of the control points around `point`: `(lowest, highest)` of joint `j`.
+    /// Returns the lowest and highest velocity (rad/s) of the control points around `point` for each joint.
     pub(super) fn velocities(&self, point: &Steps) -> [(f32, f32); JOINTS] {
         core::array::from_fn(|j| {
             let rise = point.acceleration[j].abs() * self.rise;
@@ -102,7 +102,7 @@ impl Screen {
     }
 }
 
-/// Velocities that a trajectory commands in one joint, including those of its control points.
+/// Velocities that a trajectory commands in one joint, including the velocities of its control points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct SpeedRange {
     low: (f32, u32),
@@ -122,7 +122,7 @@ impl SpeedRange {
         }
     }
 
-    /// Returns the lowest and highest velocity, rad/s, each with its point. The range always includes standstill.
+    /// Returns the lowest and the highest velocity, rad/s, each with the index of its point. The range always includes standstill.
     pub(super) fn ends(&self) -> [(f64, u32); 2] {
         [self.low, self.high].map(|(steps, point)| (f64::from(steps) * VELOCITY_STEP, point))
     }
@@ -134,7 +134,7 @@ mod tests {
     use crate::check::PathRange;
     use crate::config::Config;
 
-    /// Otherwise an interval that the exact check refuses could pass because of rounding.
+    /// Without this margin, an interval that the exact check refuses could pass the quick part because of rounding.
     #[test]
     fn j36_the_screen_keeps_a_distance_to_each_limit_that_is_more_than_its_rounding() {
         let mut config = Config::avena();
@@ -147,14 +147,14 @@ mod tests {
                 let bounds = JointBounds { position, speed, acceleration: 8.0, friction };
                 let screen = Screen::new(&[bounds; JOINTS], step);
                 let slowest = if speed > 1.5 { 0.7 } else { speed };
-                // Eight roundings, and a tenth of a step for their effect on positions.
+                // The margin covers eight roundings, and a tenth of a step for their effect on positions.
                 let share = 1.0 - 8.0 * f64::from(f32::EPSILON);
                 let [low, high] = [screen.position_low[0], screen.position_high[0]].map(f64::from);
-                // The limits contain the one step that is tolerated.
+                // The limits include the tolerance of one step.
                 assert!(low >= -2.5 / POSITION_STEP - 0.91 && high <= 2.0 / POSITION_STEP + 0.91);
                 let way = f64::from(screen.speed[5]) * POSITION_STEP;
                 assert!(way <= slowest * step * share - 0.09 * POSITION_STEP, "{speed} {friction:?} {step}");
-                // The margin does not lower the limit noticeably.
+                // The margin does not reduce the limit significantly.
                 assert!(
                     way >= slowest * step * 0.999_99 - 0.2 * POSITION_STEP,
                     "{speed} {friction:?} {step}"

@@ -1,4 +1,4 @@
-//! Compares the check with the values that the controller computes between points, sampled densely.
+//! Compares the check with dense samples of the values that the controller computes between points.
 extern crate std;
 use std::vec::Vec;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::interpolation::interpolate;
 
-/// The lower and the upper position limit of each joint have different magnitudes.
+/// Returns settings in which the lower and the upper position limit of each joint have different magnitudes.
 fn config() -> Config {
     let mut config = Config::avena();
     for limit in &mut config.joints {
@@ -18,7 +18,7 @@ fn config() -> Config {
     config
 }
 
-/// A point with these values (rad, rad/s, rad/s²) in joint `j`.
+/// Returns a point with these values (rad, rad/s, rad/s²) in joint `j`.
 fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     let mut point = RawPoint::default();
     point.position[j] = (q / POSITION_STEP).round() as i16;
@@ -27,8 +27,8 @@ fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     point
 }
 
-/// Returns the effect of rounding on a position: one step of the position, plus the effect of one step of the velocity at both points in
-/// the middle of the quintic.
+/// Returns the effect of rounding on a position. It is one position step, plus the effect of one velocity step at both points in the middle
+/// of the quintic.
 fn tolerance(step_ms: u16) -> f64 {
     let moving = |v: f64| SetPoint { velocity: [v * 6.283185 / 32767.0; JOINTS], ..SetPoint::default() };
     let (a, b) = (moving(1.0), moving(-1.0));
@@ -41,7 +41,7 @@ fn between(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> Result<
     check.behind(1, *a, Passed::default()).take(b)
 }
 
-/// Samples joint `j` between two points and returns the extremes of its position, its velocity, and the derivative of its position. The
+/// Samples joint `j` between two points. Returns the extremes of the position, the velocity, and the derivative of the position. The
 /// distance for the derivative is reduced by one step.
 fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64, f64) {
     let (a, b, h) = (SetPoint::from(a), SetPoint::from(b), f64::from(step_ms) / 1000.0);
@@ -60,8 +60,8 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
     (position, velocity, speed)
 }
 
-/// Returns the margins to the limits of joint 0 around two points, for any signs of their velocities and accelerations. The margins are:
-/// the margin of the hull of the positions (rad, below and above); the margin of the hull of the velocities (rad/s), with the bump for the
+/// Returns the margins to the limits of joint 0 around two points, for any signs of the velocities and accelerations. The margins are: the
+/// margin of the hull of the positions (rad, below and above); the margin of the hull of the velocities (rad/s), with the bump for the
 /// unexplained distance less one step; and the margin of the acceleration of `b` (rad/s²).
 fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let (limit, h, more) = (&config.joints[0], f64::from(step_ms) / 1000.0, tolerance(step_ms));
@@ -72,7 +72,7 @@ fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let around = [a, b].map(|(_, v, a)| 2.0 / 5.0 * v.abs() * h + a.abs() * h * h / 20.0);
     let fastest = [a, b].map(|(_, v, a)| v.abs() + a.abs() * h / 3.0);
     let explained = h * (a.1 + b.1) / 2.0 + h * h * (a.2 - b.2) / 12.0;
-    // The maximum of 30·u²·(1 − u)², in the middle.
+    // The factor 30/16 is the maximum of 30·u²·(1 − u)², which is in the middle.
     let bump = 30.0 / 16.0 * ((b.0 - a.0 - explained).abs() - POSITION_STEP).max(0.0) / h;
     let (around, fastest) = (around[0].max(around[1]), fastest[0].max(fastest[1]));
     [
@@ -83,7 +83,7 @@ fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     ]
 }
 
-/// Pairs of points that come near the limits, with 1 ms to 1 s between them.
+/// Returns pairs of points near the limits, with 1 ms to 1 s between the points.
 fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
     let step = prop::sample::select(&[1u16, 2, 5, 10, 20, 50, 100, 250, 1000][..]);
     (
@@ -95,7 +95,7 @@ fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
     )
         .prop_map(|(step, q, [v0, v1], [a0, a1], off)| {
             let h = f64::from(step) / 1000.0;
-            // Accelerations that change the velocity within the interval by less than the velocity limit.
+            // Scales an acceleration so that it changes the velocity within the interval by less than the velocity limit.
             let bend = |a: f64| a / (1.0 + 4.0 * h);
             let v1 = v0 + (v1 - v0) * (8.0 * h).min(1.0);
             let way = 0.5 * h * (v0 + v1) + off * h * 1.5;
@@ -106,13 +106,13 @@ fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
-    /// The check refuses every motion with a sample outside the limits, and accepts every motion with a margin of 0.01 to them.
+    /// The check refuses every motion with a sample outside the limits, and accepts every motion with a margin of 0.01 to the limits.
     #[test]
     fn j36_the_verdict_is_that_of_dense_samples((step, a, b) in pair()) {
         let config = config();
         let ([low, high], velocity, speed) = sampled(0, step, &a, &b);
         let (verdict, more) = (between(&config, step, &a, &b), tolerance(step));
-        // Paths that begin outside the limits have their own tests.
+        // Paths that begin outside the limits are tested separately.
         let before = a.position_rad()[0];
         prop_assume!((-0.7 - more..=1.3 + more).contains(&before));
         let over = |margin: f64| {
@@ -133,7 +133,7 @@ proptest! {
         let mut check = TrajectoryCheck::new(&config(), step, None);
         check = check.behind(1, a, Passed::default());
         let passed = check.screen.passes(&Steps::from(&a), &Steps::from(&b));
-        // The quick part also uses the point before; the exact part checks only the interval after it.
+        // The quick part also uses the first point. The exact part checks only the interval after this point.
         prop_assert!(!passed || check.judge(&b).is_ok(), "{:?}", check.judge(&b));
     }
 
@@ -149,14 +149,14 @@ proptest! {
         }
         let passed = TrajectoryCheck::new(&config, step, None).screen.passes(&Steps::from(&a), &Steps::from(&b));
         let room = room(&config, step, &a, &b);
-        // The last tenth of a step is left to the exact part.
+        // In the last tenth of a step, the exact part decides.
         let tenth = 0.11 * POSITION_STEP;
         let left = [tenth, tenth, tenth / (f64::from(step) / 1000.0) + 1e-5, 1e-4];
         prop_assert!(!passed || room.iter().all(|&r| r >= -1e-6), "{room:?} passed");
         prop_assert!(passed || room.iter().zip(left).any(|(&r, left)| r <= left), "{room:?} did not pass");
     }
 
-    /// A path that keeps to the velocity limit is accepted after it was rounded to steps of the wire format.
+    /// A path within the velocity limit is accepted after rounding to steps of the wire format.
     #[test]
     fn j36_rounding_of_a_path_at_full_speed_is_no_violation(q in -0.5..0.5f64, step in 1u16..50) {
         let v = 7820.0 * VELOCITY_STEP;
@@ -175,14 +175,15 @@ fn j36_each_limit_is_found_and_named() {
     };
     let at = |q, v, a| point(4, q, v, a);
     use Quantity::*;
-    // The lower position limit is not the negative of the upper one.
+    // The lower and the upper position limit have different magnitudes.
     assert_eq!(check(at(-0.69, 0.0, 0.0), at(-0.71, 0.0, 0.0), 100), (1, Position, -0.7, 0.0));
     assert!(between(&config, 100, &at(0.69, 0.0, 0.0), &at(0.71, 0.0, 0.0)).is_ok());
     assert_eq!(check(at(1.29, 0.0, 0.0), at(1.31, 0.0, 0.0), 100), (1, Position, 1.3, 0.0));
     assert_eq!(check(at(0.0, 1.49, 0.0), at(0.015, 1.51, 0.0), 10), (1, Velocity, 1.5, 0.0));
     assert_eq!(check(at(0.0, -1.49, 0.0), at(-0.015, -1.51, 0.0), 10), (1, Velocity, -1.5, 0.0));
     assert_eq!(check(at(0.0, 0.0, 0.0), at(0.0, 0.0, -8.1), 10), (1, Acceleration, -8.0, 0.0));
-    // Violations between the points: of the upper position limit, of the velocity limit in the velocity curve, and in the positions alone.
+    // The next violations are between the points. They concern the upper position limit, the velocity limit in the velocity curve, and the
+    // velocity limit in the derivative of the position.
     let (point, quantity, limit, fraction) = check(at(1.25, 1.0, 0.0), at(1.25, -1.0, 0.0), 400);
     assert_eq!((point, quantity, limit), (0, Position, 1.3));
     assert!((0.2..0.8).contains(&fraction), "{fraction}");
@@ -246,20 +247,20 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, high)));
 }
 
-/// A path that accelerates is faster between its points than at them. The check therefore uses the hull of the velocities.
+/// An accelerating path can be faster between its points than at its points. The check therefore uses the hull of the velocities.
 #[test]
 fn j36_a_table_that_is_loaded_later_has_to_hold_what_lies_between_the_points() {
     let crate::Friction::Table(tables) = crate::Parameters::avena_friction_table() else {
         panic!("no table")
     };
     let (low, high) = friction::velocities(&tables[3]);
-    // The acceleration adds a third of its effect within the step to the velocity.
+    // At a control point, the acceleration adds a third of its effect within the step to the velocity.
     for (step, a) in [(100, 0.6), (300, 0.2)] {
         for (v, a) in [(high - 0.01, a), (high - 0.01, -a), (low + 0.01, -a), (low + 0.01, a)] {
             let later = |a: f64| {
                 let mut check = TrajectoryCheck::new(&config(), step, None);
                 for p in [point(3, 0.0, 0.0, 0.0), point(3, 0.0, v, a)] {
-                    // Such a motion may violate other limits, which do not matter here.
+                    // The motion may violate other limits, which this test ignores.
                     let _ = check.take(&p);
                 }
                 inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.limit))
@@ -297,8 +298,8 @@ fn j36_a_table_that_leaves_standstill_out_is_no_table_for_a_path() {
     assert_eq!((v.joint, v.quantity, v.value), (5, Quantity::FrictionVelocity, 0.0));
 }
 
-/// Friction may change between two segments. When the path is executed, points that were loaded before are checked again, including
-/// standstill.
+/// The friction model may change between two segments. When the path is executed, points that were loaded before are checked again,
+/// including standstill.
 #[test]
 fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     let crate::Friction::Table(mut tables) = crate::Parameters::avena_friction_table() else {
@@ -307,7 +308,7 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     tables[5].velocity = core::array::from_fn(|i| 0.01 + 0.1 * i as f32);
     let moving = |q: f64| point(5, q, 0.2, 0.0);
     let check = TrajectoryCheck::new(&config(), 10, Some(&tables));
-    // The quick part uses velocities of both signs and accepts nothing here, so the exact part decides.
+    // The quick part uses velocities of both signs and does not accept this interval, so the exact part decides.
     let mut check = check.behind(1, moving(0.0), Passed::default());
     assert_eq!(check.take(&moving(0.002)), Ok(()));
     let later = inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.joint, v.value));
@@ -316,7 +317,7 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
 
 #[test]
 fn j36_where_the_halvings_are_used_up_the_hull_decides() {
-    // A parabola with its maximum at 0.5, whose hull reaches 1.
+    // The curve is a parabola with the maximum 0.5. Its hull reaches 1.
     let curve = [0.0, 1.0, 0.0];
     let mut many = HALVINGS;
     assert_eq!(leaves(curve, -1.0, 0.501, &mut many), None);
@@ -340,7 +341,7 @@ fn verdict(config: &Config, step_ms: u16, points: &[RawPoint]) -> Result<(), Vio
     check.end()
 }
 
-/// A quintic of joint `j` from rest to rest, in `steps` steps.
+/// Returns a quintic of joint `j` from rest to rest, in `steps` steps.
 fn quintic(j: usize, from: f64, to: f64, step_ms: u16, steps: u32) -> Vec<RawPoint> {
     let seconds = f64::from(steps) * f64::from(step_ms) / 1000.0;
     (0..=steps)
@@ -354,7 +355,7 @@ fn quintic(j: usize, from: f64, to: f64, step_ms: u16, steps: u32) -> Vec<RawPoi
         .collect()
 }
 
-/// Numbers of steps that are high enough for a distance of up to 0.5 rad within the limits.
+/// Returns times between points and numbers of steps that are sufficient for a distance of up to 0.5 rad within the limits.
 fn steps() -> impl Strategy<Value = (u16, u32)> {
     let step = prop::sample::select(&[1u16, 2, 7, 10, 40, 100, 300, 1000][..]);
     (step, 1.0..4.0f64).prop_map(|(step, seconds)| (step, (seconds * 1000.0 / f64::from(step)).ceil() as u32))
@@ -363,7 +364,7 @@ fn steps() -> impl Strategy<Value = (u16, u32)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 
-    /// A path passes if it keeps to its limits before it is rounded to the wire format, even if it stays on one of them or ends there.
+    /// A path passes if it is within its limits before it is rounded to the wire format. The path may stay on a limit or end on a limit.
     #[test]
     fn j36_a_path_that_ends_on_a_limit_passes(
         (step, count) in steps(), limit in -2.0..2.0f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -382,7 +383,7 @@ proptest! {
         prop_assert_eq!(verdict(&config, step, &points), Ok(()));
     }
 
-    /// A joint outside its limits may move back inside at any speed within its limits, or stay at its position.
+    /// A joint outside its position limits may move back inside at any speed within the velocity limit, or stay at its position.
     #[test]
     fn j36_a_path_that_begins_outside_and_goes_inwards_passes(
         (step, count) in steps(), out in 0.0..0.02f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -401,7 +402,7 @@ proptest! {
     ) {
         let from = if up { 1.3 + out } else { -0.7 - out };
         let away = |way: f64| if up { from + way } else { from - way };
-        // The path moves part of the way in, and then out again.
+        // The path moves inwards by a part of the distance, and then out again.
         let inner = -first * out;
         let mut points = quintic(joint, from, away(inner), step, count);
         points.extend(quintic(joint, away(inner), away(inner + more), step, count).into_iter().skip(1));
@@ -425,7 +426,7 @@ fn j36_the_tolerance_of_a_position_ends_with_its_step() {
                     .collect();
                 verdict(&config(), step, &[points[0], points[1], points[2]])
             };
-            // Points at this position from the start of the path on are outside by less than the start tolerance.
+            // If all points of a path are at this position, they are outside by less than the start tolerance.
             assert_eq!(at(last), Ok(()), "{step} ms");
             let from_inside = |raw: f64| {
                 between(&config(), step, &point(2, limit, 0.0, 0.0), &point(2, raw * POSITION_STEP, 0.0, 0.0))
@@ -435,7 +436,7 @@ fn j36_the_tolerance_of_a_position_ends_with_its_step() {
             assert_eq!(refused, Err((1, 2, Quantity::Position, limit)), "{step} ms");
         }
     }
-    // One step of the position, and at 1 s between points a third of a velocity step in addition: 96 µrad and 60 µrad.
+    // The tolerance is one position step (96 µrad). At 1 s between points, the effect of a velocity step adds 60 µrad.
     assert!((tolerance(1) - 96e-6).abs() < 1e-6 && (tolerance(1000) - 156e-6).abs() < 1e-6);
 }
 
@@ -445,7 +446,7 @@ fn j36_the_tolerance_ends_with_the_working_area_of_the_drives() {
     for joint in &mut config.joints {
         (joint.position_min, joint.position_max) = (-2.9905, 2.9905);
     }
-    // On the wire, 2.99048 is the last position inside, and 2.99058 is outside by less than one step.
+    // In the wire format, 2.99048 is the last position inside the limits, and 2.99058 is outside by less than one step.
     for (raw, inside) in [(31_191, true), (31_192, false)] {
         for sign in [1, -1] {
             for keeps in [true, false] {
@@ -478,29 +479,29 @@ fn j36_a_path_begins_outside_by_the_start_tolerance_at_most() {
 #[test]
 fn j36_a_path_that_has_come_inside_stays_there() {
     let config = config();
-    // The path moves in by 10 mrad, and then out again to its start position.
+    // The path moves inwards by 10 mrad, and then back to its start position.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.extend(quintic(4, 1.29, 1.31, 10, 150).into_iter().skip(1));
     let violation = verdict(&config, 10, &points).unwrap_err();
     assert!(violation.point > 150 && violation.quantity == Quantity::Position, "{violation:?}");
     assert!((violation.value - 1.3001).abs() < 2e-4, "{violation:?}");
-    // Once inside, the path may end on the limit like any other path.
+    // After the path has moved inside, it may end on the limit like any other path.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.extend(quintic(4, 1.29, 1.3, 10, 150).into_iter().skip(1));
     assert_eq!(verdict(&config, 10, &points), Ok(()));
-    // A joint that was never outside has no such allowance.
+    // The allowance does not apply to a joint that was never outside.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.last_mut().unwrap().position[3] = (1.301 / POSITION_STEP) as i16;
     let violation = verdict(&config, 10, &points).unwrap_err();
     assert_eq!((violation.joint, violation.quantity), (3, Quantity::Position));
 }
 
-/// Both points are outside, the second one less far. The interval between them is checked as well.
+/// Both points are outside the limits, but the second point is closer to the limit. The interval between the two points is also checked.
 #[test]
 fn j36_between_two_points_a_path_comes_no_further_out_either() {
     let after = |step, a: RawPoint, b: RawPoint| {
         let mut check = TrajectoryCheck::new(&config(), step, None);
-        // The first point is not at rest, which does not matter here.
+        // The first point is not at rest, which this test ignores.
         let _ = check.take(&a);
         check.take(&b)
     };
@@ -511,14 +512,14 @@ fn j36_between_two_points_a_path_comes_no_further_out_either() {
         assert_eq!((violation.joint, violation.quantity, violation.limit), (1, Quantity::Position, 1.3));
         assert!(violation.value > 1.3 && violation.fraction > 0.0, "{violation:?}");
     }
-    // Both ends are outside and the middle is inside, so the path moves out again.
+    // Both points are outside and the middle is inside the limits, so the path moves out again.
     let (a, b) = (point(1, 1.302, -0.05, 0.0), point(1, 1.301, 0.05, 0.0));
     assert!(after(400, a, b).is_err());
     let (a, b) = (point(1, 1.302, -0.005, 0.0), point(1, 1.301, 0.0, 0.0));
     assert_eq!(after(400, a, b), Ok(()));
 }
 
-/// Segments are checked one after the other. The state after the first one follows from its last point.
+/// Segments are checked one after another. The state after the first segment follows from the last point of this segment.
 #[test]
 fn j36_a_path_from_outside_goes_on_in_the_next_segment() {
     let config = config();

@@ -4,17 +4,17 @@ use crate::motion::ControlMode;
 use crate::path::PathClock;
 use crate::{JOINTS, TrajectoryState};
 
-/// Phase of the controller in Operate.
+/// Phase of the execution in state Operate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Phase {
-    /// Waits until every joint is enabled. `elapsed_ms`: time waited so far, ms.
+    /// Wait until every joint is enabled. `elapsed_ms` is the elapsed waiting time, ms.
     Waiting { elapsed_ms: u32 },
-    /// The approach from the held position to the first point, or to the point at which the path was paused, in `length_ms`. The approach
-    /// has its own clock. `leave`: the state that follows at standstill.
+    /// Approach from the held position to the first point or to the paused point, with the duration `length_ms`. The approach has a
+    /// separate clock. `leave` is the state that follows at standstill.
     Approaching { from: [f64; JOINTS], length_ms: f64, clock: PathClock, leave: Option<TrajectoryState> },
-    /// At point 0, which the next tick commands.
+    /// Start of the path at point 0, which the next tick commands.
     AtStart,
-    /// On the path. `leave`: the state that follows at standstill.
+    /// On the path. Motion along the path. `leave` is the state that follows at standstill.
     Running { leave: Option<TrajectoryState> },
 }
 
@@ -56,7 +56,7 @@ impl BitCodec for Phase {
 }
 
 impl Phase {
-    /// Start of an execution, before any wait.
+    /// First phase of an execution, with no elapsed waiting time.
     pub(crate) const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
 
     /// Creates an approach from the held position that takes `length_ms`.
@@ -64,7 +64,7 @@ impl Phase {
         Self::Approaching { from, length_ms, clock: PathClock::start(1.0), leave: None }
     }
 
-    /// Returns the control mode.
+    /// Returns the control mode of the phase.
     pub(crate) fn mode(&self) -> ControlMode {
         match self {
             Self::Waiting { .. } => ControlMode::Hold,
@@ -73,7 +73,7 @@ impl Phase {
         }
     }
 
-    /// Returns `true` if joints are still to be enabled.
+    /// Returns `true` while the controller waits until all joints are enabled.
     pub(crate) fn waits(&self) -> bool {
         matches!(self, Self::Waiting { .. })
     }
@@ -87,7 +87,7 @@ impl Phase {
         }
     }
 
-    /// Returns the rate of the time in which the arm moves: the time of the approach or of the path.
+    /// Returns the rate of the clock that drives the motion, which is the clock of the approach or of the path.
     pub(crate) fn rate(&self, path: &PathClock) -> f64 {
         match self {
             Self::Approaching { clock, .. } => clock.rate,

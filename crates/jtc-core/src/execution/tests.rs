@@ -1,4 +1,4 @@
-//! The execution of a trajectory, tick by tick (section 5).
+//! Tests of the execution of a trajectory, tick by tick (section 5).
 use jtc_wire::Segment;
 
 use super::*;
@@ -57,7 +57,7 @@ fn j34_after_a_stop_the_path_begins_anew() {
     }
 }
 
-/// A controller on the path that accepted a Pause `ms` ago.
+/// Returns a controller on the path that has accepted a Pause `ms` ago.
 fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
     let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
     controller.phase = Phase::Running { leave: Some(TrajectoryState::Pause) };
@@ -72,7 +72,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     for (trajectory, ms, goes_on, error) in [
         (TrajectoryState::Execute, most - 1, true, 0),
         (TrajectoryState::Execute, most, false, joint_error::TORQUE),
-        // An arm that is held, but is moved from outside.
+        // In this case, the arm is held but is moved by an external force.
         (TrajectoryState::Pause, most - 1, true, 0),
         (TrajectoryState::Pause, most, false, 0),
     ] {
@@ -142,7 +142,7 @@ fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     assert_eq!((Phase::BEGIN.leave(), Phase::AtStart.leave()), (None, None));
 }
 
-/// A controller on a path of four points, 100 ms apart, at this time and slowing down.
+/// Returns a controller that decelerates on a path of four points, 100 ms apart, at this path time.
 fn halting_at(time: f64) -> Controller<[RawPoint; 4]> {
     let mut controller = pausing(5);
     let mut body = [0; 8 + 4 * 36];
@@ -220,11 +220,12 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
             assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
             assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
             let moved = (at - rest) * way.signum();
-            // At most the remaining distance, and at most the stopping distance of a path that still accelerates for half of the ramp.
+            // The limit is the smaller of the remaining distance and the stopping distance of a path that still accelerates for half of the
+            // ramp.
             let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
             assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
             assert_eq!(controller.clock.time, 0.0, "the index stays");
-            // Joints that have no distance to go have not moved.
+            // Joints that are already at the target have not moved.
             assert_eq!(controller.motion.set.point.position[1..], [0.0; JOINTS - 1]);
         }
     }
@@ -258,7 +259,7 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
             continue;
         };
         let length = length_ms / 1_000.0;
-        // Its velocity and acceleration are sampled at a thousand places.
+        // The velocity and acceleration of the approach are sampled at a thousand times.
         let at = |u: f64| way * u * u * u * (10.0 + u * (6.0 * u - 15.0));
         let step = 1e-3;
         let (mut fastest, mut hardest) = (0.0f64, 0.0f64);
@@ -277,7 +278,7 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     }
 }
 
-/// A finished path cannot be held back. A jog that is overloaded ends.
+/// A finished path cannot be slowed down. A jog ends if it overloads a joint.
 #[test]
 fn j75_only_a_motion_that_goes_on_is_held_back() {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);

@@ -1,12 +1,12 @@
-//! Answers to extension requests: one answer can wait on each line (J-50).
+//! Answers to extension requests. On each line, one answer can wait to be sent (J-50).
 use jtc_wire::{ANSWER_MAX, Answer};
 
 use crate::HOST_LINES;
 
-/// Answer on one line.
+/// Answer buffer of one serial line.
 #[derive(Clone, Debug)]
 struct Line {
-    /// Length of the waiting answer.
+    /// Length of the answer that waits to be sent.
     len: usize,
     frame: [u8; ANSWER_MAX],
 }
@@ -15,9 +15,9 @@ struct Line {
 #[derive(Clone, Debug)]
 pub(crate) struct Answers {
     lines: [Line; HOST_LINES],
-    /// The line whose frame was sent last.
+    /// Index of the line on which the last frame was sent.
     sent: usize,
-    /// Length of that frame.
+    /// Length of the last frame that was sent.
     sent_len: usize,
 }
 
@@ -32,14 +32,14 @@ impl Answers {
         self.lines.get(line).is_some_and(|line| line.len > 0)
     }
 
-    /// Puts an answer on a line, in place of one that has not been sent yet.
+    /// Stores an answer for a line. It replaces an answer that has not been sent yet.
     pub(crate) fn put(&mut self, line: usize, answer: &Answer<'_>) {
         if let Some(line) = self.lines.get_mut(line) {
             line.len = answer.emit(&mut line.frame).unwrap_or(0);
         }
     }
 
-    /// Returns the line whose answer must be sent now. The lines take turns.
+    /// Returns the index of the line whose answer must be sent now. The lines send their answers alternately.
     pub(crate) fn send(&mut self) -> Option<usize> {
         for offset in 1..=HOST_LINES {
             let n = (self.sent + offset) % HOST_LINES;

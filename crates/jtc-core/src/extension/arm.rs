@@ -1,4 +1,4 @@
-//! The arm as a unit (J-52, J-54): loading, reading, hashing and storing it.
+//! Functions that load, read, hash and store the arm as a unit (J-52, J-54).
 use jtc_wire::{Answer, ArmImage, DataStatus, FrictionImage, Hash, PAGE_BYTES, RawPoint, StoreState};
 
 use super::Extensions;
@@ -9,24 +9,24 @@ use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::host_parameters::HostParameters;
 use crate::settings;
 
-/// Bytes of an arm image that are hashed or written in one tick.
+/// Number of bytes of an arm image that are hashed or written in one tick.
 pub(super) const IMAGE_PER_TICK: usize = 256;
 
 impl Extensions {
-    /// Clears the hash, because the arm in use has changed.
+    /// Clears the hash, because the arm that the controller uses has changed.
     pub(crate) fn forget_hash(&mut self) {
         (self.hash, self.hashed) = (None, (0, Hash::new()));
     }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Loads the stored arm (J-54). Its settings and its name are in use from now on, and the UseDefault frames select it. The parameters
-    /// must still be requested. The board calls this before the first tick. Returns `false` if this controller does not accept the image.
-    /// The settings then do not change, and the UseDefault frames are refused until an arm is stored.
+    /// Loads the stored arm (J-54). The controller then uses the settings and the name of this arm, and the UseDefault frames select this
+    /// arm. The host must still request the parameters. The board calls this before the first tick. Returns `false` if this controller does
+    /// not accept the image. In this case, the settings do not change, and the UseDefault frames are refused until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
-        // The values are written directly into the parameters. A trial copy would need too much of the small stack.
+        // The values are written directly into the parameters. A temporary copy would need too much of the small stack.
         let loaded = arm.zip(config).is_some_and(|(arm, config)| {
             let taken = takes(&mut self.parameters, &arm, &config);
             if taken {
@@ -53,12 +53,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.stored.bytes()
     }
 
-    /// Sets the state of the stored arm, and its number; the board calls this when the state changes.
+    /// Sets the state and the number of the stored arm. The board calls this function when the state changes.
     pub fn set_store_state(&mut self, state: StoreState, sequence: u32) {
         let before = core::mem::replace(&mut self.extensions.store, state);
         self.extensions.sequence = sequence;
         if before == StoreState::Busy && state == StoreState::Failed {
-            // The next start would use another arm, so no arm is stored until then.
+            // The next start would use another arm, so the stored arm is removed until the next start.
             self.extensions.stored.clear();
             self.extensions.unusable = true;
         }
@@ -68,7 +68,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
     }
 
-    /// Computes another part of the hash of the arm, unless the hash is known.
+    /// Computes the next part of the hash of the arm, unless the hash is known.
     pub(crate) fn hash_arm(&mut self) {
         if self.extensions.hash.is_none() {
             self.hash_more();
@@ -92,7 +92,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
     }
 
-    /// Stores the arm (J-54). First the UseDefault frames select the arm in use, then the board writes it.
+    /// Stores the arm (J-54). First, the present arm becomes the arm that the UseDefault frames select. Then the board writes this arm.
     pub(super) fn store_arm(&mut self) -> SliceOutcome {
         let offset = match self.slice_progress {
             SliceProgress::Image(offset) => offset,
@@ -122,7 +122,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 }
 
-/// Takes gains, model and friction of an arm. Returns `false` if they are not valid with these settings.
+/// Applies the gains, model and friction of an arm. Returns `false` if these parameters are not valid with the settings.
 fn takes(parameters: &mut HostParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
     let friction = match arm.friction {
         FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),

@@ -1,4 +1,4 @@
-//! The arm in use as an image, for reading it back, hashing it and storing it (J-52, J-54).
+//! Image of the arm that the controller uses. The image is used to read back, hash and store the arm (J-52, J-54).
 use jtc_wire::field::image as field;
 use jtc_wire::{ArmImage, Hash, IMAGE_MAX, NAME_LEN, Name, VALUE_LEN};
 
@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::host_parameters::HostParameters;
 use crate::settings;
 
-/// Parts of an image.
+/// Parts from which the image is assembled.
 pub(crate) struct ImageSource<'a> {
     pub config: &'a Config,
     pub parameters: &'a HostParameters,
@@ -14,13 +14,13 @@ pub(crate) struct ImageSource<'a> {
 }
 
 impl ImageSource<'_> {
-    /// Returns the offset of the settings.
+    /// Returns the offset of the settings in the image.
     fn settings(&self) -> usize {
         let table = self.parameters.friction_is_table;
         field::FRICTION + if table { field::TABLE_LEN } else { field::POLYNOMIAL_LEN }
     }
 
-    /// Returns the offset of the name. Only the bytes before it affect the motion of the arm.
+    /// Returns the offset of the name in the image. Only the bytes before the name affect the motion of the arm.
     fn name(&self) -> usize {
         self.settings() + VALUE_LEN * settings::count(true)
     }
@@ -30,7 +30,7 @@ impl ImageSource<'_> {
         self.name() + NAME_LEN
     }
 
-    /// Reads the image from byte `offset` on. Returns the number of bytes that were read.
+    /// Reads bytes of the image into `out`, starting at byte `offset`. Returns the number of bytes that were read.
     pub(crate) fn read(&self, offset: usize, out: &mut [u8]) -> usize {
         let (settings, name) = (self.settings(), self.name());
         let mut at = offset;
@@ -70,7 +70,7 @@ impl ImageSource<'_> {
         }
     }
 
-    /// Hashes up to `count` bytes from `offset` on. Returns the next offset and the hash.
+    /// Adds up to `count` bytes to the hash, starting at byte `offset`. Returns the next offset and the new hash.
     pub(crate) fn hash(&self, offset: usize, hash: Hash, count: usize) -> (usize, Hash) {
         let mut bytes = [0; 256];
         let count = count.min(self.name().saturating_sub(offset));
@@ -79,13 +79,13 @@ impl ImageSource<'_> {
         (offset + read, hash.update(slice.get(..read).unwrap_or(&[])))
     }
 
-    /// Returns `true` if `offset` is past the hashed part, which is everything before the name.
+    /// Returns `true` if `offset` is after the hashed part, which contains all bytes before the name.
     pub(crate) fn hashed(&self, offset: usize) -> bool {
         offset >= self.name()
     }
 }
 
-/// Bytes that are written into a buffer.
+/// Buffer that receives bytes of the image, with its fill level.
 struct Output<'a> {
     out: &'a mut [u8],
     filled: usize,
@@ -96,7 +96,7 @@ impl Output<'_> {
         self.filled < self.out.len()
     }
 
-    /// Writes the part of `bytes` after `from`, as far as the buffer has space. Returns the number of bytes that were written.
+    /// Writes the bytes of `bytes` from index `from` into the remaining space of the buffer. Returns the number of bytes that were written.
     fn part(&mut self, bytes: &[u8], from: usize) -> usize {
         let room = self.out.get_mut(self.filled..).unwrap_or(&mut []);
         let rest = bytes.get(from..).unwrap_or(&[]);
@@ -109,7 +109,7 @@ impl Output<'_> {
     }
 }
 
-/// Image of the arm that the UseDefault frames select, if an arm other than the built-in one is stored.
+/// Image of the arm that the UseDefault frames select, if an arm other than the built-in arm is stored.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredArm {
     bytes: [u8; IMAGE_MAX],
@@ -141,7 +141,7 @@ impl StoredArm {
         self.len = 0;
     }
 
-    /// Stores another image instead. If the image is too long, no arm is stored.
+    /// Replaces the stored image by `image`. If the image is too long, no arm is stored after the call.
     pub(crate) fn set(&mut self, image: &[u8]) {
         self.len = match self.bytes.get_mut(..image.len()) {
             Some(place) => {
@@ -152,8 +152,8 @@ impl StoredArm {
         };
     }
 
-    /// Stores a part of the arm in use. Returns the offset of the next part. Until all parts are stored, [`Self::is_there`] returns
-    /// `false`.
+    /// Stores a part of the arm that the controller uses. Returns the offset of the next part. Until all parts are stored,
+    /// [`Self::is_there`] returns `false`.
     pub(crate) fn write(&mut self, source: &ImageSource<'_>, offset: usize, count: usize) -> usize {
         self.len = 0;
         let end = (offset + count).min(IMAGE_MAX);

@@ -1,4 +1,4 @@
-//! The extensions as a host sees them: frames in, statuses and answers out (J-50 to J-61).
+//! Tests of the extensions with the frames, statuses and answers that a host sends and receives (J-50 to J-61).
 extern crate std;
 use std::boxed::Box;
 use std::vec;
@@ -19,7 +19,7 @@ mod setting_frames;
 mod stored;
 mod two_hosts;
 
-/// A controller on two lines, and its outputs.
+/// Controller on two serial lines, and its outputs.
 struct Bench {
     controller: Box<Controller<[RawPoint; 8]>>,
     /// Answers by line.
@@ -49,12 +49,12 @@ impl Bench {
         outputs
     }
 
-    /// Sends a frame on a line and runs until its record is sent. Returns the data status of the record.
+    /// Sends a frame on a line, and executes ticks until the response record is sent. Returns the data status of the response record.
     fn send(&mut self, line: usize, bytes: &[u8]) -> DataStatus {
         self.send_as(false, line, bytes)
     }
 
-    /// Sends a frame on a line, which may be plain.
+    /// Sends a frame on a line. If `plain` is true, the line has no extensions.
     fn send_as(&mut self, plain: bool, line: usize, bytes: &[u8]) -> DataStatus {
         let frame = FrameRef::new_checked(bytes).expect("a good frame");
         let host = [HostEvent { line, overtaken: false, plain, event: LinkEvent::Frame(frame) }];
@@ -95,7 +95,7 @@ impl Bench {
         assert_eq!(self.asks_for_defaults(), [DataStatus::NoError; 3]);
     }
 
-    /// Sends the three UseDefault frames. Returns the data status of each.
+    /// Sends the three UseDefault frames. Returns the data status of each frame.
     fn asks_for_defaults(&mut self) -> [DataStatus; 3] {
         let frames = [
             fixed::FRICTION_POLYNOMIAL_USE_DEFAULT,
@@ -156,7 +156,7 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
         let info = bench.info(line);
         assert_eq!((info.version, info.missing), (1, 7));
     }
-    // A request without an answer still gets a record.
+    // A request that causes no answer frame still causes a response record.
     assert_eq!(bench.send(0, &fixed::set_name(&Name::cut("seven"))), DataStatus::NoError);
     bench.run(500);
     assert!(bench.answers.is_empty());
@@ -167,7 +167,7 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
 fn j51_on_a_plain_line_no_data_status_is_above_6() {
     let mut bench = Bench::new();
     for line in [0, 1] {
-        // Execute without a trajectory, and a request in Init that needs another state.
+        // The frames are Execute without a trajectory, and a request that is not allowed in Init.
         for frame in [&fixed::EXECUTE[..], &fixed::TEACHING_MODE_ENABLE] {
             assert_eq!(bench.send_as(true, line, frame), DataStatus::IncorrectValue);
             assert_eq!(bench.send_as(false, line, frame), DataStatus::NotAllowed);
@@ -233,7 +233,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
         assert_eq!(bench.set(value.setting, value.joint, value.value), DataStatus::NoError, "{}", row.name);
         assert_eq!(bench.info(0).hash, first, "{}", row.name);
     }
-    // Gains, friction of both kinds, model.
+    // The next frames contain the gains, both kinds of friction, and the model.
     let mut gains = vec![0; 126];
     jtc_wire::pid_param(&mut gains, &[[900.0, 1.0, 2.0, -3.0, 3.0]; JOINTS]).expect("it fits");
     assert_eq!(bench.send(0, &gains), DataStatus::NoError);

@@ -8,7 +8,7 @@ use serde_json::json;
 /// Degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// Shows the arm. Prints the parameters. `name` is the file or the controller from which the arm was read.
+/// Prints the parameters of the arm. `name` is the file or the controller from which the arm was read.
 pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(), Failure> {
     let mut values = arm.values();
     if deg {

@@ -29,13 +29,13 @@ impl Outputs {
         Ok(Self { record, report })
     }
 
-    /// Begins the recording. Begins the recording. If the recording has already begun, it starts again with an empty file.
+    /// Begins the recording. If the recording has already begun, it starts again with an empty file.
     pub(super) fn begin(&mut self, info: &RecordingInfo, out: &Output) -> Result<Option<Tape>, Failure> {
         self.record.as_mut().map(|file| Tape::begin(file, info, "the motion continues", out)).transpose()
     }
 
-    /// Completes all files. Writes the output files. An error in one file does not affect the other file. Returns the names of the complete
-    /// files, and the failures of the other files.
+    /// Completes all output files. An error in one file does not affect the other file. Returns the names of the complete files, and the
+    /// failures of the other files.
     pub(super) fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
         let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
         let report =

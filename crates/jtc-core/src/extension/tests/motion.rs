@@ -1,4 +1,4 @@
-//! Motions and commands that end them: Disable, silent hosts, jogs, torque gains (J-53, J-58, J-59, J-61).
+//! Tests of motions and of events that end them: Disable, silent hosts, jogs and torque gains (J-53, J-58, J-59, J-61).
 use super::*;
 
 #[test]
@@ -31,7 +31,7 @@ fn j53_disable_is_for_an_arm_that_is_held_at_rest_or_not_held() {
             assert_eq!(bench.controller.state, next);
         }
     }
-    // A jogged arm is not at rest.
+    // During a jog, the arm is not at rest.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.force(ControllerState::HoldPos);
@@ -53,7 +53,7 @@ fn j59_hosts_that_are_silent_end_teaching_and_pause_the_path() {
         let leave = ends.then_some(TrajectoryState::Pause);
         assert_eq!(bench.controller.phase, Phase::Running { leave }, "{limit} {silent}");
     }
-    // A valid frame of any host ends the silence; noise does not.
+    // A valid frame of any host ends the silence. Noise does not end it.
     let frame = FrameRef::new_checked(&fixed::GET_INFO).expect("a good frame");
     let noise = LinkEvent::Noise(Response::bad(0, FrameStatus::IncorrectHeader, 0));
     for (event, left) in [(LinkEvent::Frame(frame), 0), (noise, 78)] {
@@ -87,7 +87,7 @@ fn j61_drives_are_asked_for_the_joint_torque_times_the_gain() {
     assert!((f64::from(status.joints[2].torque) * 1.2 - report).abs() < 1e-6);
 }
 
-/// J-04, J-58: a Stop or a Pause also ends a jog. A Jog that was sent before it has no effect.
+/// J-04, J-58: a Stop or a Pause also ends a jog. A Jog that was sent before the Stop or Pause has no effect.
 #[test]
 fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
     for command in [UrgentCommand::Stop, UrgentCommand::Pause] {
@@ -116,7 +116,7 @@ fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
         for _ in 0..520 {
             hold(&mut bench.controller);
             position = bench.controller.motion.set.point.position;
-            // The acceleration must change its sign first.
+            // The velocity may still increase slightly, because the acceleration must first change its sign.
             assert!(bench.controller.motion.set.point.velocity[2] <= before + 0.1, "{before}");
         }
         assert!(!bench.controller.motion.set.jogging() && position[2] > 0.0);

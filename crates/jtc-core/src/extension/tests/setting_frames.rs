@@ -1,4 +1,4 @@
-//! Reading and changing settings, and the states in which settings may change (J-53).
+//! Tests of reading and changing settings, and of the states in which settings may change (J-53).
 use super::*;
 
 #[test]
@@ -40,7 +40,7 @@ fn j53_settings_change_whole_and_without_torque_only() {
         let values = Values::parse(&frame[4..frame.len() - 2]).expect("values");
         assert_eq!(bench.at_once(Command::SetSettings(values)), expected, "{state:?}");
         assert_eq!(bench.controller.config.gravity[2], if taken { 9.81 } else { -9.81 });
-        // The speed override changes in every state.
+        // The speed override can change in every state.
         let frame = settings_frame(&[SettingValue { setting: 128, joint: 0, value: 0.5 }]).expect("it fits");
         let values = Values::parse(&frame[4..frame.len() - 2]).expect("values");
         assert_eq!(bench.at_once(Command::SetSettings(values)), DataStatus::NoError, "{state:?}");
@@ -50,7 +50,7 @@ fn j53_settings_change_whole_and_without_torque_only() {
     }
 }
 
-/// A new gravity changes the torque of the model from the next tick on.
+/// In the next tick, the torque of the model uses the new gravity.
 #[test]
 fn j53_gravity_that_is_set_is_computed_with() {
     let mut bench = Bench::new();
@@ -62,7 +62,7 @@ fn j53_gravity_that_is_set_is_computed_with() {
     assert!(before.iter().zip(after).all(|(b, a)| (b + a).abs() < 1e-9) && before[1].abs() > 10.0);
 }
 
-/// Later settings are refused if the received parameters are not valid with them.
+/// Settings that arrive after the parameters are refused if the received parameters are not valid with them.
 #[test]
 fn j53_settings_that_the_parameters_contradict_are_refused() {
     for (setting, value) in [(96, 7_000.0), (101, 0.5), (103, 0.001)] {
@@ -72,20 +72,20 @@ fn j53_settings_that_the_parameters_contradict_are_refused() {
         bench.use_defaults();
         assert_eq!(bench.set(setting, 0, value), DataStatus::IncorrectValue, "{setting}");
     }
-    // Parameters are also refused if they are not valid with the settings.
+    // Parameters that arrive after the settings are also refused if they are not valid with the settings.
     let mut bench = Bench::new();
     bench.set(96, 0, 7_000.0);
     assert_eq!(bench.send(0, &fixed::PID_PARAM_USE_DEFAULT), DataStatus::IncorrectValue);
 }
 
-/// New settings are checked against the received parameters, even if these have been withdrawn since.
+/// New settings are checked with the received parameters, even if Disable has withdrawn these parameters.
 #[test]
 fn j53_settings_fit_to_what_disable_has_withdrawn() {
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.controller.parameters.withdraw_all();
     assert_eq!(bench.set(96, 0, 7_000.0), DataStatus::IncorrectValue);
-    // Friction tables are checked as well, one per tick.
+    // Friction tables are also checked, one table per tick.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.send(0, &fixed::FRICTION_TABLE_USE_DEFAULT);
@@ -109,8 +109,8 @@ fn j07_j53_settings_in_motion_are_few() {
     }
 }
 
-/// A setting of the arm in the same frame as a payload is treated as if it came alone. The speed override may change together with the
-/// payload.
+/// A setting of the arm in a frame with a payload is treated like a setting in a separate frame. The speed override may change together
+/// with the payload.
 #[test]
 fn j53_j60_a_payload_is_set_wherever_the_arm_stands() {
     for (state, stands, bare) in [

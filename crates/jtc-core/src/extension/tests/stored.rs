@@ -2,7 +2,7 @@
 use super::*;
 use crate::extension::arm::IMAGE_PER_TICK;
 
-/// Returns the image of an arm that is not the built-in one, and its hash.
+/// Returns the image of an arm other than the built-in arm, and the hash of this arm.
 fn other_arm() -> (Vec<u8>, u64) {
     let mut bench = Bench::new();
     assert_eq!(bench.set(33, 0, 3.0), DataStatus::NoError);
@@ -28,7 +28,8 @@ fn j54_a_stored_arm_is_what_the_defaults_mean_after_the_next_start() {
     assert_eq!((info.missing, info.arm.as_str(), info.defaults_stored), (7, "other", true));
     assert_eq!(bench.controller.config.gravity[1], 3.0);
     assert_ne!(info.hash, hash, "its parameters are not in use yet");
-    // The friction of the stored arm is a table. The table is used for both kinds of default friction that an existing host may request.
+    // The friction of the stored arm is a table. The controller uses this table for both kinds of default friction that an existing host
+    // may request.
     bench.use_defaults();
     let info = bench.info(0);
     assert_eq!((info.hash, info.missing), (hash, 0));
@@ -42,7 +43,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     bench.info(0);
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "nobody gave parameters");
     bench.use_defaults();
-    // Disable, for example, may have withdrawn the parameters since.
+    // The parameters may have been withdrawn in the meantime, for example by Disable.
     bench.controller.parameters.withdraw_all();
     for state in [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching] {
         bench.controller.state = state;
@@ -92,7 +93,7 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
                     continue;
                 }
                 let info = bench.info(0);
-                // If the flipped bit makes a value appear twice, and the missing value is a default, the arm is still the same.
+                // If the flipped bit duplicates one setting, and the missing setting has its default value, the arm is unchanged.
                 let same = bench.controller.config() == &Config::avena();
                 assert!(info.hash != hash || at >= image.len() - 32 || same, "byte {at}");
                 assert!(bench.controller.config.check().is_ok());

@@ -1,11 +1,11 @@
-//! Two hosts on two lines that send different arms at the same time (J-04, J-50, J-53).
+//! Tests with two hosts on two lines that send different arms at the same time (J-04, J-50, J-53).
 use std::collections::VecDeque;
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// All frames of an arm, with the parameters of this host. Friction as a table takes many ticks.
+/// Returns all frames of an arm with the parameters of this host. Friction as a table takes many ticks.
 fn arm(host: u8) -> Vec<Vec<u8>> {
     let number = f64::from(host) + 1.0;
     let mut gains = vec![0; 126];
@@ -26,8 +26,9 @@ fn arm(host: u8) -> Vec<Vec<u8>> {
 }
 
 proptest! {
-    /// For each kind of parameter, the frame that was accepted last is in use, whichever host sent it. Two frames are never mixed, though
-    /// each may take many ticks. Each host gets its own records and answers, in the order of its frames.
+    /// For each kind of parameter, the controller uses the last accepted frame of either host. The values of two frames are never mixed,
+    /// although the processing of a frame may take many ticks. Each host receives the response records and answers to its frames, in the
+    /// order of these frames.
     #[test]
     fn j04_j53_two_hosts_with_different_arms_do_not_mix_within_a_frame(
         first in prop::collection::vec(any::<bool>(), 1..40),

@@ -187,7 +187,7 @@ struct Doubt {
 /// Recording in progress.
 struct Reel {
     trajectory: Option<Arc<Trajectory>>,
-    /// Clock of the recording. It starts at the first status.
+    /// Clock of the recording, which starts at the first status.
     clock: Option<StatusClock>,
 }
 

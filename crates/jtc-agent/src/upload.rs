@@ -17,7 +17,7 @@ struct Assembly {
     segments: u16,
     /// Number of received segments.
     taken: u16,
-    /// Number of points before the last segment. This number is used if the last segment is sent again.
+    /// Number of points before the last segment. The number is needed if the last segment is sent again.
     before_last: usize,
     points: Vec<Point>,
 }
@@ -54,7 +54,8 @@ impl Upload {
         }
     }
 
-    /// Returns `true` if a Trajectory frame was accepted; `None` if the response does not belong to an undamaged Trajectory frame.
+    /// Returns `true` if the controller accepted a Trajectory frame. Returns `None` if the response does not belong to an undamaged
+    /// Trajectory frame.
     pub(crate) fn answer(response: &Response) -> Option<bool> {
         let whole =
             response.frame_type == FrameType::Trajectory as u8 && response.status == FrameStatus::NoError;

@@ -113,7 +113,8 @@ proptest! {
             board.send(clients[client], &frame);
             board.run_ms(seed_ms);
         }
-        // A request for a frame waits until the frame of the previous request has arrived. This board never sends the requested frame.
+        // A request for a frame waits until the frame of the previous request has arrived. The simulated board never sends the requested
+        // frame.
         board.run_ms(60 * 520 + 2000);
         for (client, sent) in clients.iter().zip(&sent) {
             let (records, denied) = board.take(*client);
@@ -570,8 +571,8 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     ask(&mut board, again).expect("it is over");
 }
 
-/// If the policy of a client has ended its motion, the client needs a new request for the next motion. This also applies if another client
-/// has resumed the first motion.
+/// If the policy of a client has ended its motion, the client needs a new request for the next motion. The client also needs a new request
+/// if another client has resumed the first motion.
 #[test]
 fn a_lease_that_lapsed_with_a_pause_is_not_taken_again_by_what_waits() {
     let mut board = Board::new(115_200);
@@ -677,8 +678,8 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
 fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
     use ControllerState::{HoldPos, Operate, Teaching};
     use TrajectoryState::{Execute, Finish, Pause, Stop};
-    // Each case has the timeout (ms), the state of the controller, `true` if the holder's lease lapses, the interval of the holder's
-    // frames (ms; 0: no frames), and `true` if the viewer's requests are sent.
+    // Each case contains the timeout (ms), the controller state, and `true` if the lease of the holder lapses. The last two values are the
+    // frame interval of the holder (ms; 0 for no frames), and `true` if the requests of the viewer are sent.
     let cases = [
         (0, (Operate, Execute), true, 0, true),
         (1500, (Operate, Execute), true, 0, false),

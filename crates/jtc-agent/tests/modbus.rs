@@ -156,7 +156,7 @@ fn order(command: Command, sequence: u16) -> Vec<u8> {
 const PRESS: [u8; 5] = [5, 0, 0, 0xFF, 0];
 const LET_GO: [u8; 5] = [5, 0, 0, 0, 0];
 
-/// The Stop follows the start immediately. It is sent in the same packet, as a coil that is briefly 1, or as the next command.
+/// The Stop follows the start immediately, in the same packet, as a coil that is briefly 1, or as the next command.
 #[test]
 fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     let cell = Cell::start(&[]);
@@ -221,7 +221,8 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     client.ask(&PRESS);
 }
 
-/// A PLC with another address cannot write while the first PLC has the lease. It never uses values that the first PLC has written.
+/// A PLC with another address cannot write while the first PLC has the lease. The second PLC never uses values that the first PLC has
+/// written.
 #[test]
 fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_defaults() {
     let cell = Cell::start(&["127.0.0.0/8"]);

@@ -27,14 +27,14 @@ mod field {
     pub(super) const LONG_LEN: usize = 20;
 }
 
-/// Answer of a joint to Move (0x200+n). It has 16 bytes, or 20 bytes from new drives.
+/// Answer of a joint to Move (0x200+n), with 16 bytes, or 20 bytes from new drives.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct JointReport {
     /// Position, rad.
     pub position: f64,
     /// Velocity, rad/s.
     pub velocity: f64,
-    /// Torque, N·m. Its sign is the sign of the commanded torque (J-16).
+    /// Torque, N·m, with the sign convention of the commanded torque (J-16).
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: u8,

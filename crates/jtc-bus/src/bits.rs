@@ -77,7 +77,7 @@ bit_words! {
         ABSOLUTE_ENCODER = 1, "absolute encoder";
         /// Lets the node react to the safety line.
         SAFETY_LINE = 2, "safety line";
-        /// Watch the bus.
+        /// Monitors the bus.
         BUS_WATCHDOG = 3, "bus watchdog";
         /// Trips on over-speed. If this bit is 0, the trip is off.
         OVER_SPEED_TRIP = 4, "over-speed trip";

@@ -130,7 +130,7 @@ impl Display for Answer {
     }
 }
 
-/// Writes the names of the set bits; writes nothing if no bit is set.
+/// Writes the names of the set bits. If no bit is set, the function writes nothing.
 fn report_bits(f: &mut Formatter<'_>, title: &str, bits: u8, names: &[&str]) -> Result {
     if bits == 0 {
         return Ok(());

@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn j10_a_frame_without_stuff_bits() {
-        // The frame has 17 + 12 nominal bits. Its data bits are ESI, length, 8 bytes, 4 + 17 checksum bits, 6 fixed stuff bits and
+        // The frame has 17 + 12 nominal bits. The data bits are ESI, length, 8 bytes, 4 + 17 checksum bits, 6 fixed stuff bits and
         // delimiter.
         let frame = Frame::new(0x555, &[0x55; 8]).unwrap();
         assert_eq!(duration_ns(&frame), 29_000 + (1 + 4 + 64 + 21 + 6 + 1) * 200);

@@ -169,7 +169,7 @@ const fn len_of(dlc: u8) -> Option<usize> {
 /// Reason why a frame cannot be decoded. The controller counts and ignores frames that it cannot decode (J-15).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// This protocol does not use the identifier.
+    /// The protocol of this bus does not use the identifier.
     UnknownId(u16),
     /// The frame is too short for its identifier.
     TooShort {

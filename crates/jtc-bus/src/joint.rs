@@ -1,4 +1,4 @@
-//! Numbers of the joints. Users count joints from 1; the bus counts nodes from 0.
+//! Numbers of the joints. Users count joints from 1, but the bus counts nodes from 0.
 use core::fmt;
 
 use crate::JOINTS;

@@ -11,7 +11,7 @@ pub const TORQUE_FULL_SCALE: f64 = 360.0;
 /// protocol.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Velocity that the integer 32767 represents, rad/s; 2.0, or 6.283185 on older drives.
+    /// Velocity that the integer 32767 represents, rad/s. The value is 2.0, or 6.283185 on older drives.
     pub velocity: f64,
 }
 
@@ -29,13 +29,13 @@ impl Default for Scale {
     }
 }
 
-/// Returns the nearest 16-bit value, within ±32767; NaN is 0.
+/// Returns the nearest 16-bit integer, limited to ±32767, and 0 for NaN.
 #[inline]
 pub(crate) fn to_i16(value: f64, full_scale: f64) -> [u8; 2] {
     (nearest(value, full_scale, f64::from(i16::MAX)) as i16).to_be_bytes()
 }
 
-/// Returns the nearest 32-bit value, within ±2147483647; NaN is 0.
+/// Returns the nearest 32-bit integer, limited to ±2147483647, and 0 for NaN.
 pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }

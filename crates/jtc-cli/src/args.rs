@@ -1,5 +1,5 @@
-//! The command line: commands, options, their environment variables and examples. The options of each group of commands are in a
-//! file of their own.
+//! Command line of `jtc`, with commands, options, environment variables and examples. Each group of commands has a separate file for its
+//! options.
 
 mod arm;
 mod bench;
@@ -376,7 +376,7 @@ pub(crate) enum Command {
     },
 }
 
-/// Words that people try, with the command to use.
+/// Words that users may type instead of a command, with the right command.
 pub(crate) const MEANT: [(&str, &str); 15] = [
     ("pause", "jtc traj pause"),
     ("hold", "jtc traj pause"),
@@ -399,7 +399,7 @@ pub(crate) const MEANT: [(&str, &str); 15] = [
 ];
 
 impl Command {
-    /// Returns `true` if the command moves the arm, or records a motion by hand: its result cannot be repeated.
+    /// Returns `true` if the command moves the arm or records a motion by hand, so that its result cannot be repeated.
     pub(crate) fn moves(&self) -> bool {
         matches!(
             self,

@@ -26,7 +26,7 @@ impl LinkArgs {
         self.open_with(None)
     }
 
-    /// Like [`Self::open`]; `policy` tells the agent how to treat a motion when this program disconnects.
+    /// Like [`Self::open`]. `policy` defines how the agent treats a motion when this program disconnects.
     pub(crate) fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
         Ok(self.open_as(policy, true)??)
     }

@@ -86,7 +86,7 @@ fn a_measured_motion_at_its_limits_is_run_again() {
     assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
 }
 
-/// A pose cannot be saved during a motion. This includes its beginning, when the velocity is still zero.
+/// A pose cannot be saved during a motion, including the start of the motion, when the velocity is still zero.
 #[test]
 fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     let sim = Sim::start(&["--no-throttle"]).held();

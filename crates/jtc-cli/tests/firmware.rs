@@ -30,7 +30,7 @@ fn image(board: &str) -> Vec<u8> {
     bytes[0x600] = 1;
     bytes[0xFFF] = 1;
     if board.starts_with("nucleo-h745") {
-        // This part is the program of the second core.
+        // The part after these bytes is the program of the second core.
         bytes.resize(1024 * 1024, 0xFF);
         for word in [0x3004_8000u32].into_iter().chain([0x0810_0041; 15]).chain([0xE7FD_BF30]) {
             bytes.extend(word.to_le_bytes());

@@ -17,7 +17,7 @@ use crate::common::{Sim, jtc};
 /// Time after the enable until every joint has settled.
 const SETTLES: Duration = Duration::from_secs(8);
 
-/// External torque at which a push is reported, N·m. It is 30 % of the 40 N·m of joint 5.
+/// External torque at which a push is reported, N·m. The value is 30 % of the 40 N·m of joint 5.
 const LIMIT: f64 = 12.0;
 
 fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {

@@ -1,4 +1,5 @@
-//! Tests of `jtc plan` with the flange on lines and arcs. They check the flange positions in the written trajectory, and the refused plans.
+//! Tests of `jtc plan` with the flange on lines and arcs. The tests check the flange positions in the written trajectory, and the refused
+//! plans.
 
 use crate::common;
 #[path = "../../jtc-plan/tests/robots/mod.rs"]

@@ -53,7 +53,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     let text = jtc(&["log", "replay", &recording]).ends(0).out;
     assert!(text.contains(" replayed, no difference"), "{text}");
 
-    // Clearing errors keeps the log; clearing the log removes it.
+    // A request that clears errors does not remove the log. A request that clears the log removes it.
     sim.jtc(&["recover"]).ends(0);
     assert_eq!(sim.json(&["log", "fetch"], 0)["first"], *first);
     let info = sim.jtc(&["info"]).ends(0).out;

@@ -52,7 +52,7 @@ fn the_port_may_stand_before_the_command() {
     assert!(output.err.contains("/near/tty"), "{}", output.err);
 }
 
-/// The joint bus is CAN FD. A transport without CAN FD is refused, and the error suggests a suitable one.
+/// The joint bus is CAN FD. A transport without CAN FD is refused, and the error suggests a suitable transport.
 #[cfg(unix)]
 #[test]
 fn a_bus_that_cannot_carry_the_joints_is_refused() {

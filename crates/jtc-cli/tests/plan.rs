@@ -32,7 +32,7 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// `--deg` converts the blend as well as the positions. The command reports each waypoint that a rounded corner does not pass.
+/// With `--deg`, the positions and the blend are in degrees. The command reports each waypoint that a rounded corner does not pass.
 #[test]
 fn a_blend_is_in_the_unit_of_the_positions() {
     let dir = Dir::new();
@@ -97,8 +97,8 @@ fn a_plan_leaves_the_margin_that_is_asked_for() {
     }
 }
 
-/// The trajectory passes the check of a run and is at rest at its ends. Its distance from the waypoints is at most the blend distance.
-/// Without a speed limit, the motion is at least as fast. The printed values match the file.
+/// The trajectory passes the check of a run and is at rest at its ends. The distance of the trajectory from the waypoints is at most the
+/// blend distance. Without a speed limit, the motion is at least as fast. The printed values match the file.
 #[test]
 fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     let dir = Dir::new();

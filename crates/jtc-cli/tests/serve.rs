@@ -149,7 +149,7 @@ fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
     assert!(open.err.contains("chmod 600"), "{}", open.err);
 }
 
-/// Writes two arm files. The first has another name; the second contains gains that no frame can transmit.
+/// Writes two arm files. The first arm has another name, and the second arm contains gains that no frame can transmit.
 fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     let avena = include_str!("../../../arms/avena.toml");
     let file = |name: &str, text: String| {

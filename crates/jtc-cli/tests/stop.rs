@@ -224,7 +224,8 @@ fn a_pause_reaches_the_program_too() {
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
-/// Like a Python program, the program keeps the port open for longer than one motion. It may be busy with other work while the arm moves.
+/// Like a Python program, the program keeps the port open for longer than one motion. The program may be busy with other work while the arm
+/// moves.
 #[test]
 fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let cell = Cell::held();
@@ -270,7 +271,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
         assert_eq!(direct.out.trim_end(), words);
         let value = cell.jtc(&["--json", "traj", "stop"]).ends(0).json();
         assert_eq!((&value["command"], &value["arms"][0]["moved"]), (&"stop".into(), &false.into()));
-        // A program that only shows the status forwards the Stop.
+        // The Stop is sent through a program that only shows the status.
         let mut monitor = cell.command(&["--json", "monitor"]).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         let mut out = BufReader::new(monitor.stdout.take().unwrap());
@@ -325,7 +326,7 @@ fn an_arm_that_falls_without_torque_does_not_stand() {
     let file = cell.0.file("motion.csv", &slow_motion(50));
     cell.jtc(&["traj", "run", &file]).ends(5);
     stops(&cell, "Error");
-    // The controller is in Init without torque. Its drives were enabled before.
+    // The controller is in Init without torque, but its drives were enabled before.
     let cell = Cell(Sim::start(&["--no-throttle"]).held());
     cell.jtc(&["disable", "--yes"]).ends(0);
     stops(&cell, "Init");

@@ -124,7 +124,7 @@ fn j33_a_reader_that_does_not_read_holds_no_run() {
     let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // This write fills the pipe to its capacity.
+    // The write call fills the pipe to its capacity.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();

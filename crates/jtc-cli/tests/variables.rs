@@ -59,8 +59,8 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
     }
 }
 
-/// In older versions some variables caused a motion or a reset, confirmed an action or overrode a check. Such a variable has no effect now,
-/// and one output line reports this.
+/// In older versions some variables caused a motion or a reset, confirmed an action or overrode a check. A variable of this kind has no
+/// effect now, and one output line reports this.
 #[test]
 fn no_variable_acts() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -118,7 +118,8 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// The command reports a variable that has an effect in one line on stderr. It does not if the option is typed before or after the command.
+/// The command reports a variable that has an effect in one line on stderr. The command does not report the variable if the option is typed
+/// before or after the command.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);

@@ -58,7 +58,8 @@ enum Notice {
     },
     Halted {
         number: u64,
-        /// Numbers of Stops and Pauses of other clients. They are missing if the agent is older and does not count them.
+        /// Numbers of Stops and Pauses of other clients. The numbers are missing if the agent is older and does not count these Stops and
+        /// Pauses.
         of_others: Option<Halts>,
     },
     #[serde(other)]
@@ -169,7 +170,7 @@ impl AgentPort {
         &self.hello
     }
 
-    /// Receives one message if one arrives within the timeout; otherwise returns `false`.
+    /// Receives a message. Returns `false` if no message arrives within the timeout.
     fn receive(&mut self, timeout: Duration) -> Result<bool, PortError> {
         let set = tls::socket(self.socket.get_mut()).and_then(|stream| {
             if timeout.is_zero() {

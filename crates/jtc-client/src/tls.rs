@@ -10,11 +10,11 @@ use rustls::{ClientConfig, RootCertStore};
 use tungstenite::Connector;
 use tungstenite::stream::MaybeTlsStream;
 
-/// Creates a connector that trusts the certificates in this file. Without a file, it trusts the certificates of the system.
+/// Creates a connector that trusts the certificates in this file. Without a file, the connector trusts the certificates of the system.
 ///
 /// # Errors
 ///
-/// Returns an error if the file contains no certificate, or the system has none.
+/// Returns an error if the file contains no certificate, or if the system has no certificates.
 pub(crate) fn connector(file: Option<&Path>) -> io::Result<Connector> {
     let mut roots = RootCertStore::empty();
     let certificates: Vec<CertificateDer<'static>> = match file {
@@ -44,7 +44,7 @@ pub(crate) fn socket(stream: &mut MaybeTlsStream<TcpStream>) -> io::Result<&mut 
     match stream {
         MaybeTlsStream::Rustls(stream) => Ok(&mut stream.sock),
         MaybeTlsStream::Plain(stream) => Ok(stream),
-        // This crate creates no other kind of stream.
+        // The crate creates only streams of the kinds above.
         _ => Err(io::ErrorKind::Unsupported.into()),
     }
 }

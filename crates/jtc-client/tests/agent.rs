@@ -170,8 +170,8 @@ fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
     assert_eq!(status.state, ControllerState::HoldPos);
 }
 
-/// A queued request from before a Stop is refused even if the client sends it later. The client knows the number of Stops of other clients,
-/// so it can send the number of the time of the request.
+/// A queued request from before a Stop is refused even if the client sends it later. The client counts the Stops and Pauses of other
+/// clients, and each request contains the count at the time of its creation.
 #[test]
 fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requested_after_them() {
     let served = Served::start(921_600);

@@ -40,7 +40,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
     assert_eq!(check["passed"], true, "{check}");
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7 }));
     let (number, _) = event(&served, 0, "executing");
-    // Another command at the same time is refused; the error contains the running job.
+    // Another command at the same time is refused, and the error contains the active job.
     let (status, busy) = anna.ask("POST /api/gripper", Some(json!({ "on": true })));
     assert!(
         status == 409
@@ -49,7 +49,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
     );
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(anna.ask("POST /api/pause", None).0, 200);
-    // This client can pause the run and resume it as soon as the arm is at rest.
+    // The client that started the run can pause the run, and resume it when the arm is at rest.
     let paused = |event: &Value| event["trajectory"] == "Pause";
     let (mut number, mut state) = event(&served, number, "state");
     while !paused(&state) {

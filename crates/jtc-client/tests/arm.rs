@@ -40,7 +40,7 @@ fn an_arm_is_read_given_and_stored_and_what_is_none_changes_nothing() {
         String::new(),
         text.replace("stop_ms = 400", "stop_ms = 5"),
         text.replace("stop_ms", "stop_mss"),
-        // This arm is complete, but contains a parameter that no controller accepts.
+        // The arm is complete, but contains a parameter that no controller accepts.
         text.replace("stop_ms = 400", "kp_max = 1"),
     ] {
         let (status, error) = anna.ask("PUT /api/arm", Some(json!({ "text": wrong })));

@@ -41,7 +41,8 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let (_, head, file) = files.iter().find(|(status, ..)| *status == 200).expect("one of them");
     assert!(head.to_ascii_lowercase().contains("content-type: application/octet-stream"), "{head}");
 
-    // The file is equal to the output of `jtc log fetch`. It is a recording that any tool can read, and a log that reproduces every tick.
+    // The file is equal to the output of `jtc log fetch`. The file is a recording that any tool can read, and contains a log that
+    // reproduces every tick.
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
     std::fs::write(&path, file).expect("a file");

@@ -84,7 +84,7 @@ fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
         get(&served, "/api/status")["controller"]["joints"][1]["position_rad"].as_f64().expect("a position")
     };
     let before = place();
-    // The trajectory reaches 2 rad/s in the middle. Such a trajectory can be stored.
+    // The trajectory reaches 2 rad/s in the middle. A trajectory with this velocity can be stored.
     assert_eq!(put(&served, "7", "too fast", 2.6).0, 200);
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
     let ended = anna.over(job);

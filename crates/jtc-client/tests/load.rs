@@ -48,7 +48,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
             })
         })
         .collect();
-    // These clients request all data but do not read it.
+    // The clients request all data but do not read the data.
     let deaf: Vec<_> = ["stream", "line", "foxglove"]
         .iter()
         .flat_map(|path| (0..4).map(move |_| *path))

@@ -116,7 +116,7 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": 35 }))).0, 204);
     assert_eq!(look(&served, "GET /api/speed"), (200, json!({ "percent": 35 })));
 
-    // An uploaded arm must be complete. Its parameters that cannot be sent in a frame must also be acceptable.
+    // An uploaded arm must be complete, and its parameters that cannot be sent in a frame must also be acceptable.
     is_for_the_one_who_commands(&served, "POST /api/recover", &json!({ "arm": AVENA_TOML }));
     let heavy = AVENA_TOML.replacen("mass_kg = 4", "mass_kg = 5", 1);
     let other = heavy.replacen("position_max_rad = 2.97", "position_max_rad = 2.5", 1);

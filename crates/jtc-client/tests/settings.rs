@@ -1,5 +1,5 @@
-//! Tests of settings and other parameters of a controller by HTTP. They are refused to other clients and in the wrong state, and never
-//! applied partially.
+//! Tests of settings and other parameters of a controller by HTTP. The requests are refused to other clients and in the wrong state, and
+//! are never applied partially.
 use crate::common;
 
 use common::Served;

@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::deceleration::moves;
 use crate::limits::JointConfig;
 
-/// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. This time is longer than the
+/// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. The time is longer than the
 /// low-speed phase at the reversal of a swing.
 const CALM_MS: u16 = 100;
 

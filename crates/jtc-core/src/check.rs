@@ -1,9 +1,9 @@
 //! Check of a trajectory during its upload, point by point, before the arm moves (J-36).
 //!
-//! Between two points (J-32) the commanded velocity is a cubic and the position a quintic. The derivative of the position is a quartic. It
-//! is the cubic plus a bump for the distance that the velocities do not explain. In Bernstein form each curve lies within the hull of a few
-//! control points. An interval passes the check at once if a rough estimate of its hulls is within the limits (`screen`). For any other
-//! interval the curves are halved until the hull is within the limits or a point of the curve is outside (`curve`).
+//! Between two points (J-32) the commanded velocity is a cubic and the position a quintic. The derivative of the position is a quartic,
+//! which is the cubic plus a bump for the distance that the velocities do not explain. In Bernstein form each curve lies within the hull of
+//! a few control points. An interval passes the check at once if a rough estimate of its hulls is within the limits (`screen`). For any
+//! other interval the curves are halved until the hull is within the limits or a point of the curve is outside (`curve`).
 //!
 //! Positions are rounded to steps of 96 µrad. The effect of this rounding on the derivative is not an error of the path. The check
 //! therefore reduces the distance of each interval by one step. `range` handles the effect of rounding on the positions, and paths that
@@ -302,8 +302,8 @@ impl TrajectoryCheck {
             if coming_in && !range.contains(p0) {
                 let (low, high) = range.inward(p0, VELOCITY_STEP + h * ACCELERATION_STEP);
                 let found = leaves(speed, low, high, &mut halvings);
-                // This is the position in the interval at which the curve turns outwards. If the curve is still inside at this position,
-                // the check reports the point at the start of the interval.
+                // The result is the position in the interval at which the curve turns outwards. If the curve is still inside at this
+                // position, the check reports the point at the start of the interval.
                 let place = |Leaves { at, .. }: Leaves| {
                     let value = interpolate(&a, &b, h, at).position[j];
                     let value = if range.contains(value) { p0 } else { value };

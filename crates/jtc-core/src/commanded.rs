@@ -3,14 +3,14 @@
 //! A measurement is delayed, because the drive has read its encoder before it received the Move that it answered. The command that follows
 //! from the measurement takes effect even later. The *due* position is the position that was commanded one *delay*
 //! ([`Config::delay_ticks`](crate::Config)) ago. A joint that follows exactly would measure the due position now. The difference between
-//! the measured and the due position is therefore an error of the joint. This difference does not include the distance that the joint has
+//! the measured and the due position is therefore an error of the joint. The difference does not include the distance that the joint has
 //! moved during the delay.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::SetPoint;
 use crate::{DT, JOINTS};
 
-/// Number of stored set values. It is a power of two, so that an index needs no comparison.
+/// Number of stored set values, which is a power of two so that an index needs no comparison.
 const SLOTS: usize = 8;
 
 /// Ring buffer of the last set values.

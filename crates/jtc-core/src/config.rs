@@ -34,11 +34,11 @@ pub struct Config {
     /// Resolution of the joint encoders, rad. In the known drives it is 16 bits per revolution, which is much coarser than the resolution
     /// on the bus. While a joint is at rest, the integral does not change within one encoder step (J-41).
     pub encoder_step: f64,
-    /// Age of a measurement when the command that follows from it takes effect, in ticks (J-62); at most 7. The drives have a loop of 1 ms,
-    /// in which they read the encoder and apply the torque. A drive answers a Move that it receives between two loops with the encoder
-    /// value of the first loop, and applies the torque in the second loop. The controller uses the answer in its next tick, and the Move of
-    /// that tick takes effect in the third loop. The torque therefore takes effect two loops after the encoder was read, for any phase
-    /// between the loops of the drive and the ticks of the controller. An arm with a slower bus, or with drives that filter their
+    /// Age of a measurement at the time when the resulting command takes effect, in ticks (J-62). The highest value is 7. The drives have a
+    /// loop of 1 ms, in which they read the encoder and apply the torque. A drive answers a Move that it receives between two loops with
+    /// the encoder value of the first loop, and applies the torque in the second loop. The controller uses the answer in its next tick, and
+    /// the Move of that tick takes effect in the third loop. The torque therefore takes effect two loops after the encoder was read, for
+    /// any phase between the loops of the drive and the ticks of the controller. An arm with a slower bus, or with drives that filter their
     /// positions, has a longer delay. With 0, measurements are compared with the present command.
     pub delay_ticks: u8,
     /// Configuration bits that the controller sends to every joint (J-11).
@@ -52,7 +52,7 @@ pub struct Config {
     pub missed_moves_max: u8,
     /// Time for which a node may be silent after its reset without an error, ms.
     pub node_boot_ms: u32,
-    /// Longest time from READY to ENABLE, ms (J-16). This time is measured while enabling is requested.
+    /// Longest time from READY to ENABLE, ms (J-16). The time is measured while the controller requests enabling.
     pub enable_timeout_ms: u32,
     /// Highest speed at which joints are enabled, rad/s (J-16). Every joint must have been slower than this speed for `enable_still_ms`, so
     /// that a falling arm is not stopped abruptly.
@@ -112,20 +112,20 @@ pub struct Config {
     /// Speed override, in seconds of path time per second, 0.05 to 1 (J-57). The speed override is not part of an arm.
     pub speed: f64,
     /// Absent joints, for work on a bench (J-53). The controller does not expect nodes for absent joints, and does not execute a motion.
-    /// This setting is not part of an arm, and no joint is absent at the start of the device.
+    /// The setting is not part of an arm, and no joint is absent at the start of the device.
     pub absent: [bool; JOINTS],
     /// Position of each absent joint in the model, rad.
     pub absent_position: [f64; JOINTS],
-    /// Payload at the flange of the arm (J-60). The payload is not part of an arm, and the device starts without one.
+    /// Payload at the flange of the arm (J-60). The payload is not part of an arm, and the device starts without a payload.
     pub payload: Payload,
     /// Bounds of gains, masses and friction that a host may send (J-06).
     pub parameter_bounds: ParameterBounds,
 }
 
 impl Config {
-    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded. They are its position limits,
-    /// clipped to the working area if the drives are configured to keep to this area (J-43). If `joint` is out of range, the range is
-    /// empty.
+    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded. The range is defined by the
+    /// position limits of the joint, clipped to the working area if the drives are configured to keep to this area (J-43). If `joint` is
+    /// out of range, the range is empty.
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);
@@ -201,7 +201,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// Returns the number of the joint with the error, from 1; 0 for the whole arm.
+    /// Returns the number of the joint with the error, counted from 1, or 0 for the whole arm.
     pub const fn joint(&self) -> usize {
         match *self {
             Self::Braking { .. } => 0,
@@ -258,7 +258,7 @@ impl Config {
     /// must be able to report the over-speed threshold, and must not trip below this threshold.
     ///
     /// # Errors
-    /// Returns the first joint whose limits the drives cannot do. A limit that is NaN is also refused.
+    /// Returns an error with the first joint whose limits the drives do not support. A limit that is NaN is also refused.
     #[allow(clippy::neg_cmp_op_on_partial_ord)]
     pub const fn check(&self) -> Result<(), ConfigError> {
         let (value, limit) = (self.braking_ms_max, 2 * self.stop_ms as u32);

@@ -32,7 +32,7 @@ pub struct Controller<M> {
     pub(crate) state: ControllerState,
     pub(crate) errors: Errors,
     pub(crate) nodes: Nodes,
-    // Parameters that the controller has received from the host.
+    // Parameters and commands that the controller has received from the host.
     pub(crate) parameters: HostParameters,
     pub(crate) teaching: bool,
     /// Time for which Teaching has waited until the arm is held, ms.
@@ -109,7 +109,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         &self.status_frame
     }
 
-    /// Returns the reason why the check of J-36 refused the last segment or Execute; `None` if the check refused neither.
+    /// Returns the reason why the check of J-36 refused the last segment or Execute. Returns `None` if the check did not refuse it.
     pub fn violation(&self) -> Option<&Violation> {
         self.violation.as_ref()
     }

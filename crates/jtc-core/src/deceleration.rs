@@ -26,8 +26,8 @@ pub(crate) fn moves(velocity: f64) -> bool {
 pub(crate) struct Deceleration {
     from: f64,
     velocity: f64,
-    /// Elapsed time, ms. It is 0 in the first tick, which commands the measured values. The position error and its derivative therefore
-    /// begin at 0.
+    /// Elapsed time, ms. The time is 0 in the first tick, which commands the measured values. The position error and its derivative
+    /// therefore begin at 0.
     elapsed_ms: f64,
     length_ms: f64,
     /// `true` if the joint falls, so that no torque decelerates it at the beginning.
@@ -37,8 +37,8 @@ pub(crate) struct Deceleration {
 bit_codec!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
-    /// Creates the deceleration of a joint that a hand guides. It starts at a measured position (rad) and velocity (rad/s) and takes
-    /// `length_ms`. The velocity is clipped to the velocity limit.
+    /// Creates the deceleration of a joint that a hand guides. The deceleration starts at a measured position (rad) and velocity (rad/s)
+    /// and takes `length_ms`. The velocity is clipped to the velocity limit.
     pub(crate) fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }

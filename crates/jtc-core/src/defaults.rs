@@ -1,4 +1,4 @@
-//! Default settings and parameters at the start of the device (rules, section 7). These defaults are generated from `arms/avena.toml` at
+//! Default settings and parameters at the start of the device (rules, section 7). The defaults are generated from `arms/avena.toml` at
 //! build time.
 use jtc_dynamics::{ArmModel, Link, Origin, Payload};
 

@@ -197,8 +197,8 @@ mod tests {
         }
     }
 
-    /// The cause of a held stop is shown as occurred, and as current if the stop latches. This cause is not an error, so the safety output
-    /// stays 1.
+    /// The cause of a held stop is shown as occurred, and as current if the stop latches. The cause of a held stop is not an error, so the
+    /// safety output stays 1.
     #[test]
     fn j66_j69_the_cause_of_a_held_stop_is_shown_and_is_no_error() {
         for latches in [false, true] {

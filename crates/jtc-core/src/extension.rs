@@ -87,7 +87,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Jogs at joint velocities (J-58). This requires HoldPos, and no paused path.
+    /// Jogs at joint velocities (J-58). A jog is possible only in HoldPos and without a paused path.
     fn jog(&mut self, velocities: &Floats<'_>) -> Result<(), DataStatus> {
         let set = &self.motion.set;
         let free = self.state == ControllerState::HoldPos
@@ -260,7 +260,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Applies all values or none (J-53). If friction tables are in use, one table is checked per tick.
+    /// Applies all values or none (J-53). If the controller uses friction tables, it checks one table per tick.
     fn set_settings(&mut self, values: Values<'_>) -> SliceOutcome {
         let all = |taken: fn(Live) -> bool| {
             values.iter().all(|value| settings::setting(value.setting).is_some_and(|row| taken(row.live)))

@@ -4,8 +4,9 @@ use crate::parameters::TableOf;
 
 /// Returns the torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
 ///
-/// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), with s as the smoothed sign of v. The temperature factor is clipped to 0.2..2. The
-/// straight line that was fitted to the measured drives changes its sign near 60 °C, and the compensation would then act as drag.
+/// The torque is (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), with s as the smoothed sign of v. The temperature factor is clipped to
+/// 0.2..2. The straight line that was fitted to the measured drives changes its sign near 60 °C, and the compensation would then act as
+/// drag.
 pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }
@@ -61,7 +62,7 @@ fn ends(axis: &[f32; 20]) -> (f64, f64) {
 }
 
 /// Returns the bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. For a temperature outside the table, the
-/// nearest column is used. Returns `None` for a velocity outside the table; both end values are inside.
+/// nearest column is used. Returns `None` for a velocity outside the table. The end values belong to the table.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let (slowest, fastest) = velocities(table);
     // A velocity that is outside only because of rounding in the interpolation between two points is considered inside.
@@ -107,7 +108,7 @@ mod tests {
     fn sample() -> TableOf<f32> {
         let velocity = core::array::from_fn(|i| -1.0 + i as f32 * 0.125);
         let temperature = core::array::from_fn(|i| 20.0 + i as f32 * 2.0);
-        // This torque is bilinear in both axes, so a correct interpolation reproduces it everywhere.
+        // The torque of this table is bilinear in velocity and temperature, so a correct interpolation reproduces the torque everywhere.
         let torque = core::array::from_fn(|r| {
             core::array::from_fn(|c| {
                 3.0 + 2.0 * velocity[r] - 0.5 * temperature[c] + 0.25 * velocity[r] * temperature[c]

@@ -1,7 +1,7 @@
 //! Check that gains match the inertia of the joints (J-71), and trial of new gains.
 //!
 //! The torques of the derivative and of the position error take effect with a delay, so a joint that is too light for its gains oscillates.
-//! The controller computes the smallest effective inertia of each joint in some fixed poses, one pose per tick. It compares the gains with
+//! The controller computes the smallest effective inertia of each joint in some fixed poses, one pose per tick, and compares the gains with
 //! this inertia.
 use core::f64::consts::TAU;
 
@@ -17,13 +17,14 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Delay of the torque of the derivative in addition to [`Config::delay_ticks`], ticks. This delay is half of the ticks over which the
+/// Delay of the torque of the derivative in addition to [`Config::delay_ticks`], ticks. The delay is half of the ticks over which the
 /// derivative is computed, plus half of the tick for which a torque is constant.
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Delay of the torque of the position error in addition to [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
 /// Factors in the required inertia: the first for Kd times the delay of its torque, the second for Kp times both delays. The result is 1.1
-/// to 1.7 times the inertia at which the loop of one joint becomes stable, if Kp is at most half of the Kp that Kd can damp.
+/// to 1.7 times the inertia at which the control loop of one joint becomes stable. This range applies if Kp is at most half of the Kp that
+/// Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
 /// Largest permitted sag of a joint if new gains reduce the torque of its integral, as a share of the position error limit.
@@ -161,7 +162,7 @@ bit_codec!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
 bit_codec!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
-    /// Begins a trial, because a host has sent the gains `given` under torque. They replace the gains `before`.
+    /// Begins a trial of the gains `given`, which a host has sent under torque. The gains `before` are replaced.
     pub(crate) fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
         // If the gains in `before` are still on trial, they have not yet held the arm stable.
@@ -207,8 +208,8 @@ impl Trial {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
-    /// Returns the gains of this tick while the gains `given` are blended in. Kp and Kd change gradually, but the integral changes at once.
-    /// Returns `None` if the blend is over.
+    /// Returns the gains of this tick during the blend to the new gains `given`. Kp and Kd change gradually, but the integral changes at
+    /// once. Returns `None` if the blend is over.
     pub(crate) fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
             return None;
@@ -235,8 +236,8 @@ impl Trial {
     }
 
     /// Handles joints (one bit each) that fail with their `gains`. `unstable` marks the joints with unstable control loops. If the gains
-    /// must change, returns the cause and the new gains. These are the gains before the trial or, if none are stored, softer gains for the
-    /// unstable joints.
+    /// must change, returns the cause and the new gains. The new gains are the gains before the trial or, if none are stored, softer gains
+    /// for the unstable joints.
     pub(crate) fn fails(
         &mut self,
         failed: u8,

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::retention::{Begun, Retention};
 
-/// Largest number of samples that wait for the disk. This is enough for minutes of statuses.
+/// Largest number of samples that wait for the disk. The queue is large enough for minutes of statuses.
 const WAITING_MAX: usize = 1 << 13;
 /// Number of queue entries that are reserved for the start and end of recordings.
 const RESERVED: usize = 64;

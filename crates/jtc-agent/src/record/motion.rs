@@ -89,7 +89,7 @@ impl Follower {
     pub(super) fn status(&mut self, now: Duration, status: &Status) -> Vec<Step> {
         let mut steps = self.silence(now);
         let motion = self.motion(now, status);
-        // Each motion gets a separate recording, even if it begins directly after the previous motion.
+        // Each motion is stored in a separate recording, even if it begins directly after the previous motion.
         let another = motion.is_some_and(|motion| {
             self.open.as_ref().is_some_and(|open| open.motion != motion)
                 || motion == Motion::Execution && self.begins_anew(status)
@@ -132,7 +132,7 @@ impl Follower {
         self.end("fault", &format!("no status received for {} s", SILENT.as_secs()))
     }
 
-    /// Ends the recording with the given reason, because no more statuses will be processed.
+    /// Ends the recording with `reason`, because no more statuses will be processed.
     pub(super) fn end(&mut self, outcome: &str, reason: &str) -> Vec<Step> {
         self.last = None;
         self.before.clear();

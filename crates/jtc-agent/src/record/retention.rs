@@ -163,11 +163,11 @@ impl Retention {
         }
     }
 
-    /// Completes a recording: it gets its final name.
+    /// Completes a recording and gives the file its final name.
     ///
     /// # Errors
     ///
-    /// The recording could not be renamed and keeps the name of an incomplete recording.
+    /// The recording file could not be renamed and keeps the name of an incomplete recording.
     pub(super) fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
         let bytes = length(&begun.path).unwrap_or(0);
         let mut own = Own { name: begun.name, bytes, part: true };
@@ -193,7 +193,7 @@ impl Retention {
         self.own.push_back(Own { name: begun.name, bytes, part: true });
     }
 
-    /// Removes the oldest recordings until `bytes` fit within the limit; returns the removed paths.
+    /// Removes the oldest recordings until `bytes` more bytes fit within the limit. Returns the paths of the removed recordings.
     pub(super) fn make_room(&mut self, bytes: u64) -> Vec<PathBuf> {
         let mut removed = Vec::new();
         while self.bytes() + bytes > self.limit

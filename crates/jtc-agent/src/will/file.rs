@@ -218,7 +218,7 @@ mod tests {
         doubtful("another port");
         write(&path, PORT, &will(Policy::Continue), 0.0).expect("there is room");
         let good = fs::read_to_string(&path).expect("text");
-        // A file that is truncated at any byte is reported as damaged. It is never read as another policy.
+        // A file that is truncated at any byte is reported as damaged and is never read as another policy.
         for n in 0..good.len() {
             fs::write(&path, &good[..n]).expect("a file");
             doubtful("damaged");

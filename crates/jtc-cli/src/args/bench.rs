@@ -1,4 +1,4 @@
-//! `jtc bench`: joints that are not there.
+//! `jtc bench`: options to declare absent joints.
 
 use clap::Subcommand;
 use jtc_wire::Joint;

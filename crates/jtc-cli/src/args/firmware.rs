@@ -1,4 +1,4 @@
-//! `jtc firmware`: images, drives, and what a board runs.
+//! `jtc firmware`: options for images, USB drives, and the firmware of a board.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `jtc log`: the flight recorder.
+//! `jtc log`: options for the flight recorder.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `jtc monitor`, `clear`, `reset`, `gripper`, `recover`, `jog`: looking at a controller and leading it back.
+//! `jtc monitor`, `clear`, `reset`, `gripper`, `recover`, `jog`: options to monitor and recover a controller.
 
 use std::path::PathBuf;
 

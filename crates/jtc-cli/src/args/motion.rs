@@ -1,4 +1,4 @@
-//! `jtc traj` and `jtc teach`: what moves the arm.
+//! `jtc traj` and `jtc teach`: options of the commands that move the arm.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
-/// Help of `jtc run` and `jtc traj run`.
+/// Help text of `jtc run` and `jtc traj run`.
 pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of the speed in the file. The \
     speed of an approach is --speed percent of the limits, but at most 50 %. Without --speed, the approach \
     runs at 10 % of the limits, and at 25 % in a simulator.\n\n\
@@ -22,7 +22,7 @@ pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of t
     jtc traj run motion.csv --speed 10 --record run.mcap\n  \
     jtc traj run cycle.csv --approach --repeat 10";
 
-/// Help of `jtc stop` and `jtc traj stop`.
+/// Help text of `jtc stop` and `jtc traj stop`.
 pub(super) const STOP_EXAMPLES: &str = "The Stop also reaches the arm if an agent or another program of this \
     user has the port. Without --port or JTC_PORT, the command stops every arm whose port such a program \
     has. If no such program runs, the command uses the only port found.\n\n\
@@ -54,7 +54,7 @@ pub(crate) struct CheckArgs {
 }
 
 impl CheckArgs {
-    /// Percent of the file's own speed.
+    /// Returns the speed in percent of the speed in the file.
     pub(crate) fn speed(&self) -> f64 {
         self.speed.unwrap_or(100.0)
     }
@@ -324,7 +324,7 @@ pub(crate) enum TeachCommand {
 }
 
 impl ExecuteArgs {
-    /// The policy in the word of the agent.
+    /// Returns the policy under the name that the agent uses.
     pub(crate) fn policy(&self) -> Option<&'static str> {
         ["continue", "pause", "stop"].into_iter().find(|word| self.when_gone.as_deref() == Some(word))
     }

@@ -1,4 +1,4 @@
-//! `jtc dynamics`, `explain`, `report`: what needs no controller.
+//! `jtc dynamics`, `explain`, `report`: options of commands that need no controller.
 
 use std::path::PathBuf;
 

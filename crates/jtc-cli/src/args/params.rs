@@ -1,4 +1,4 @@
-//! `jtc params`: what a controller is given, and what of it no frame carries.
+//! `jtc params`: options for the parameters of a controller, and the parameters that cannot be sent in a frame.
 
 use std::path::PathBuf;
 

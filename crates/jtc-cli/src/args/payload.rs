@@ -1,4 +1,4 @@
-//! `jtc payload`: what the arm carries at its flange.
+//! `jtc payload`: options for the payload at the flange.
 
 use clap::{Args, Subcommand};
 use jtc_core::Payload;
@@ -89,7 +89,7 @@ fn inertia(text: &str) -> Result<[f64; 6], String> {
     })
 }
 
-/// A point mass for the simulator: `KG` or `KG,X,Y,Z`.
+/// Parses a point mass for the simulator, `KG` or `KG,X,Y,Z`.
 pub(super) fn carried(text: &str) -> Result<Payload, String> {
     let payload = match numbers(text)?[..] {
         [mass] => Payload { mass, ..Payload::NONE },

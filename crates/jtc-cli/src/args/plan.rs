@@ -1,4 +1,4 @@
-//! `jtc plan`, `jtc move`, `jtc pose`: motions made here, and the poses that they lead to.
+//! `jtc plan`, `jtc move`, `jtc pose`: options to plan motions, and to name target poses.
 
 use std::path::PathBuf;
 
@@ -145,7 +145,7 @@ pub(crate) enum Target {
     Pose(String),
 }
 
-/// Six numbers with commas between them, or a name.
+/// Parses six numbers with commas between them, or a name.
 fn target(text: &str) -> Result<Target, String> {
     let text = text.trim();
     if text.is_empty() {
@@ -161,7 +161,7 @@ fn target(text: &str) -> Result<Target, String> {
     Ok(Target::Joints(joints))
 }
 
-/// Six numbers with commas between them.
+/// Parses six numbers with commas between them.
 fn flange_pose(text: &str) -> Result<[f64; 6], String> {
     numbers(text)?.try_into().map_err(|all: Vec<f64>| {
         format!("{} numbers, not 6: expected x, y, z in m, then roll, pitch and yaw, with commas", all.len())

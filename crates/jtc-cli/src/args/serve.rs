@@ -1,4 +1,4 @@
-//! `jtc serve`: the agent.
+//! `jtc serve`: options of the agent.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -97,12 +97,12 @@ pub(crate) struct ServeArgs {
     pub link: LinkArgs,
 }
 
-/// Room for recordings: some minutes at least.
+/// Parses the size limit of the recordings, which must be sufficient for some minutes.
 fn record_size(text: &str) -> Result<u64, String> {
     size(text, 10_000_000)
 }
 
-/// Room for the log of commands: some thousand lines at least.
+/// Parses the size limit of the command log, which must be sufficient for some thousand lines.
 fn log_size(text: &str) -> Result<u64, String> {
     size(text, 1_000_000)
 }

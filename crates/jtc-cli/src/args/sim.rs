@@ -1,4 +1,4 @@
-//! `jtc demo` and `jtc sim`: the simulator.
+//! `jtc demo` and `jtc sim`: options of the simulator.
 
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ fn over_speed(text: &str) -> Result<[f64; JOINTS], String> {
     of_joints(text, DriveConfig::OVER_SPEED, "rad/s")
 }
 
-/// A number for all joints, or one for each, within limits.
+/// Parses a number for all joints, or a number for each joint, within limits.
 fn of_joints(text: &str, (low, high): (f64, f64), unit: &str) -> Result<[f64; JOINTS], String> {
     let numbers = super::payload::numbers(text)?;
     let all = match numbers[..] {

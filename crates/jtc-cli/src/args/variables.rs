@@ -2,12 +2,12 @@
 
 use cli_kit::variables::{Retired, Variables};
 
-/// Variables of `jtc`, and those that earlier versions used.
+/// Variables of `jtc`, and variables of earlier versions.
 pub(crate) const VARIABLES: Variables = Variables {
     json: "JTC_JSON",
     retired: &[
-        // Variables that made a command move, reset, program, answer a question, override a check or overwrite a file, or that set
-        // another file.
+        // Variables that caused a motion, a reset, flashing or overwriting, that confirmed an action, overrode a check, or selected another
+        // file.
         Retired::less("JTC_ACCEPT_DEVICE_LIMITS", "", "accept-device-limits"),
         Retired::less("JTC_ACCEPT_SUPPLY", "", "accept-supply"),
         Retired::less("JTC_AGAIN", "", "again"),
@@ -36,7 +36,7 @@ pub(crate) const VARIABLES: Variables = Variables {
         Retired::less("JTC_TO_FLANGE", "", "to-flange"),
         Retired::less("JTC_TRAJECTORY", "traj continue", "trajectory"),
         Retired::less("JTC_YES", "", "yes"),
-        // Variables that limited or changed a motion or a result: without them the command would do something else.
+        // Variables that limited or changed a motion or a result. Without these variables, the result of the command would be different.
         Retired::other("JTC_BLEND", "plan", "blend"),
         Retired::other("JTC_BLEND_M", "plan", "blend-m"),
         Retired::other("JTC_BOARD", "", "board"),
@@ -128,7 +128,7 @@ mod tests {
             ("JTC_FAULTS", File),
             ("JTC_SIM_RECORD", Output),
         ];
-        // Options for an image, for parameters of a controller and for a motion have no variable.
+        // Options for an image, for parameters of a controller and for a motion have no environment variable.
         let without = [
             "recover --arm",
             "traj continue --trajectory",

@@ -75,7 +75,7 @@ fn no_link(seen: &Observation) -> bool {
 fn other_rate(name: &str, own: u32, out: &Output) -> Option<u32> {
     RATES.into_iter().filter(|r| *r != own).find(|rate| {
         out.note(format!("no frame in the received bytes; trying {rate} Bd"));
-        // The port gets no socket for Stops, because a Stop at a wrong rate would not reach the controller.
+        // The port is opened without a socket for Stops, because a Stop at a wrong rate would not reach the controller.
         let port = SerialPort::open_without_door(name, *rate).ok();
         port.and_then(|p| Session::new(p).examine(TRY).ok()).is_some_and(|seen| seen.statuses > 0)
     })

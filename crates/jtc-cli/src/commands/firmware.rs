@@ -123,8 +123,7 @@ fn the_drive(places: &Places, named: Option<&PathBuf>) -> Result<Drive, Failure>
 }
 
 /// Returns the port that is checked in addition to the ports of the USB device of the drive. The result is the port that the user has
-/// specified. Otherwise, the result is the only port of the computer. This applies if the board must report its firmware and the system
-/// does not show which port belongs to the board.
+/// specified. Otherwise, if the board must report its firmware and its port is unknown, the result is the only port of the computer.
 fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<String>, Failure> {
     match &link.port {
         Some(url) if url.contains("://") => {

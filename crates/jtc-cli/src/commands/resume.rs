@@ -67,7 +67,7 @@ fn check_rest(
     })
 }
 
-/// Prints that the remainder is not checked. This program did not load the motion, and a controller cannot return its trajectory.
+/// Prints that the remainder is not checked. The program did not load the motion, and a controller cannot return its trajectory.
 fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Result<(), Failure> {
     let payload = session.payload()?;
     if session.has_extensions() {

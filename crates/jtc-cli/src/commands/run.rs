@@ -49,8 +49,8 @@ pub(super) struct Course {
     pub repeat: u32,
 }
 
-/// Function that creates the trajectory of a job. It is called when the position of the arm and the speed of a move on this controller are
-/// known.
+/// Function that creates the trajectory of a job. The function is called when the position of the arm and the speed of a move on this
+/// controller are known.
 pub(super) type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
 
 impl Course {

@@ -60,7 +60,7 @@ impl Frames {
     }
 }
 
-/// Tracker of the bytes of the host. It determines if a frame is incomplete, and since when its next byte is missing.
+/// Tracker of the bytes of the host, which determines if a frame is incomplete and since when its next byte is missing.
 ///
 /// With `--speed max`, and while the simulator makes up for a delay, virtual time passes faster than the host's time. A gap between two
 /// parts of a frame must then not become longer than it was for the host.

@@ -203,8 +203,8 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
     }
 }
 
-/// Returns `true` if a program uses this pseudo-terminal as a serial port. It is then open and in raw mode, unlike the terminal of a shell.
-/// A terminal that a host has locked is also in use.
+/// Returns `true` if a program uses this pseudo-terminal as a serial port. The pseudo-terminal is then open and in raw mode, unlike the
+/// terminal of a shell. A terminal that a host has locked is also in use.
 fn serves(terminal: &Path) -> bool {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
     match rustix::fs::open(terminal, flags, Mode::empty()) {

@@ -32,7 +32,7 @@ pub(super) fn program_of(image: &[u8]) -> Program {
     Program { bytes: PROGRAM as u32, crc32: !register }
 }
 
-/// Processor and ST-LINK of a board. Both stop when this value is dropped.
+/// Processor and ST-LINK of a board. The processor and the ST-LINK stop when this value is dropped.
 pub(super) struct Board {
     /// Its serial port.
     pub port: String,
@@ -145,7 +145,7 @@ impl Running {
     fn take(&self, file: &Path) {
         let bytes = fs::read(file).unwrap();
         fs::remove_dir_all(&self.drive).unwrap();
-        // This is longer than the command waits for a status before it checks the drive again.
+        // The delay is longer than the time for which the command waits for a status before it checks the drive again.
         thread::sleep(Duration::from_millis(1_800));
         let mut flashed = self.flashed.lock().unwrap();
         (flashed.program, flashed.started, flashed.before_ms) = (Some(program_of(&bytes)), Instant::now(), 0);

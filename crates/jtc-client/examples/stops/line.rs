@@ -1,4 +1,5 @@
-//! Serial line of the measurement. It is a pseudo-terminal to the controller and a model of a UART that transmits the bytes of the agent.
+//! Serial line of the measurement, which consists of a pseudo-terminal to the controller and a model of a UART that transmits the bytes of
+//! the agent.
 use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};

@@ -142,7 +142,8 @@ fn j06_what_is_refused_is_told_with_its_value() {
 fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     let sixteenth = joint().velocity_max / 16.0;
     for (reached, found) in [(0.5, 1.0), (2.5, 3.0), (14.5, 15.0)] {
-        // The bound for slow speeds, 100 N·m, is reached after `reached` steps; a sixteenth of the velocity limit has sixteen steps.
+        // The bound for slow speeds, 100 N·m, is reached after `reached` steps. A sixteenth of the velocity limit is divided into sixteen
+        // steps.
         let c1 = 100.0 / (sixteenth * reached / 16.0);
         let refused = BOUNDS.check_polynomial(&[0.0, c1, 0.0, 0.0, 0.0, 0.0], &joint());
         assert_eq!(refused.map_err(|e| e.velocity), Err(Some(sixteenth * found / 16.0)), "{reached}");

@@ -6,8 +6,8 @@
 use super::{POSITION_STEP, VELOCITY_STEP};
 use crate::config::{Config, WORKING_AREA};
 
-/// Change of the quintic (rad) in the middle between two points 1 s apart, if the first velocity increases by 1 rad/s and the second
-/// velocity decreases by 1 rad/s. The exact value is 5/16.
+/// Change of the quintic (rad) in the middle between two points 1 s apart, for a velocity change of +1 rad/s at the first point and −1
+/// rad/s at the second point. The exact value is 5/16.
 const WAY_OF_VELOCITY: f64 = 0.3125;
 
 /// Range of positions that a path may have in one joint (J-36), rad.

@@ -1,4 +1,5 @@
-//! Quick part of the check. It computes bounds of the control points around a point, in single precision and in steps of the wire format.
+//! Quick part of the check, which computes bounds of the control points around a point, in single precision and in steps of the wire
+//! format.
 //!
 //! Each control point of an interval (J-32), except the one in the middle of the quintic's derivative, depends on the velocity and
 //! acceleration at one end only. Each of the six joints therefore needs only a few dozen operations, and nearly every interval of a real
@@ -9,7 +10,7 @@ use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 
-/// Margin for rounding in single precision, in position steps.
+/// Margins for rounding in single precision, in position steps and as a share of the speed limit.
 const SLACK: f64 = 0.1;
 const SLACK_SHARE: f64 = 2e-6;
 /// Maximum of the quartic above the cubic, relative to the distance that the velocities do not explain.

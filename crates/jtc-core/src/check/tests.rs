@@ -27,8 +27,8 @@ fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     point
 }
 
-/// Returns the effect of rounding on a position. It is one position step, plus the effect of one velocity step at both points in the middle
-/// of the quintic.
+/// Returns the effect of rounding on a position, which is one position step, plus the effect of one velocity step at both points in the
+/// middle of the quintic.
 fn tolerance(step_ms: u16) -> f64 {
     let moving = |v: f64| SetPoint { velocity: [v * 6.283185 / 32767.0; JOINTS], ..SetPoint::default() };
     let (a, b) = (moving(1.0), moving(-1.0));
@@ -60,9 +60,9 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
     (position, velocity, speed)
 }
 
-/// Returns the margins to the limits of joint 0 around two points, for any signs of the velocities and accelerations. The margins are: the
-/// margin of the hull of the positions (rad, below and above); the margin of the hull of the velocities (rad/s), with the bump for the
-/// unexplained distance less one step; and the margin of the acceleration of `b` (rad/s²).
+/// Returns the margins to the limits of joint 0 around two points, for any signs of the velocities and accelerations. The first two margins
+/// are those of the hull of the positions (rad, below and above). The third margin is that of the hull of the velocities (rad/s), with the
+/// bump for the unexplained distance less one step. The last margin is that of the acceleration of `b` (rad/s²).
 fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let (limit, h, more) = (&config.joints[0], f64::from(step_ms) / 1000.0, tolerance(step_ms));
     let [a, b] = [a, b].map(|point| {
@@ -182,8 +182,8 @@ fn j36_each_limit_is_found_and_named() {
     assert_eq!(check(at(0.0, 1.49, 0.0), at(0.015, 1.51, 0.0), 10), (1, Velocity, 1.5, 0.0));
     assert_eq!(check(at(0.0, -1.49, 0.0), at(-0.015, -1.51, 0.0), 10), (1, Velocity, -1.5, 0.0));
     assert_eq!(check(at(0.0, 0.0, 0.0), at(0.0, 0.0, -8.1), 10), (1, Acceleration, -8.0, 0.0));
-    // The next violations are between the points. They concern the upper position limit, the velocity limit in the velocity curve, and the
-    // velocity limit in the derivative of the position.
+    // The next violations are between the points. The violations concern the upper position limit, the velocity limit in the velocity
+    // curve, and the velocity limit in the derivative of the position.
     let (point, quantity, limit, fraction) = check(at(1.25, 1.0, 0.0), at(1.25, -1.0, 0.0), 400);
     assert_eq!((point, quantity, limit), (0, Position, 1.3));
     assert!((0.2..0.8).contains(&fraction), "{fraction}");
@@ -317,7 +317,7 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
 
 #[test]
 fn j36_where_the_halvings_are_used_up_the_hull_decides() {
-    // The curve is a parabola with the maximum 0.5. Its hull reaches 1.
+    // The curve is a parabola with the maximum 0.5, whose hull reaches 1.
     let curve = [0.0, 1.0, 0.0];
     let mut many = HALVINGS;
     assert_eq!(leaves(curve, -1.0, 0.501, &mut many), None);
@@ -496,7 +496,7 @@ fn j36_a_path_that_has_come_inside_stays_there() {
     assert_eq!((violation.joint, violation.quantity), (3, Quantity::Position));
 }
 
-/// Both points are outside the limits, but the second point is closer to the limit. The interval between the two points is also checked.
+/// The two points are outside the limits, but the second point is closer to the limit. The interval between the two points is also checked.
 #[test]
 fn j36_between_two_points_a_path_comes_no_further_out_either() {
     let after = |step, a: RawPoint, b: RawPoint| {
@@ -512,7 +512,7 @@ fn j36_between_two_points_a_path_comes_no_further_out_either() {
         assert_eq!((violation.joint, violation.quantity, violation.limit), (1, Quantity::Position, 1.3));
         assert!(violation.value > 1.3 && violation.fraction > 0.0, "{violation:?}");
     }
-    // Both points are outside and the middle is inside the limits, so the path moves out again.
+    // The two points are outside and the middle is inside the limits, so the path moves out again.
     let (a, b) = (point(1, 1.302, -0.05, 0.0), point(1, 1.301, 0.05, 0.0));
     assert!(after(400, a, b).is_err());
     let (a, b) = (point(1, 1.302, -0.005, 0.0), point(1, 1.301, 0.0, 0.0));

@@ -14,7 +14,7 @@ pub(crate) enum Phase {
     Approaching { from: [f64; JOINTS], length_ms: f64, clock: PathClock, leave: Option<TrajectoryState> },
     /// Start of the path at point 0, which the next tick commands.
     AtStart,
-    /// On the path. Motion along the path. `leave` is the state that follows at standstill.
+    /// Motion along the path. `leave` is the state that follows at standstill.
     Running { leave: Option<TrajectoryState> },
 }
 

@@ -32,7 +32,7 @@ impl Answers {
         self.lines.get(line).is_some_and(|line| line.len > 0)
     }
 
-    /// Stores an answer for a line. It replaces an answer that has not been sent yet.
+    /// Stores an answer for a line, and replaces an answer that has not been sent yet.
     pub(crate) fn put(&mut self, line: usize, answer: &Answer<'_>) {
         if let Some(line) = self.lines.get_mut(line) {
             line.len = answer.emit(&mut line.frame).unwrap_or(0);

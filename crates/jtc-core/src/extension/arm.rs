@@ -58,7 +58,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let before = core::mem::replace(&mut self.extensions.store, state);
         self.extensions.sequence = sequence;
         if before == StoreState::Busy && state == StoreState::Failed {
-            // The next start would use another arm, so the stored arm is removed until the next start.
+            // The next start would use another arm, so no stored arm is available until the next start.
             self.extensions.stored.clear();
             self.extensions.unusable = true;
         }

@@ -54,7 +54,7 @@ impl Bench {
         self.send_as(false, line, bytes)
     }
 
-    /// Sends a frame on a line. If `plain` is true, the line has no extensions.
+    /// Sends a frame on a line. If `plain` is true, the line is plain (J-51).
     fn send_as(&mut self, plain: bool, line: usize, bytes: &[u8]) -> DataStatus {
         let frame = FrameRef::new_checked(bytes).expect("a good frame");
         let host = [HostEvent { line, overtaken: false, plain, event: LinkEvent::Frame(frame) }];

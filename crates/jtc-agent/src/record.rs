@@ -1,8 +1,8 @@
-//! Records every motion of any client. The recorder is itself a client of the agent, with read-only access.
+//! Recorder of all motions of all clients. The recorder is itself a client of the agent, with read-only access.
 //!
-//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the line, [`Recorder`] follows the statuses. One thread follows the
-//! statuses and another thread writes the recordings, so a slow disk delays only the writer. Neither thread delays the serial line. If the
-//! queue between them is full, samples are dropped, and the recording contains the number of dropped samples.
+//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the serial line, and [`Recorder`] reads the statuses. One thread
+//! reads the statuses and another thread writes the recordings, so a slow disk delays only the writer. Neither thread delays the serial
+//! line. If the queue between the threads is full, samples are dropped, and the recording contains the number of dropped samples.
 mod disk;
 mod motion;
 mod retention;
@@ -42,12 +42,12 @@ const LOOK: Duration = Duration::from_millis(50);
 const QUIET: Duration = Duration::from_millis(300);
 /// Time after which the request is repeated if the controller did not answer.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
-/// Longest wait for the disk at the end.
+/// Longest wait for the disk when the recorder ends.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 /// Name of the recorder on the line.
 const NAME: &str = "recorder of the agent";
 
-/// Part of a frame to the controller that recordings need.
+/// Data from a frame to the controller that recordings need.
 enum Seen {
     /// A Trajectory frame.
     Segment(Vec<u8>),
@@ -169,8 +169,8 @@ struct Identity {
 }
 
 impl Identity {
-    /// Returns the identity that is used for a device that does not report its own. A controller with the hash of the built-in arm has the
-    /// built-in arm, so the recorder does not request the arm.
+    /// Returns the identity that is used for a device that does not report its identity. A controller with the hash of the built-in arm has
+    /// the built-in arm, so the recorder does not request the arm.
     fn built_in() -> Self {
         let arm = Arm::avena();
         Self { delay_ticks: arm.config().delay_ticks, hash: arm.hash().ok().flatten(), arm, device: None }
@@ -194,7 +194,7 @@ struct Reel {
 /// Statuses with their arrival times, and number of statuses that did not fit into the queue.
 type Arrived = Rc<RefCell<(VecDeque<(Duration, Status)>, u64)>>;
 
-/// State of the following thread.
+/// State of the thread that reads the statuses.
 struct Following {
     seen: Receiver<Seen>,
     missed: Arc<AtomicBool>,
@@ -235,8 +235,7 @@ impl Following {
                     self.follow(steps, &mut session);
                     return;
                 }
-                // The client was disconnected, for example because the computer was suspended. The recorder connects
-                // again.
+                // The client was disconnected, for example because the computer was suspended. The recorder reconnects to the line.
                 (session, arrived) = connect(line);
             }
             self.take_seen();
@@ -302,7 +301,7 @@ impl Following {
             doubt.asked = asked;
         }
         let identity = match session.info() {
-            // Controller without the extensions of the protocol.
+            // The controller does not support the extensions of the protocol.
             Ok(None) => Some(Identity::built_in()),
             Ok(Some(info)) if self.identity.hash == Some(info.hash) => {
                 self.identity.device = Some((&info).into());

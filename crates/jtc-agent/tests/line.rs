@@ -69,8 +69,8 @@ proptest! {
         prop_assert!(records.len() == 1 && records[0].accepted());
     }
 
-    /// The operating system may accept bytes late. At most 256 bytes wait in the operating system, and the pause before a Stop separates
-    /// the Stop from the interrupted frame.
+    /// The operating system may accept bytes with a delay. At most 256 bytes wait in the operating system, and the pause before a Stop
+    /// separates the Stop from the interrupted frame.
     #[test]
     fn j04_j05_a_stop_in_an_upload_on_a_busy_computer_is_a_frame_of_its_own(
         after_us in 0u64..400_000, points in 20usize..1666, held_up_us in prop::collection::vec(0u64..15_000, 0..20),
@@ -621,7 +621,7 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     // The client that waits for the lease disconnects.
     board.line.leave(bob, now);
     board.line.want_lease(carl, now).expect("nobody waits any more");
-    // A client without a connection to the line keeps its place in the queue by sending requests.
+    // A client without a connection to the line keeps its position in the queue for the lease by sending requests.
     let dora = operator(&mut board, "dora");
     let lasts = Some(Duration::from_secs(1));
     board.line.leave(carl, now);

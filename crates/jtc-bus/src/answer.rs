@@ -134,10 +134,10 @@ impl Answer {
         }
     }
 
-    /// Returns the frame of the answer. Nodes use this function. A joint report has 20 bytes if it has a motor temperature, otherwise 16.
-    /// Values saturate.
+    /// Returns the frame of the answer. Nodes use this function. A joint report has 20 bytes if it contains a motor temperature, and
+    /// otherwise 16 bytes. Values saturate.
     ///
-    /// A node number that does not exist is sent as 15, and the controller ignores it.
+    /// An invalid node number is sent as 15, and the controller ignores frames from node 15.
     pub fn emit(&self, scale: Scale) -> Frame {
         match self {
             Self::Joint { node, report } => emit_joint(*node, report, scale),

@@ -1,6 +1,7 @@
 //! Bit words of the bus. Each word is a table with bit, name, text and meaning.
 
-/// Declares words of bits. A row of a word has the meaning (as documentation), the name of the mask, the bit and its text.
+/// Declares words of bits. A row of a word contains the meaning (as documentation), the name of the mask, the bit number and the text of
+/// the bit.
 ///
 /// Each word becomes a module with a mask for each bit, and with the texts in `NAMES`.
 #[doc(hidden)]
@@ -13,7 +14,7 @@ macro_rules! bit_words {
         $(#[$doc])*
         pub mod $word {
             $($(#[$meaning])+ pub const $name: $type = 1 << $bit;)+
-            /// Texts of the bits, bit 0 first.
+            /// Texts of the bits, in the order of the bits from bit 0.
             pub const NAMES: [&str; [$($bit),+].len()] = {
                 let mut names = [""; [$($bit),+].len()];
                 $(names[$bit] = $text;)+
@@ -82,9 +83,9 @@ bit_words! {
         /// Trips on over-speed. If this bit is 0, the trip is off.
         OVER_SPEED_TRIP = 4, "over-speed trip";
         with
-        /// Default of a joint, 0x17.
+        /// Default configuration bits of a joint, 0x17.
         pub const JOINT_DEFAULT: u8 = WORKING_AREA | ABSOLUTE_ENCODER | SAFETY_LINE | OVER_SPEED_TRIP;
-        /// Default of the gripper, 0x04.
+        /// Default configuration bits of the gripper, 0x04.
         pub const GRIPPER_DEFAULT: u8 = SAFETY_LINE;
     }
 }

@@ -6,12 +6,12 @@ use crate::timing::{DATA_BIT_RATE, NOMINAL_BIT_RATE};
 const NOMINAL_NS: u32 = 1_000_000_000 / NOMINAL_BIT_RATE;
 const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
 
-/// Nominal bits after the data phase: acknowledgement, its delimiter, end of frame and intermission.
+/// Number of nominal bits after the data phase, for acknowledgement, acknowledgement delimiter, end of frame and intermission.
 const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
 /// Bits of the stuff count with its parity, sent before the checksum.
 const STUFF_COUNT_BITS: u32 = 4;
-/// The delimiter after the checksum. The bit rate falls within this bit, and it rises within an earlier bit (BRS). Both changes occur at
-/// the same fraction of the bit, so one of the two bits is counted as a nominal bit and the other bit as a data bit.
+/// Bit of the delimiter after the checksum. The bit rate falls within this bit, and it rises within an earlier bit (BRS). Both changes
+/// occur at the same fraction of the bit, so one of the two bits is counted as a nominal bit and the other bit as a data bit.
 const CRC_DELIMITER_BITS: u32 = 1;
 
 /// Returns the time from the start of the frame until the next frame may start, in ns, at the rates in [`timing`](crate::timing). The time
@@ -49,8 +49,8 @@ struct Stuffer {
 impl Stuffer {
     fn push(&mut self, value: u32, width: u32) {
         for at in (0..width).rev() {
-            // The stuff bit is sent before the next bit. After the last bit of the payload, the fixed stuff bit is sent instead of this
-            // stuff bit.
+            // After five equal bits, the stuff bit is sent before the next bit. After the last bit of the payload, the fixed stuff bit is
+            // sent instead of this stuff bit.
             if self.run == 5 {
                 self.bits += 1;
                 self.last = self.last.map(|bit| !bit);

@@ -127,8 +127,8 @@ impl Frame {
         id::node(self.id)
     }
 
-    /// Creates a frame from a length code as a CAN controller reports it. Returns `None` if the code means more than 24 bytes, or more
-    /// bytes than `data` has.
+    /// Creates a frame from a length code as a CAN controller reports it. Returns `None` if the code represents more than 24 bytes, or more
+    /// bytes than `data` contains.
     pub fn from_dlc(id: u16, dlc: u8, data: &[u8]) -> Option<Self> {
         Self::new(id, data.get(..len_of(dlc)?)?)
     }

@@ -1,7 +1,7 @@
 //! Identifiers of the bus, with the bits `R U cccc nnnn` (J-11).
 //!
-//! Bit 9 marks a response and bit 8 a unicast frame. Bits 7..4 are the command, and bits 3..0 the node. The identifier of an answer is the
-//! identifier of the request with bit 9 set and the number of the node.
+//! Bit 9 marks a response and bit 8 a unicast frame. Bits 7..4 are the command, and bits 3..0 are the node number. The identifier of an
+//! answer is the identifier of the request with bit 9 set and the number of the node.
 
 /// Bit 9, which is set in the response of a node.
 pub const RESPONSE: u16 = 0x200;

@@ -39,7 +39,7 @@ impl Target {
     /// Returns the target for a byte in the wire format.
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match NodeState::new(byte) {
-            // Start cannot be requested. In a request, the byte of Start means that no change is requested.
+            // The controller cannot request Start. In a request, the byte of Start means that no change is requested.
             NodeState::START => Some(Self::NoChange),
             NodeState::INIT => Some(Self::Init),
             NodeState::READY => Some(Self::Ready),
@@ -52,19 +52,20 @@ impl Target {
 /// Request of the controller. The controller uses `emit`, and nodes use `parse`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// 0x000: torque of each joint and the pump. Encoding limits each torque to its range (J-13) and converts NaN to 0.
+    /// Torque of each joint and state of the pump (identifier 0x000). Encoding limits each torque to its range (J-13) and converts NaN to
+    /// 0.
     Move {
         /// Torque at the joint, N·m.
         torque: [f64; JOINTS],
         /// `true` switches the vacuum pump on.
         pump: bool,
     },
-    /// 0x010: requested state of each node (J-16).
+    /// Requested state of each node (identifier 0x010, J-16).
     ChangeFsm {
         /// Requested state of each node.
         target: [Target; NODES],
     },
-    /// 0x0F0: mode (1: torque) and configuration bits of each joint, configuration bits of the gripper.
+    /// Mode and configuration bits of each joint, and configuration bits of the gripper (identifier 0x0F0).
     ChangeMode {
         /// Mode of each joint: 0 for none, 1 for torque, 2 for speed.
         mode: [u8; JOINTS],
@@ -73,9 +74,9 @@ pub enum Request {
         /// Configuration bits of the gripper.
         gripper: u8,
     },
-    /// 0x0A0: reset of every node.
+    /// Reset of every node (identifier 0x0A0).
     ResetAll,
-    /// 0x1A0 + node, 0..6: reset of one node. An invalid node number is sent as 15, which no node has.
+    /// Reset of one node (0..6), with the identifier 0x1A0 + node. An invalid node number is sent as 15, which no node has.
     Reset(u8),
 }
 

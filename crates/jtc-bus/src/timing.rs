@@ -60,7 +60,7 @@ pub const TDC_OFFSET: u8 = {
     assert!(offset <= 127);
     offset as u8
 };
-/// Window of the filter for the measured delay; 0 switches the filter off.
+/// Window of the filter for the measured delay. The value 0 switches the filter off.
 pub const TDC_FILTER: u8 = 0;
 
 #[cfg(test)]

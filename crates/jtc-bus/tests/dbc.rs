@@ -25,7 +25,7 @@ fn bits_of(signal: &Signal) -> impl Iterator<Item = usize> {
 fn decoded(frame: &Frame) -> BTreeMap<String, f64> {
     let id = MessageId::Standard(frame.id);
     let message = DBC.messages.iter().find(|message| message.id == id).expect("the file has this frame");
-    // The short form of a report ends before its last signals.
+    // The short form of a report does not contain the last signals.
     let held = |signal: &&Signal| (signal.start_bit / 8) < frame.data().len() as u64;
     message.signals.iter().filter(held).map(|signal| (signal.name.clone(), value(signal, frame))).collect()
 }

@@ -1,4 +1,4 @@
-//! The commands. Each command, or each family of commands, has its own file.
+//! The commands. Implementation of the commands. Each command or family of commands has a separate file.
 
 mod arm;
 mod bench;

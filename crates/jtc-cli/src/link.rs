@@ -32,7 +32,7 @@ impl LinkArgs {
     }
 
     /// Opens the link for a Stop or a Pause. An agent on this computer accepts a Stop or a Pause without a token, and even with an unknown
-    /// token. The inner error is the error of a serial port that no agent of this user owns.
+    /// token. The inner error is the error of opening a serial port that no agent of this user owns.
     pub(crate) fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
             // The agent does not answer, so a second attempt would fail too.

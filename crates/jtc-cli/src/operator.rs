@@ -39,7 +39,7 @@ pub(crate) struct Operator<'a> {
     /// Events for programs.
     pub progress: Progress,
     stop: Stop,
-    /// Keyboard input, which is read only while the arm moves. At other times the terminal is unchanged.
+    /// Keyboard input, which is read only while the arm moves. At other times, the terminal mode is unchanged.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,
@@ -156,7 +156,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Requests the next speed step up or down.
+    /// Requests the next higher or lower speed.
     fn another_speed(&mut self, wish: Wish) -> Flow {
         let Some(speed) = &mut self.speed else {
             self.out.note(NO_SPEED.replace('`', ""));

@@ -51,7 +51,7 @@ impl Progress {
         self.0.out.event(name, value);
     }
 
-    /// Reports all further statuses of this session as events. Callers with their own observer pass the statuses to [`Progress::see`]
+    /// Reports all further statuses of this session as events. Callers with a separate observer pass the statuses to [`Progress::see`]
     /// instead.
     pub(crate) fn watch<P: Port>(&self, session: &mut Session<P>) {
         *self.0.link.borrow_mut() = json!({ "port": session.port().name(), "baud": session.port().baud() });

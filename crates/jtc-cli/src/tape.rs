@@ -49,7 +49,7 @@ impl Tape {
         self.live.sink()
     }
 
-    /// Completes the recording with the end of the run.
+    /// Completes the recording with the result of the run.
     pub(crate) fn finish(self, ending: &Ending) -> Result<(), Failure> {
         let Self { name, live, on_disk } = self;
         live.finish(ending).map_err(recording_broken_off)?;

@@ -55,7 +55,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     assert_eq!((&info["hash"], info["missing"].as_array().unwrap().len()), (&pushed["hash"], 3));
     assert_eq!(sim.json(&["arm", "diff", &arm], 0)["equal"], true);
 
-    // The controller's defaults are now this arm, and a run is checked with it. A run with a different arm file is refused.
+    // The new arm is now the default of the controller, and a run is checked with the new arm. A run with a different arm file is refused.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let sim = sim.held();
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
@@ -119,7 +119,7 @@ fn j57_the_speed_of_a_motion_changes_while_it_runs() {
     let run = sim.jtc(&["--json", "traj", "run", &file]).ends(0);
     assert!(run.err.contains("speed override of the controller is 50 %"), "{}", run.err);
     let executed = run.json()["recorded_s"].as_f64().unwrap();
-    // The lower speed does not apply to the approach, which takes as long as before.
+    // The lower speed does not apply to the approach, whose duration is unchanged.
     assert!(executed > 1.6 * whole && executed < 2.1 * whole, "{whole} s became {executed} s");
     for wrong in ["4", "101", "nan"] {
         sim.jtc(&["traj", "speed", wrong]).ends(2);
@@ -172,7 +172,7 @@ fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() 
     assert!(error.to_string().contains("jtc recover"), "{error}");
 }
 
-/// The simulated board keeps its arm in a file, like a real board in flash. The file still exists after the end of the simulator.
+/// The simulated board stores its arm in a file, as a real board stores it in flash. The file still exists after the end of the simulator.
 #[test]
 fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     let dir = tempfile::tempdir().unwrap();

@@ -178,7 +178,7 @@ fn a_controller_that_holds_its_arm_or_is_another_one_is_not_reset() {
     assert_eq!(refused["error"]["code"], "has-torque");
     assert!(refused["error"]["hint"].as_str().unwrap().contains("jtc disable"));
     nothing_written(&drive);
-    // A simulator has no flash.
+    // A simulated controller has no flash memory.
     let verified = sim.json(&["firmware", "verify", "--image", &new], 5);
     assert_eq!(verified["error"]["code"], "not-reported");
 }

@@ -14,7 +14,7 @@ use test_kit::patience::Patience;
 use crate::common::agent::{command_in, serve};
 use crate::common::{Sim, jtc};
 
-/// Time after the enable until every joint has settled.
+/// Time from enabling the drives until every joint has settled.
 const SETTLES: Duration = Duration::from_secs(8);
 
 /// External torque at which a push is reported, N·m. The value is 30 % of the 40 N·m of joint 5.

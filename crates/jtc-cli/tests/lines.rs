@@ -224,7 +224,7 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
             legs.iter().enumerate().map(|(i, leg)| format!("0.6,{},0.4,0,0,0,1,{leg}\n", 0.1 * i as f64));
         format!("x,y,z,qx,qy,qz,qw,leg\n{}", rows.collect::<String>())
     };
-    // Errors in the format of the file.
+    // The next files have errors in their format.
     for (kinds, message) in [
         (&["", "via", "line"][..], "refused.csv, line 3: `via` (a point on an arc) is not followed by `arc`"),
         (&["", "line", "via"], "refused.csv, line 4: `via`"),

@@ -99,7 +99,7 @@ fn j56_a_log_without_a_fault_holds_the_motion_that_was() {
     assert!(count(&fetched, "replayed") > 2_000, "{fetched}");
     let words = fetched["events"].to_string();
     assert!(words.contains("trajectory Finish"), "{words}");
-    // The log has not stopped, and continues to record.
+    // The flight recorder has not stopped, and continues to record.
     assert_eq!(fetched["state"], "recording");
 }
 

@@ -349,7 +349,7 @@ fn j33_a_move_is_stopped_on_its_path() {
     assert!(here[1..].iter().all(|q| q.abs() < 3e-3), "{here:?}");
 }
 
-/// J-55: with an arm file that differs from the controller's arm, no joint moves. Without an arm file, the limits of the controller apply.
+/// J-55: if an arm file differs from the arm of the controller, no joint moves. Without an arm file, the limits of the controller apply.
 #[test]
 fn j55_a_move_for_another_arm_is_refused() {
     let sim = ready();

@@ -98,7 +98,7 @@ impl Session {
     }
 }
 
-/// Exit code, stdout and remaining stderr of a command, and the simulator.
+/// Result of a command, with exit code, stdout, remaining stderr, and the simulator.
 struct Ended {
     code: i32,
     value: serde_json::Value,

@@ -93,7 +93,7 @@ fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
         let refused = set(words, 2);
         assert!(refused.contains(what), "{words:?}: {refused}");
     }
-    // The payload is invalid, so the command does not even search for a port.
+    // The payload is invalid, so the command does not search for a port.
     let none = jtc(&["payload", "set", "--mass", "-2", "--com", "0,0,0", "--port", "/nowhere/tty"]).ends(2);
     assert!(none.err.contains("nothing was sent"), "{}", none.err);
 }

@@ -55,8 +55,8 @@ fn a_blend_is_in_the_unit_of_the_positions() {
     }
 }
 
-/// `plan` keeps and prints the torque margin. `plan` and `traj check` print a warning if the margin is below 10 %. A margin out of range is
-/// refused, and the error contains the range.
+/// `plan` keeps and prints the torque margin. `plan` and `traj check` print a warning if the margin is below 10 %. If the margin is out of
+/// range, it is refused, and the error contains the range.
 #[test]
 fn a_plan_leaves_the_margin_that_is_asked_for() {
     let dir = Dir::new();

@@ -247,7 +247,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     assert!(!status.is_executing());
     let halted =
         |error: Error| matches!(error, Error::Link(LinkError::Port(PortError::Halted { by: Some(_) })));
-    // The next requests of the same program are refused, because they were made before the Stop or too soon after it.
+    // The next requests of the same program are refused, because they were sent before the Stop or too soon after the Stop.
     assert!(session.execute(&checked).is_err_and(halted));
     assert!(session.upload(&checked, |_| Flow::Continue).is_err_and(halted));
     session.ask_to_move().unwrap();
@@ -438,7 +438,7 @@ impl Two {
     }
 }
 
-/// The controller continues the motion of a killed program. The socket of the killed program still exists and identifies the arm.
+/// The controller continues the motion of a killed program. The socket of the killed program still exists, so the command can find the arm.
 #[test]
 fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     let mut two = Two::moving();

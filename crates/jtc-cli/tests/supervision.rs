@@ -61,7 +61,7 @@ fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let agent = Agent::start(&["--port", sim.port.to_str().unwrap()]);
     let mut patience = Patience::begin();
     loop {
-        // Each command sends a frame, if the agent forwards it.
+        // Each command sends a frame to the controller if the agent forwards the request.
         agent.jtc(&["info"]);
         let status = agent.jtc(&["--json", "status"]).ends(0).json();
         if status["trajectory"] == "Pause" {

@@ -49,7 +49,7 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
         with((variable, value), &["plan", &file, "-o", &out]).ends(2);
         assert!(!dir.has("out.csv"), "{variable}");
     }
-    // The variable is not refused if it is off or empty, or if the option is typed. A Stop is never refused.
+    // The command is not refused if the variable is off or empty, or if the option is typed. A Stop is never refused.
     let plan = ["plan", &file, "-o", &out, "--overwrite", "--speed", "50"];
     for (variable, value) in [("JTC_DEG", "off"), ("JTC_LINE", ""), ("JTC_SPEED_PERCENT", "5")] {
         with((variable, value), &plan).ends(0);

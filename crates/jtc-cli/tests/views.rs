@@ -79,7 +79,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
-/// On a terminal below 40 columns the keys work, and the required size is printed.
+/// If a terminal has fewer than 40 columns, the keys work and the required size is printed.
 #[test]
 fn a_small_terminal_says_so_and_its_keys_work() {
     let sim = Sim::start(&["--no-throttle"]);

@@ -165,7 +165,7 @@ impl AgentPort {
         Ok(port)
     }
 
-    /// Returns the agent's description of itself.
+    /// Returns the first message of the agent, which describes the agent.
     pub fn hello(&self) -> &Hello {
         &self.hello
     }

@@ -142,7 +142,7 @@ fn one_that_hangs_commands_no_more_and_has_to_come_again() {
     let (mut anna, mut bob) = (served.operator("anna"), served.operator("bob"));
     anna.gripper(false).expect("nobody else commands");
     assert!(matches!(bob.gripper(false), Err(LinkError::Denied { .. })));
-    // anna does not read her messages.
+    // The client anna does not read its messages.
     let mut patience = Patience::begin();
     while served.line.with(|line, _| line.lease().is_some()) {
         patience.pause("the end of her lease");
@@ -171,7 +171,7 @@ fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
 }
 
 /// A queued request from before a Stop is refused even if the client sends it later. The client counts the Stops and Pauses of other
-/// clients, and each request contains the count at the time of its creation.
+/// clients, and compares the count with that at the time of the request.
 #[test]
 fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requested_after_them() {
     let served = Served::start(921_600);

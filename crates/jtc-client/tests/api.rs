@@ -255,7 +255,7 @@ fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     let anna = Program::new(&served, "anna", 30.0, "continue");
     let asked = Instant::now();
-    // Repeated jog requests, as from a key that is held down, extend the hold-off.
+    // Repeated jog requests, as from a key that stays pressed, extend the hold-off.
     while asked.elapsed() < Duration::from_secs(5) {
         assert_eq!(anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": zeros }))).0, 409);
         std::thread::sleep(Duration::from_millis(50));

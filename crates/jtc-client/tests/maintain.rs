@@ -157,7 +157,7 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     assert_eq!(anna.ask("POST /api/arm/defaults", None).0, 204);
     until(&served, |controller| controller["state"] == "HoldPos");
     assert_eq!(mass(), before);
-    // A request from before a Stop cannot enable the torque.
+    // A request that was sent before a Stop cannot enable the torque.
     assert_eq!(served.get("POST /api/stop").0, 200);
     assert_eq!(anna.ask("POST /api/arm/defaults?asked_after=0", None).0, 409);
 }

@@ -231,7 +231,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// Bits in a list of words.
+    /// List of bits, which is stored as words.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub(crate) struct Bits {
         words: Vec<u32>,

@@ -46,7 +46,7 @@ pub struct ParameterBounds {
 pub struct OutOfBounds {
     /// Name of the parameter, with its unit.
     pub what: &'static str,
-    /// Velocity at which a friction torque is out of bounds, rad/s; `None` for other parameters.
+    /// Velocity at which a friction torque is out of bounds, rad/s. The value is `None` for other parameters.
     pub velocity: Option<f64>,
     /// The value.
     pub value: f64,

@@ -75,7 +75,7 @@ impl Catch {
         self.left_ms > 0
     }
 
-    /// Updates the peaks of the swing for one tick.
+    /// Updates the peak speeds of the swing in one tick.
     fn swing(&mut self, velocity: f64) {
         if velocity * self.peak < 0.0 {
             let peak = self.peak.abs();

@@ -34,8 +34,8 @@ const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
 /// Highest number of halvings of curves in one interval, for all joints together. A curve is halved until the distance of its hull is about
-/// a thousandth of the height of the curve. Six joints at their limits in the same interval share the halvings. When all halvings are used,
-/// the check uses the hull.
+/// a thousandth of the height of the curve. If six joints are at their limits in one interval, they share the halvings. When all halvings
+/// are used, the check uses the hull.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.
@@ -88,7 +88,7 @@ impl BitCodec for Quantity {
 pub struct Violation {
     /// Index of the point, counted from 0.
     pub point: u32,
-    /// Fraction of the interval to the next point, 0..1.
+    /// Position in the interval to the next point, as a fraction from 0 to 1.
     pub fraction: f64,
     /// Index of the joint, counted from the base.
     pub joint: usize,
@@ -108,7 +108,7 @@ struct JointBounds {
     position: PathRange,
     speed: f64,
     acceleration: f64,
-    /// Velocities that the friction table contains; unbounded if no table is used.
+    /// Velocity range of the friction table; unbounded if no table is used.
     friction: (f64, f64),
 }
 
@@ -281,7 +281,7 @@ impl TrajectoryCheck {
             let found = leaves(position, low, high, &mut halvings);
             let limit = |found: Leaves| Leaves { bound: range.limit_at(found.value), ..found };
             outside(Quantity::Position, found.map(limit))?;
-            // The velocities are in rad per interval up to this line, and in rad/s from here.
+            // The velocities before this line are in rad per interval. The velocities after this line are in rad/s.
             let velocity = [v0, v0 + a0 / 3.0, v1 - a1 / 3.0, v1].map(|v| v / h);
             let found = leaves(velocity, -bounds.speed, bounds.speed, &mut halvings);
             outside(Quantity::Velocity, found)?;

@@ -109,10 +109,10 @@ pub struct Config {
     /// Time without a valid frame from any host after which a motion is paused and teaching ends, ms (J-59). With 0, host supervision is
     /// off.
     pub host_timeout_ms: u16,
-    /// Speed override, in seconds of path time per second, 0.05 to 1 (J-57). The speed override is not part of an arm.
+    /// Speed override (0.05 to 1), in seconds of path time per second (J-57). The speed override is not part of an arm.
     pub speed: f64,
-    /// Absent joints, for work on a bench (J-53). The controller does not expect nodes for absent joints, and does not execute a motion.
-    /// The setting is not part of an arm, and no joint is absent at the start of the device.
+    /// Joints that are declared absent, for tests on a bench (J-53). The controller does not expect nodes for absent joints, and does not
+    /// execute a motion. The setting is not part of an arm, and no joint is absent at the start of the device.
     pub absent: [bool; JOINTS],
     /// Position of each absent joint in the model, rad.
     pub absent_position: [f64; JOINTS],

@@ -99,7 +99,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Raises an internal error that no other bit explains, because the device failed and was therefore reset (J-12). The error latches
-    /// like any other error (J-21). The board calls this before the first tick.
+    /// like any other error (J-21). The board calls this function before the first tick.
     pub fn raise_internal(&mut self) {
         self.errors.raise_device();
     }

@@ -21,7 +21,7 @@ pub(crate) fn moves(velocity: f64) -> bool {
     velocity.abs() > STANDING
 }
 
-/// Deceleration of a joint from its start, along a smooth ramp of the velocity.
+/// Deceleration of a joint along a smooth ramp of the velocity.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deceleration {
     from: f64,

@@ -1,4 +1,5 @@
-//! Parts of the documentation that tests generate from the code. With `UPDATE_DOCS=1` the tests write these parts.
+//! Parts of the documentation that tests generate from the code. If `UPDATE_DOCS=1` is set, the tests write these parts of the
+//! documentation.
 extern crate std;
 use std::format;
 use std::path::Path;

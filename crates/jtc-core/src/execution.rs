@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
-    /// Changes the speed on the path (J-57). Path time follows along the ramp of J-33.
+    /// Changes the speed on the path (J-57). The rate of path time changes along the ramp of J-33.
     pub(crate) fn set_speed(&mut self, speed: f64) {
         self.config.speed = speed;
         if self.clock.set_pace(speed) {

@@ -87,7 +87,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Jogs at joint velocities (J-58). A jog is possible only in HoldPos and without a paused path.
+    /// Moves the arm with the joint velocities of a Jog (J-58). A jog is possible only in HoldPos and without a paused path.
     fn jog(&mut self, velocities: &Floats<'_>) -> Result<(), DataStatus> {
         let set = &self.motion.set;
         let free = self.state == ControllerState::HoldPos

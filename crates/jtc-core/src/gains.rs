@@ -182,7 +182,7 @@ impl Trial {
         before
     }
 
-    /// Discards the gains before the trial unless `may` allows them to be restored.
+    /// Discards the gains before the trial, unless `may` allows the controller to restore these gains.
     pub(crate) fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
         self.before = self.before.filter(may);
     }

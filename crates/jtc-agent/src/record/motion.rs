@@ -75,7 +75,7 @@ pub(super) struct Follower {
 }
 
 impl Follower {
-    /// Notes that a Jog was sent.
+    /// Handles a Jog that was sent.
     pub(super) fn jog(&mut self, now: Duration) {
         self.jogged = Some(now);
     }
@@ -213,7 +213,7 @@ mod tests {
         follower: Follower,
         now: Duration,
         status: Status,
-        /// Begin and End, with the number of statuses between them.
+        /// Begin and end of each recording, with the number of statuses between them.
         seen: Vec<String>,
         statuses: usize,
     }
@@ -286,7 +286,7 @@ mod tests {
         arm.is(HoldPos, Stop, 0.0);
         arm.run_ms(60_000);
         assert_eq!(arm.take(), ["begin execution", "stopped"]);
-        // The statuses of half a second before the motion, 4.4 s in motion, and half a second at rest.
+        // The recording contains the statuses of 0.5 s before the motion, 4.4 s in motion, and 0.5 s at rest.
         assert!((130..=140).contains(&arm.statuses), "{}", arm.statuses);
     }
 

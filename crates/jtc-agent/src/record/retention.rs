@@ -131,7 +131,7 @@ impl Retention {
         Ok(())
     }
 
-    /// Appends a line to the list, completely or not at all.
+    /// Appends a line to the list. After a failed write, removes the incomplete line.
     fn note(&mut self, line: &str) -> io::Result<()> {
         let end = self.list.seek(SeekFrom::End(0))?;
         let written = self.list.write_all(format!("{line}\n").as_bytes());
@@ -179,7 +179,7 @@ impl Retention {
         renamed.and(noted).map(|()| whole)
     }
 
-    /// Ends a recording without completing it. The file is deleted only if it contains no samples.
+    /// Closes a recording file without completing it. The file is deleted only if it contains no samples.
     pub(super) fn break_off(&mut self, begun: Begun, samples: u64) {
         if samples == 0 && std::fs::remove_file(&begun.path).is_ok() {
             let _ = self.note(&format!("gone {}", begun.name));
@@ -200,7 +200,7 @@ impl Retention {
             && let Some(oldest) = self.own.pop_front()
         {
             let path = oldest.path(&self.dir);
-            // If another program has replaced the recording by another file, that file is kept.
+            // If another program has replaced the recording by another file, this file is not removed.
             if length(&path) == Some(oldest.bytes) && std::fs::remove_file(&path).is_ok() {
                 removed.push(path);
             }

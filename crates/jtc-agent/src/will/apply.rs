@@ -43,7 +43,7 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
 
 /// Reads `host_timeout_ms` from the controller, so that the line knows the value. A motion that a killed program has started may still be
 /// in progress. The line uses this timeout to refuse requests of other clients, because the controller would treat such requests as signs
-/// of life of the killed program (J-59). Has no effect if the controller has no such setting or does not answer.
+/// of life of the killed program (J-59). Has no effect if the controller does not have this setting or does not answer.
 pub fn read_host_timeout(line: &Line) {
     let introduction = Introduction { name: "agent".into(), role: Role::Viewer, policy: Policy::Continue };
     // The result is not used, because the line itself reads the value from the answer.

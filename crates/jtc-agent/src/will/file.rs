@@ -102,8 +102,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Writes the file in one step. After this write, the file is valid even if the agent is killed. After the disk has stored the file, the
-/// file also survives a loss of power.
+/// Writes the complete file in one step. After this write, the file is valid even if the agent is killed. After the disk has stored the
+/// file, the file also survives a loss of power.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };
@@ -119,10 +119,10 @@ pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> 
     file.sync_all()
 }
 
-/// Empties a file that can be neither replaced nor removed, so that its contents are invalid. A file can be shortened
-/// even on a full disk.
+/// Empties a file that can be neither replaced nor removed, so that its contents are invalid. Truncating a file is possible even on a full
+/// disk.
 pub(super) fn spoil(path: &Path) {
-    // If even this fails, nothing more can be done.
+    // If truncating the file fails too, the error is ignored.
     let _ = OpenOptions::new().write(true).truncate(true).open(path);
 }
 

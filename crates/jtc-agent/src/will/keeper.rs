@@ -12,7 +12,7 @@ use crate::record::{Notice, Notify};
 
 /// Time after which a failed write is repeated.
 const AGAIN: Duration = Duration::from_secs(5);
-/// Longest wait for the disk at the end.
+/// Longest wait for the disk when the keeper ends.
 const LAST: Duration = Duration::from_secs(1);
 
 /// Intended contents of the file, with the start of the motion.
@@ -141,7 +141,7 @@ struct Writer {
 
 impl Writer {
     fn run(&mut self) {
-        // A folder that cannot be written is found before the first motion.
+        // The folder is checked before the first motion, so that a write error is found early.
         let tried = file::try_out(&self.path);
         self.report(tried);
         while let Some(wanted) = self.next() {

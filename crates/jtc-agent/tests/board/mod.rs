@@ -35,7 +35,7 @@ pub(crate) struct Board {
     /// Bytes of each write to the operating system, with the time.
     pub written: Vec<(Duration, Vec<u8>)>,
     pub status: Status,
-    /// Number of bytes, beginning with the next one, that arrive damaged.
+    /// Number of bytes that will arrive damaged, beginning with the next byte.
     pub damaged: usize,
     /// Time before which no status is sent.
     pub deaf_until: Duration,

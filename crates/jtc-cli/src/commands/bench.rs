@@ -1,4 +1,4 @@
-//! `jtc bench`: absent joints (J-53).
+//! `jtc bench`: declares absent joints (J-53).
 
 use cli_kit::{Failure, Output};
 use jtc_core::JOINTS;

@@ -12,7 +12,7 @@ use super::status;
 /// Largest number of consecutive invalid bytes that are shown one by one.
 const SHOWN: usize = 32;
 
-/// Decodes stdin to its end. Ends with exit code 2 if the input contains no frame.
+/// Decodes the standard input until it ends. Ends with exit code 2 if the input contains no frame.
 pub(super) fn decode(out: &Output) -> Result<(), Failure> {
     let mut input = Vec::new();
     std::io::stdin().lock().read_to_end(&mut input)?;

@@ -105,7 +105,7 @@ pub(super) fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns a port to `world` that takes a sample at each tick while it is recording.
+/// Returns a port to `world`. While a recording is active, the port stores a sample at each tick.
 fn observed(
     world: World,
     speed: SimSpeed,

@@ -14,7 +14,7 @@ use crate::args::LinkArgs;
 
 /// Listening time at the requested rate, in which 50 statuses arrive.
 const LISTEN: Duration = Duration::from_secs(2);
-/// Listening time at each other rate.
+/// Listening time at each of the other bit rates.
 const TRY: Duration = Duration::from_millis(300);
 
 /// Checks the link, the bus and the set-up. The exit code is 0 if no problem was found, 3 if there is no link, and 1 for other problems.

@@ -8,7 +8,7 @@ use super::job::typed;
 use crate::args::ExampleArgs;
 use cli_kit::OutputFile;
 
-/// Writes an example, or lists them.
+/// Writes an example file, or lists the examples.
 pub(super) fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
     let name = args.name.as_deref().unwrap_or("list");
     if name.eq_ignore_ascii_case("list") {

@@ -1,4 +1,4 @@
-//! `jtc firmware`: images, drives of boards, flashing, and the running firmware.
+//! `jtc firmware`: commands for images, USB drives of boards, flashing, and the running firmware.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -191,7 +191,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let permissions = Permissions { assume_board: args.assume_board, accept_supply: args.accept_supply };
     may_flash(&image, &drive, &before, permissions)?;
     let line = lines.proving().map(|(port, same_device)| (port.to_owned(), same_device));
-    // Only the board's own ports are considered, because another board may already run the image.
+    // Only the ports of this board are considered, because another board may already run the image.
     if let Some(program) =
         before.own_info().find_map(|info| compare(&image, info).ok()).filter(|_| !args.again)
     {

@@ -1,5 +1,5 @@
-//! `jtc stop` and `jtc traj pause`. The command goes directly to the controller, through an agent, or through the program of this user that
-//! has opened the port.
+//! Commands `jtc stop` and `jtc traj pause`. The command goes directly to the controller, through an agent, or through the program of this
+//! user that has opened the port.
 
 use std::cell::Cell;
 use std::panic::resume_unwind;
@@ -28,7 +28,7 @@ const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 const OWNERS: usize = 16;
 /// Time after which a Stop or the end of teaching is sent again if the statuses do not show its effect.
 const AGAIN: Duration = Duration::from_millis(200);
-/// Longest time until a stopped arm is at rest.
+/// Longest wait until a stopped arm is at rest.
 const REST: Duration = Duration::from_secs(5);
 
 /// Error code if the arm does not come to rest after a confirmed Stop.
@@ -172,7 +172,7 @@ fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
     alive.iter().cloned().map(arm).chain(left).collect()
 }
 
-/// An arm to stop.
+/// Arm that the command stops.
 enum Arm {
     /// Arm at a port, or arm of an agent that has opened this port.
     Of { link: LinkArgs, port: Option<String> },
@@ -200,7 +200,7 @@ impl Arm {
     }
 }
 
-/// An arm at rest.
+/// Result for an arm that is at rest.
 struct Stopped {
     /// `true` if the controller accepted the Stop.
     accepted: bool,

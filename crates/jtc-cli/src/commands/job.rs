@@ -16,7 +16,7 @@ use serde_json::json;
 use super::named_arm;
 use crate::args::CheckArgs;
 
-/// Number of speeds that are tried between a speed that passes the check and one that fails.
+/// Number of speeds that are checked between a speed that passes and a speed that fails the check.
 const TRIES: usize = 4;
 
 /// Formats a path as the user can type it in a shell.
@@ -30,7 +30,7 @@ pub(super) fn typed(path: &Path) -> String {
     }
 }
 
-/// Returns the name of a file without directory and ending.
+/// Returns the name of a file without directory and extension.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }

@@ -22,7 +22,7 @@ const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 /// Index of the highest velocity at which jogging with keys may begin.
 const FIRST_MAX: usize = 2;
 
-/// Jogs until a key, the time or a signal ends the jog. Waits until the arm is at rest.
+/// Moves the joint until a key, the time limit or a signal ends the jog. Waits until the arm is at rest.
 pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let rate = args.rate.map(|rate| if args.deg { rate.to_radians() } else { rate });
     if let Some(rate) = rate

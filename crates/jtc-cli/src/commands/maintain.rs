@@ -17,7 +17,7 @@ use crate::limits;
 use crate::operator::ended_at_once;
 use crate::progress::Progress;
 
-/// Time within which a clear takes effect.
+/// Time within which a request to clear errors takes effect.
 const EFFECT: Duration = Duration::from_millis(300);
 
 /// Clears errors, and reports the remaining errors.
@@ -52,7 +52,7 @@ pub(super) fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Brings the controller back to HoldPos.
+/// Recovers the controller to HoldPos.
 pub(super) fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let arm = args.arm.as_deref().map(Arm::load).transpose()?;

@@ -1,4 +1,4 @@
-//! `jtc payload`: payload at the flange (J-60).
+//! `jtc payload`: shows and sets the payload at the flange (J-60).
 
 use cli_kit::{Failure, Output};
 use jtc_core::Payload;

@@ -16,7 +16,7 @@ use super::job::{stem, typed};
 use super::{named_arm, run_report};
 use crate::args::PlanArgs;
 
-/// Message for a blend without corners to round.
+/// Message if a blend is specified but the path has no corners to round.
 const NO_LINES: &str = "--blend-m has no effect: it rounds corners between lines and arcs, and this motion \
     has no lines or arcs; use --line, or a column `leg`";
 
@@ -166,7 +166,8 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
     });
 }
 
-/// Returns for how long each limit of a joint is the limiting constraint. Returns a dash if the joint is never the limiting constraint.
+/// Returns the time for which each limit of a joint is the limiting constraint. Returns a dash if the joint is never the limiting
+/// constraint.
 fn binds(binding: &[Bound], joint: Joint) -> String {
     let mut limits: Vec<(&str, f64)> = Vec::new();
     for bound in binding.iter().filter(|bound| bound.joint == joint) {

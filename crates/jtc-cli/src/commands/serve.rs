@@ -163,8 +163,8 @@ fn moves(status: &Status) -> bool {
     status.is_executing() || status.state == ControllerState::Teaching
 }
 
-/// Stops a motion, because no client can stop it after the end of the agent. Also ends teaching, so that the arm is held. Returns `true` if
-/// the controller reports that the arm is at rest and held.
+/// Stops a motion, because no client can stop it after the end of the agent. Also ends Teaching, so that the controller holds the arm.
+/// Returns `true` if the controller reports that the arm is at rest and held.
 fn come_to_rest(line: &Line, out: &Output) -> bool {
     let began = line.now();
     line.with(|line, now| line.end(now));

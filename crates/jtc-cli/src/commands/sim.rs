@@ -108,7 +108,7 @@ fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
 fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
     let text =
         std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-    // Files of hand motions are in the same directory as the fault file that refers to them.
+    // Files of hand motions are in the directory of the fault file that refers to them.
     let load = |file: &str| crate::serve::hand(&path.with_file_name(file));
     jtc_sim::FaultPlan::from_toml_with(&text, load)
         .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))

@@ -65,7 +65,8 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Records until the user or the time ends the recording. If a tolerance (rad) is specified, the result is a file of waypoints.
+/// Records the motion until the user or the time limit ends the recording. If a tolerance (rad) is specified, the result is a file of
+/// waypoints.
 fn record(
     file: OutputFile,
     link: &LinkArgs,
@@ -101,8 +102,8 @@ fn record(
             Ok(s) if s.state == ControllerState::Teaching => {
                 match taught.take((session.now() - start).as_secs_f64(), s.positions()) {
                     Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
-                    // If the file is lost, the user does not need to guide the arm any longer. The controller then holds the arm, as after
-                    // Ctrl-C.
+                    // If the file cannot be written, the user does not need to guide the arm any longer. The controller then holds the arm,
+                    // as after Ctrl-C.
                     Err(e) => {
                         lost = Some(e);
                         break;

@@ -62,7 +62,7 @@ impl Frames {
 
 /// Tracker of the bytes of the host, which determines if a frame is incomplete and since when its next byte is missing.
 ///
-/// With `--speed max`, and while the simulator makes up for a delay, virtual time passes faster than the host's time. A gap between two
+/// With `--speed max`, and while the simulator catches up after a delay, virtual time passes faster than the host's time. A gap between two
 /// parts of a frame must then not become longer than it was for the host.
 ///
 /// A busy operating system can suspend a host within one write for longer than the silence that ends a frame. On a real serial line, the
@@ -126,8 +126,8 @@ impl Incoming {
         self.missing > 0 || !self.head.is_empty()
     }
 
-    /// Returns how long the host has been silent within a frame, also at the moment when the silence ends. Returns
-    /// `None` outside a frame, or after a silence that is too long for the frame to be completed.
+    /// Returns how long the host has been silent within a frame, including the moment at which the silence ends. Returns `None` outside a
+    /// frame, or after a silence that is too long for the frame to be completed.
     pub(super) fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);

@@ -138,8 +138,8 @@ impl Pty {
         }
     }
 
-    /// Discards the bytes that a disconnected host did not read. If a killed host has left the port locked, a new
-    /// pseudo-terminal replaces the old one under the same link.
+    /// Discards the bytes that a disconnected host did not read. If a killed host has left the port locked, a new pseudo-terminal replaces
+    /// the old pseudo-terminal under the same link.
     pub(crate) fn renew(&mut self) -> Result<(), PtyError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
         match rustix::fs::open(&self.slave, flags, Mode::empty()) {

@@ -13,7 +13,7 @@ const LOOK: Duration = Duration::from_millis(200);
 /// Longest line.
 const LINE_MAX: usize = 4096;
 
-/// Lines of the standard input.
+/// Reader of the lines of the standard input.
 pub(crate) struct Typed {
     lines: Receiver<String>,
 }

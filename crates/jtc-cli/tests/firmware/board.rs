@@ -1,4 +1,4 @@
-//! Board for `jtc firmware flash`: a controller on a pseudo-terminal, and the drive of its ST-LINK in a folder.
+//! Simulated board for `jtc firmware flash`, with a controller on a pseudo-terminal, and a folder as the USB drive of its ST-LINK.
 
 use std::fs;
 use std::os::fd::OwnedFd;
@@ -17,7 +17,7 @@ use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// Bytes of the program in an image of [`super::image`].
+/// Number of program bytes in an image of [`super::image`].
 const PROGRAM: usize = 0x1000;
 
 /// Returns the program data that a board with this image in flash reports. The checksum is computed bit by bit, as in its definition.

@@ -123,7 +123,7 @@ impl Cell {
     /// Returns the log lines of agents about the policy of a killed agent.
     pub(super) fn found(&self) -> Vec<Value> {
         let text = std::fs::read_to_string(self.dir.path().join("commands.jsonl")).expect("a log");
-        // The last line may not be complete on the disk yet, so invalid lines are skipped.
+        // The last line of the log may be incomplete, so invalid lines are skipped.
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         lines.filter(|line| line["what"].as_str().is_some_and(|what| what.starts_with("policy-"))).collect()
     }

@@ -7,8 +7,8 @@ use super::cell::{Cell, trajectory};
 
 /// Time after the check at which the upload of the long motion is in progress. The upload takes five seconds.
 pub(super) const IN_UPLOAD: Duration = Duration::from_millis(700);
-/// Slightly more than the hold-off after a Pause of a client or a policy. During the hold-off no other client can begin
-/// a motion.
+/// Waiting time that is slightly longer than the hold-off after a Pause of a client or a policy. During the hold-off no other client can
+/// begin a motion.
 const CALM: Duration = Duration::from_millis(3100);
 /// Observation time during which the arm must stay at rest.
 pub(super) const REST: Duration = Duration::from_millis(500);
@@ -197,7 +197,7 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");
     assert!(is_held(&cell.rests(CALM)), "{ended}");
-    // The motion continues as with a connected client.
+    // The motion continues in the same way as with a connected client.
     let mut job = Silent::come(&cell, "continue").begins("POST /api/runs", json!({ "trajectory": 8 }));
     job.reports("executing");
     pause(&cell);

@@ -17,7 +17,7 @@ use crate::common::simulated;
 pub(crate) const BAUD: u32 = 115_200;
 const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 
-/// A Stop on the line.
+/// Stop that was sent on the line.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
     pub first_byte: Instant,
@@ -31,7 +31,7 @@ pub(crate) struct Stop {
 pub(crate) struct Seen {
     /// Time at which the line has transmitted all bytes.
     free_at: Instant,
-    /// Number of bytes that are missing in the current frame.
+    /// Number of bytes of the current frame that were not sent yet.
     left: usize,
     /// Largest number of bytes that waited for transmission at the same time.
     pub queued_most: usize,

@@ -11,7 +11,7 @@ use crate::line::{self, Watch};
 use crate::operator::Operator;
 
 /// Time between two Stops, which is long enough for the response record of the first Stop. A random time up to `AT_ANY_TIME_US` is added,
-/// so that Stops occur at any phase of the statuses.
+/// so that Stops occur at random times between two statuses.
 const BETWEEN: Duration = Duration::from_millis(220);
 const AT_ANY_TIME_US: u64 = 120_000;
 /// Longest wait for an event. If the event has not occurred by then, the measurement has failed.

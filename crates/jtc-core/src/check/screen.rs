@@ -1,9 +1,9 @@
 //! Quick part of the check, which computes bounds of the control points around a point, in single precision and in steps of the wire
 //! format.
 //!
-//! Each control point of an interval (J-32), except the one in the middle of the quintic's derivative, depends on the velocity and
-//! acceleration at one end only. Each of the six joints therefore needs only a few dozen operations, and nearly every interval of a real
-//! path passes this part. If an interval does not pass the quick part, the exact check decides.
+//! Each control point of an interval (J-32), except the control point in the middle of the derivative of the quintic, depends on the
+//! velocity and acceleration at one end only. Each of the six joints therefore needs only a few dozen operations, and nearly every interval
+//! of a real path passes this part. If an interval does not pass the quick part, the exact check decides.
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
@@ -13,7 +13,7 @@ use crate::bit_codec::bit_codec;
 /// Margins for rounding in single precision, in position steps and as a share of the speed limit.
 const SLACK: f64 = 0.1;
 const SLACK_SHARE: f64 = 2e-6;
-/// Maximum of the quartic above the cubic, relative to the distance that the velocities do not explain.
+/// Largest difference between the quartic and the cubic, relative to the distance that the velocities do not explain.
 const BUMP: f32 = 1.875;
 
 /// Point of a trajectory as floats, in steps of the wire format.
@@ -68,7 +68,7 @@ impl Screen {
         }
     }
 
-    /// Returns `true` if point `b`, and the interval from point `a` to it, are certainly within every bound.
+    /// Returns `true` if point `b` and the interval from `a` to `b` are certainly within every bound.
     pub(super) fn passes(&self, a: &Steps, b: &Steps) -> bool {
         let (kv, ka) = (self.per_velocity, self.per_acceleration);
         let mut good = true;

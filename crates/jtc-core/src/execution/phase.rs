@@ -1,4 +1,4 @@
-//! The phases of an execution.
+//! Phases of the execution of a trajectory.
 use crate::bit_codec::{BitCodec, BitSink, BitSource};
 use crate::motion::ControlMode;
 use crate::path::PathClock;

@@ -21,8 +21,9 @@ impl Extensions {
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Loads the stored arm (J-54). The controller then uses the settings and the name of this arm, and the UseDefault frames select this
-    /// arm. The host must still request the parameters. The board calls this before the first tick. Returns `false` if this controller does
-    /// not accept the image. In this case, the settings do not change, and the UseDefault frames are refused until an arm is stored.
+    /// arm. The host must still request the parameters. The board calls this function before the first tick. Returns `false` if this
+    /// controller does not accept the image. In this case, the settings do not change, and the UseDefault frames are refused until an arm
+    /// is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());

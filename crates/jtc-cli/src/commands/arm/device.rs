@@ -1,4 +1,4 @@
-//! `jtc arm push`, `pull`, `diff`: the arm of a controller.
+//! `jtc arm push`, `pull`, `diff`: write, read and compare the arm of a controller.
 
 use std::path::Path;
 
@@ -76,7 +76,7 @@ pub(super) fn push(
     Ok(())
 }
 
-/// Describes a parameter that was sent.
+/// Describes a parameter that was sent to the controller.
 fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }

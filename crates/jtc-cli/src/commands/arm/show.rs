@@ -1,4 +1,4 @@
-//! `jtc arm show`: all parameters of an arm.
+//! `jtc arm show`: prints all parameters of an arm.
 
 use cli_kit::{Failure, Output, table};
 use jtc_host::arm::{Arm, ArmValue, Source};

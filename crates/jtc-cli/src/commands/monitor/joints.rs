@@ -127,7 +127,7 @@ fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     joints.chain(gripper).map(drawn).map(|(cells, style)| Row::new(cells).style(style)).collect()
 }
 
-/// Returns the rows from `first` on, at the width of the view.
+/// Returns the table for the width of the view, starting at row `first`.
 pub(super) fn table(s: &Status, silent: bool, width: u16, framed: bool, first: usize) -> Table<'static> {
     let shown = |c: &&Column| width >= c.2;
     let mut widths: Vec<Constraint> = COLUMNS.iter().filter(shown).map(|c| Constraint::Length(c.1)).collect();

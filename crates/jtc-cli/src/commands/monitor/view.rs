@@ -1,6 +1,6 @@
-//! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first. The first rows of the table
-//! are the joints without measured values. Text that does not fit can be scrolled, and the keys are always visible. The position curves
-//! fill the remaining space.
+//! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. The view shows errors and the next command first. The first rows of
+//! the table are the joints without measured values. Text that does not fit can be scrolled, and the keys are always visible. The position
+//! curves fill the remaining space.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -39,7 +39,7 @@ pub(super) struct View {
     pub rate: f64,
     /// Number of received bytes that do not belong to a valid frame.
     pub bad_bytes: u64,
-    /// Result of the last key, shown until the next key is pressed.
+    /// Result of the last pressed key, which is shown until the next key is pressed.
     pub reply: String,
     /// Scroll positions of the causes and the joints.
     pub scroll: Scroll,

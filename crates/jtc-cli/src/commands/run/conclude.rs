@@ -29,7 +29,7 @@ pub(super) struct Done {
 #[derive(Default)]
 pub(super) struct Finished {
     kept: VecDeque<Done>,
-    /// Number of runs, without approaches.
+    /// Number of finished runs, not including approaches.
     runs: usize,
     /// Number of runs and approaches whose results were dropped.
     left_out: usize,

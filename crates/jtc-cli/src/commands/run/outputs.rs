@@ -1,4 +1,4 @@
-//! Files of a run: recording and report page.
+//! Output files of a run (recording and report page).
 
 use std::path::Path;
 

@@ -62,7 +62,7 @@ pub(super) struct Terminal<'a, 'o> {
     move_speed: MoveSpeed,
     outputs: Outputs,
     operator: &'a mut Operator<'o>,
-    /// Recording, which begins with the first motion.
+    /// Recording of the run, which begins with the first motion.
     reel: Option<Reel>,
     done: Finished,
     /// Progress bar of the upload or of the motion.
@@ -110,7 +110,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
         Taken { done, samples, reel, outputs }
     }
 
-    /// Begins the recording with the first motion. Returns the sink for the samples of the motion.
+    /// Begins the recording at the first motion. Returns the sink for the samples of the motion.
     fn record(&mut self, phase: Phase, source: String, now: Duration) -> Result<Option<SampleSink>, Failure> {
         let reel = match &mut self.reel {
             Some(reel) => reel,
@@ -264,7 +264,7 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
     }
 }
 
-/// Returns the failure if the user ended the command before it moved the arm. `during` is the current step.
+/// Returns the failure if the user ended the command before it moved the arm. `during` is the name of the current step.
 pub(super) fn cancelled(during: &str) -> Failure {
     let message = format!("cancelled during the {during}; the motion was not started");
     Failure { message, ..Failure::of(&Error::Cancelled) }

@@ -18,7 +18,7 @@ const GRID_S: f64 = 0.04;
 const LEAST: usize = 3;
 const HEADER: &str = "t,q1,q2,q3,q4,q5,q6\n";
 
-/// Pose in the file.
+/// Row of the file with one pose.
 struct Row {
     position: [f64; 6],
     /// Length of the file including this row, bytes.

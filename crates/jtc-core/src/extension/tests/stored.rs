@@ -1,4 +1,4 @@
-//! The stored arm, which survives a loss of power (J-54).
+//! Tests of the stored arm, which is kept without power (J-54).
 use super::*;
 use crate::extension::arm::IMAGE_PER_TICK;
 

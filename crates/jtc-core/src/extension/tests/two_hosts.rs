@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Returns all frames of an arm with the parameters of this host. Friction as a table takes many ticks.
+/// Returns all frames of an arm with the parameters of this host. The controller needs many ticks to process a friction table.
 fn arm(host: u8) -> Vec<Vec<u8>> {
     let number = f64::from(host) + 1.0;
     let mut gains = vec![0; 126];

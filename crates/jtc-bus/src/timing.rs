@@ -1,4 +1,4 @@
-//! Bit timing of the bus (J-10), with the register names of a Bosch M_CAN (the FDCAN of the STM32).
+//! Bit timing of the bus (J-10), in the terminology of a Bosch M_CAN (the FDCAN of the STM32).
 //!
 //! A bit has 17 time quanta in both phases, with the sample point after the 13th quantum. The kernel clock is 85 MHz.
 

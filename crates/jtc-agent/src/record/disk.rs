@@ -59,7 +59,7 @@ impl Disk {
         (Self { queue, waiting: Arc::default(), lost: 0 }, messages)
     }
 
-    /// Starts the thread that writes into `shelf`.
+    /// Starts the thread that writes the recordings into the directory of `retention`.
     pub(super) fn begin(retention: Retention, notify: Notify) -> io::Result<(Self, JoinHandle<()>)> {
         let (disk, messages) = Self::new();
         let taken = disk.waiting.clone();

@@ -2,7 +2,7 @@
 //! reads it.
 //!
 //! [`bit_codec!`] lists the fields of a type. A field that is missing in the list is a compile error, so every snapshot is complete.
-//! Reading never fails. Bits that are not from a snapshot result in an arbitrary value, and [`BitSource::is_damaged`] then returns `true`.
+//! Reading never fails. Bits that are not from a snapshot result in an arbitrary value, and [`BitSource::is_damaged`] reports this damage.
 use jtc_bus::{JointReport, NodeState};
 use jtc_wire::{ControllerState, StopKind, TrajectoryState};
 

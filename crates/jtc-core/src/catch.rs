@@ -1,8 +1,8 @@
 //! Control of a load that is missing in the model, when the joints are enabled (J-43).
 //!
 //! A load that is missing in the model begins to fall when its joint is enabled. The joint then oscillates around the position at which it
-//! will be held. At the end of the first oscillation, the control law needs up to 1.7 times the missing torque of the model. If this torque
-//! is above the limit, the limit is commanded, which stops every load that the limit can hold. During this time the set position *sags*
+//! will be held. At the end of the first oscillation, the control law needs up to 1.7 times the torque that is missing in the model. If this
+//! torque is above the limit, the limit is commanded, which stops every load that the limit can hold. During this time the set position *sags*
 //! towards the joint, in proportion to the torque above the limit. The joint therefore comes to rest at the position at which the limit
 //! torque has stopped it. If the set position did not sag, the joint would be thrown upwards and fall again. With little friction, this
 //! oscillation would never end.

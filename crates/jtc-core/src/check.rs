@@ -33,9 +33,9 @@ pub const REST_SPEED: f64 = 0.02;
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
-/// Highest number of halvings of curves in one interval, for all joints together. A curve is halved until the distance of its hull is about
-/// a thousandth of the height of the curve. If six joints are at their limits in one interval, they share the halvings. When all halvings
-/// are used, the check uses the hull.
+/// Highest number of halvings of curves in one interval, for all joints together. A curve is halved until the distance of its hull from
+/// the curve is at most about a thousandth of the height of the curve. If six joints are at their limits in one interval, they share the
+/// halvings. When all halvings are used, the check uses the hull.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.

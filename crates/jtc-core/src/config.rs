@@ -111,8 +111,9 @@ pub struct Config {
     pub host_timeout_ms: u16,
     /// Speed override (0.05 to 1), in seconds of path time per second (J-57). The speed override is not part of an arm.
     pub speed: f64,
-    /// Joints that are declared absent, for tests on a bench (J-53). The controller does not expect nodes for absent joints, and does not
-    /// execute a motion. The setting is not part of an arm, and no joint is absent at the start of the device.
+    /// Joints that are declared absent, for tests on a bench (J-53). The controller does not expect nodes for absent joints. While a
+    /// joint is absent, the controller does not execute a trajectory. The setting is not part of an arm, and no joint is absent at the start
+    /// of the device.
     pub absent: [bool; JOINTS],
     /// Position of each absent joint in the model, rad.
     pub absent_position: [f64; JOINTS],

@@ -21,7 +21,7 @@ use crate::telemetry::Observed;
 use crate::tick_overruns::TickOverruns;
 use crate::{ControllerState, TrajectoryState};
 
-/// Joint trajectory controller. `M` is the memory for the trajectory, which contains [`crate::POINTS_MAX`] points.
+/// Joint trajectory controller. `M` is the memory for the trajectory, with space for [`crate::POINTS_MAX`] points.
 ///
 /// The parts that have a state are separate modules: `nodes` (the bus), `received` (parameters), `store` (trajectory), `motion` (control
 /// law), `errors`. `Controller` connects these parts. [`Controller::tick`] executes the steps of the figure in the manual from top to

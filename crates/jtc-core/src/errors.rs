@@ -9,7 +9,7 @@ pub(crate) struct Errors {
     emergency_input: bool,
     /// `true` if the controller device failed.
     device: bool,
-    /// `true` if a node reported an error or violated the protocol.
+    /// `true` if a joint reported an error or misbehaved.
     external_joints: bool,
     /// Internal error word of each joint.
     joints: [u16; JOINTS],

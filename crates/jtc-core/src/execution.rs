@@ -111,7 +111,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         true
     }
 
-    /// Executes one tick of a motion whose path time is slowed down.
+    /// Executes one tick of a motion whose time (of the path or of the approach) is slowed down or returns to its normal rate.
     pub(crate) fn step_hold_back(&mut self) {
         if !self.motion.hold_back.is_watched() || !self.phase.goes_on() {
             return;

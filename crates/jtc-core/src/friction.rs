@@ -5,8 +5,8 @@ use crate::parameters::TableOf;
 /// Returns the torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
 ///
 /// The torque is (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), with s as the smoothed sign of v. The temperature factor is clipped to
-/// 0.2..2. The straight line that was fitted to the measured drives changes its sign near 60 °C, and the compensation would then act as
-/// drag.
+/// 0.2..2, because the straight line that was fitted to the measured drives changes its sign near 60 °C. Without the clip, the compensation
+/// would then act as drag.
 pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }

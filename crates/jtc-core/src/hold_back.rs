@@ -36,7 +36,7 @@ pub(crate) struct HoldBack {
     quiet_ms: u16,
     /// Number of ticks of this run of the path in which the path was held back.
     run_ms: u16,
-    /// Mask of the joints that have been at their torque limits since the path was first held back.
+    /// Mask of the joints that have been at their torque limits since the controller last began to hold back the path.
     pressed: u8,
 }
 
@@ -86,7 +86,7 @@ impl HoldBack {
         self.run_ms
     }
 
-    /// Returns `true` if the joint has been at its torque limit since the path was first held back.
+    /// Returns `true` if the joint has been at its torque limit since the controller last began to hold back the path.
     pub(crate) fn has_pressed(&self, joint: usize) -> bool {
         self.pressed & (1 << joint) != 0
     }

@@ -203,7 +203,7 @@ impl HostParameters {
         self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
     }
 
-    /// Runs one tick of the payload blend. The arm is in HoldPos or in Teaching.
+    /// Runs one tick of the payload blend. The arm is held or in Teaching.
     pub(crate) fn blend_payload(&mut self) {
         self.payload.step(&mut self.dynamics);
     }
@@ -218,7 +218,7 @@ impl HostParameters {
         self.payload.next_mass()
     }
 
-    /// Returns the time until the model contains the whole payload, ms. Returns 0 after the blend.
+    /// Returns the time until the model contains the whole payload, ms. Returns 0 if the model already contains it.
     pub(crate) fn blend_left_ms(&self) -> u16 {
         self.payload.left_ms()
     }

@@ -43,8 +43,8 @@ pub struct Inputs<'a> {
     /// Stop and Pause commands that have arrived on each line since the last tick. These commands take effect in this tick, before all
     /// waiting events (J-04). The frames of these commands also appear as events in the order of arrival.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. In the next tick, the caller offers the
-    /// uncompleted events again.
+    /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. In the next tick, the caller must offer
+    /// the uncompleted events again.
     pub host: &'a [HostEvent<'a>],
     /// The serial transmitters can accept a status now.
     pub status_free: bool,

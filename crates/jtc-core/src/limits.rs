@@ -111,7 +111,7 @@ const TURNS_MS: u32 = 200;
 /// Changes of a joint's torque from one limit to the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turns {
-    /// Last three ticks in which the torque changed from one limit to the other, oldest first.
+    /// Last three ticks in which the torque reached one limit after the other, oldest first.
     at: [u32; 3],
     /// Number of entries in `at`, at most three.
     count: u8,

@@ -94,7 +94,7 @@ impl Screen {
         good
     }
 
-    /// Returns the lowest and highest velocity (rad/s) of the control points around `point` for each joint.
+    /// Returns the lowest and highest velocity of the control points around `point` for each joint, in velocity steps of the wire format.
     pub(super) fn velocities(&self, point: &Steps) -> [(f32, f32); JOINTS] {
         core::array::from_fn(|j| {
             let rise = point.acceleration[j].abs() * self.rise;

@@ -479,7 +479,7 @@ fn j36_a_path_begins_outside_by_the_start_tolerance_at_most() {
 #[test]
 fn j36_a_path_that_has_come_inside_stays_there() {
     let config = config();
-    // The path moves inwards by 10 mrad, and then back to its start position.
+    // The path moves from 10 mrad outside the limit to 10 mrad inside, and then back to its start position.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.extend(quintic(4, 1.29, 1.31, 10, 150).into_iter().skip(1));
     let violation = verdict(&config, 10, &points).unwrap_err();

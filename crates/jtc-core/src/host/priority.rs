@@ -27,8 +27,8 @@ impl Priority {
     }
 
     /// Returns the data status of an execution command that an urgent command has overtaken. A Stop or a Pause that was accepted is
-    /// reported as accepted. A Stop or a Pause is also reported as accepted if an Execute was cancelled and the `trajectory` is in the
-    /// commanded state.
+    /// reported as accepted. A Stop or a Pause is also reported as accepted if it has cancelled an Execute and the `trajectory` is in
+    /// the commanded state.
     pub(crate) fn overtaken(
         &mut self,
         exec: ExecCommand,

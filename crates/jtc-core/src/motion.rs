@@ -65,8 +65,8 @@ impl Motion {
         *hold_back = HoldBack::default();
     }
 
-    /// Makes joints yield from the next tick on (J-68), and other joints lower their loads (J-70). The inertia of each joint comes from the
-    /// last ramp.
+    /// Makes joints yield from the next tick on (J-68), and other joints lower their loads (J-70). The inertia is taken from the
+    /// ramp.
     pub(crate) fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {

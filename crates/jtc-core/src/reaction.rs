@@ -211,7 +211,7 @@ mod tests {
             let taught = reaction(&found, ControlMode::Teach, false, false);
             assert_eq!(taught, expected.filter(|(reaction, ..)| *reaction == Release), "{found:?}");
             assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
-            // With the reaction in the manual, an overload of the torque releases the arm, and is not considered a push before the release.
+            // With the reaction in the manual, an overload alone releases the arm. Before the overload, the torque does not count as a push.
             let released = reaction(&found, mode, true, false);
             if found.overloaded {
                 assert_eq!(released, Some((Release, Overload, torque)), "{found:?}");

@@ -151,7 +151,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.stopped
     }
 
-    /// Returns `true` if the upload began on a plain line, because the host of a plain line cannot handle a refused segment (J-51).
+    /// Returns `true` if the upload began on a plain line. The host of a plain line cannot handle a refused segment (J-51).
     pub(crate) fn plain(&self) -> bool {
         self.plain
     }

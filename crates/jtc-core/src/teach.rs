@@ -168,8 +168,8 @@ impl Taught {
         self.carried[j].rest.into()
     }
 
-    /// Computes the slowly changing values, one per tick. Returns `true` if the tick has no time left to compute the torques of the joints.
-    /// The very first tick adds only the load, because the torque would step without the load.
+    /// Computes the slowly changing values, at most one in a tick. Returns `true` if the tick has no time left to compute the torques of the
+    /// joints. The very first tick adds only the load, because the torque would step without the load.
     #[inline(never)]
     pub(crate) fn look(
         &mut self,

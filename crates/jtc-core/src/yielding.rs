@@ -65,7 +65,7 @@ const COMES_BACK_S: f64 = 0.3;
 const HOLDABLE: f64 = 0.95;
 /// Number of missing answers after which the spring does not act.
 const MISSING: u8 = 2;
-/// Number of yields of a joint after which the last yield continues until the host clears it. Yields are counted together if each yield of
+/// Number of yields of a joint. The last of these yields continues until the host clears it. Yields are counted together if each yield of
 /// the arm begins within [`AGAIN_MS`] after the previous yield.
 const TIMES: u8 = 3;
 /// See [`TIMES`].

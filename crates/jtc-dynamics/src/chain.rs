@@ -124,7 +124,7 @@ pub(crate) struct BaseInertialParameters {
     pub hx: f64,
     pub hy: f64,
     /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike a moment of inertia, a second moment contributes
-    /// to the torque only with the acceleration along its own axis.
+    /// to the torque only with the acceleration of its own axis.
     pub xx: f64,
     pub yy: f64,
     pub xy: f64,

@@ -122,7 +122,7 @@ pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     } else {
         FRAC_PI_2.copysign(sin)
     };
-    // Each step changes the error e, which is below π/4 at first, to e − sin e.
+    // Each step reduces the error e, which is below π/4 at first, to e − sin e.
     for _ in 0..6 {
         let (s, c) = sin_cos(angle);
         angle += sin * c - cos * s;

@@ -126,7 +126,7 @@ fn j06_angles_without_a_meaning_are_refused() {
     );
 }
 
-/// The error message contains the largest allowed angle.
+/// The error contains the largest allowed angle.
 #[test]
 fn j06_an_angle_at_the_limit_is_accepted() {
     let mut model = arms::avena();

@@ -111,7 +111,7 @@ proptest! {
         prop_assert!((half(&both) - half(&arm) - kinetic).abs() < 1e-6 * kinetic.max(1.0), "{kinetic} J");
     }
 
-    /// An interpolation between an arm with two payloads equals the arm with the interpolated payload.
+    /// The interpolation between an arm with one payload and the same arm with another payload equals the arm with the interpolated payload.
     #[test]
     fn j60_the_way_between_two_payloads_is_straight(
         model in arms::model(), a in payload(), b in payload(), share in 0.0..=1.0f64,

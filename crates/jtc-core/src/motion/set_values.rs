@@ -260,8 +260,8 @@ impl SetValues {
         }
     }
 
-    /// Moves the set position of a joint whose load is being caught towards the measured position. The step depends on the torque above the
-    /// limit (`excess`, N·m) and on the position error (`error`, rad). Returns the step, rad.
+    /// Moves the set position of a joint whose load is being caught towards the measured position. The step corresponds to the torque above
+    /// the limit (`excess`, N·m), but is at most the position error (`error`, rad). Returns the step, rad.
     pub(crate) fn sag(&mut self, j: usize, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         let step = self.catch[j].sag(excess, kp, error, limits);
         self.point.position[j] += step;

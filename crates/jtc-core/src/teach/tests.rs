@@ -182,8 +182,7 @@ fn j25_a_mass_that_is_missed_comes_back() {
     assert!(driven.taught.mass > 0.0 && driven.taught.found <= 0.51, "{} kg", driven.taught.found);
 }
 
-/// In each round, the inertia and the friction of every joint are computed once. The load is checked once per joint, and the ramp gets one
-/// tick.
+/// In each round, the inertia and the friction of every joint are computed once. The load is checked six times, and the ramp gets one tick.
 #[test]
 fn j25_each_round_computes_all_that_changes_slowly() {
     let of =

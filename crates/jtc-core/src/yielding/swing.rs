@@ -8,7 +8,7 @@ const HALF_SPEED: f32 = 0.15;
 /// Lowest speed of the second half of a swing, as a share of the speed of the first half. The two halves have opposite directions. A shove
 /// and the return of the spring also make two halves, but the second half is slow.
 const LASTS: f32 = 0.5;
-/// Factor by which each swing makes the joint softer, and lowest value of the factor.
+/// Factor by which each swing makes the joint softer, and lowest value to which several swings reduce `soft`.
 const SOFTER: f32 = 0.5;
 const SOFTEST: f32 = 0.2;
 /// Time without a swing after which the joint becomes stiffer by one step, and time between further steps, ms.

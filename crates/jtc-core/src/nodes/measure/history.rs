@@ -79,7 +79,7 @@ impl History {
     pub(super) fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
         self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
-        // In most cases an answer comes in each millisecond, so that only the oldest of five answers is old enough.
+        // Nearly always an answer comes in each millisecond, so that only the oldest of five answers is old enough.
         let rate = if self.in_turn >= WINDOW as u8 {
             let rad_s = self.nth(WINDOW - 1).way_to(now) * PER_WINDOW;
             Some(Rate { rad_s, as_predicted: self.younger_as_predicted(WINDOW - 1) })

@@ -119,7 +119,7 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes_without, &bus, GOOD);
     assert_eq!((nodes_without.node(2).missed, nodes_without.node(1).missed), (1, 0));
-    // The next answer is used without a correction.
+    // After the five unusable answers, an answer is used without a correction.
     let mut bus = all(NodeState::READY);
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes, &bus, GOOD);

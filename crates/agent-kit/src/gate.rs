@@ -252,7 +252,7 @@ fn protocol_token(headers: &HeaderMap) -> Option<&str> {
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // A header that is not text counts as a token that is never valid.
+    // A header that is not text counts as present, but it is never valid.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 

@@ -30,7 +30,7 @@ pub struct FaultConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultSchedule {
-    /// Seed. Seed of the faults; equal seeds and frames produce equal faults.
+    /// Seed of the faults; equal seeds and frames produce equal faults.
     pub seed: u64,
     /// Faults of frames that the member sends.
     pub send: FaultConfig,

@@ -122,7 +122,7 @@ impl VirtualHub {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
-    /// Adds a member. Adds a member, which receives all frames that are sent from now on.
+    /// Adds a member, which receives all frames that are sent from now on.
     pub fn join(&self) -> VirtualBus {
         self.add(Member::ORDINARY)
     }

@@ -15,11 +15,11 @@ pub struct Facts {
     pub limit: Option<f64>,
     /// Usual cause.
     pub cause: Option<&'static str>,
-    /// Cause of a held Stop, if the controller reports the cause.
+    /// Cause of a held stop, if the controller reports the cause.
     pub held_stop: Option<Box<HeldStopFacts>>,
 }
 
-/// Cause of a held Stop.
+/// Cause of a held stop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldStopFacts {
     /// Name of the cause, with hyphens.

@@ -63,7 +63,7 @@ actions! {
     BenchShow: "jtc bench show", "GET /api/absent", "jtc bench show";
     /// Set all joints present.
     BenchPresent: "jtc bench present", "PUT /api/absent with absent: []", "jtc bench present";
-    /// Acknowledge a held Stop and clear errors whose cause no longer exists.
+    /// Acknowledge a held stop and clear errors whose cause no longer exists.
     Clear: "jtc clear", "Acknowledge (POST /api/clear)", "robot.recover()";
     /// Switch off the torque of all joints.
     Disable: "jtc disable", "Take the torque off (POST /api/disable)", "robot.disable()";
@@ -132,7 +132,7 @@ actions! {
 enum Part {
     /// Words that all front ends show. Commands are enclosed in backticks.
     Words(Cow<'static, str>),
-    /// Action. Action, for which each front end shows its own name. The command line shows the command instead, if one
+    /// Action, for which each front end shows its own name. The command line shows the command instead, if one
     /// is set.
     Action(Action, Option<String>),
 }

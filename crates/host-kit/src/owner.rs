@@ -14,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Command. Command. A Stop refuses a waiting command, and cancels a command that has begun.
+    /// Command. A Stop refuses a waiting command, and cancels a command that has begun.
     Command,
     /// Update of a device's program. A Stop refuses a waiting update. A Stop does not cancel an update that has begun,
     /// because a device with a half-written program would not work.

@@ -104,7 +104,7 @@ pub struct Jobs {
     arm: Arm,
     /// Session that sends queries for all clients.
     asker: Arc<HttpSession>,
-    /// Held Stops and their causes.
+    /// Held stops and their causes.
     pub stops: Stops,
     kept: Mutex<Kept>,
 }

@@ -6,7 +6,7 @@
 //! decides which client may send which frame:
 //!
 //! - every client may send queries, and a Stop or a Pause, which is sent before all other frames;
-//! - only the holder of the [`Lease`] may send all other frames.
+//! - all other frames may be sent by the holder of the [`Lease`] only.
 //!
 //! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last Stop or
 //! Pause does not move the arm, even if its frames arrive later.
@@ -397,8 +397,8 @@ impl SharedLine {
     }
 
     /// Stops or pauses every motion on behalf of the owner. Sends the command even if the arm seems to be at rest,
-    /// because the last status is older than the last command. If the arm is at rest, the controller may refuse the
-    /// command; other clients are not affected. Returns true if the arm may have been moving.
+    /// because the last status is older than the last command. If the arm seems to be at rest, the controller
+    /// may refuse the command, and other clients are not affected. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.motion_tracker.may_move(self.status.as_ref(), now);
         if moved {

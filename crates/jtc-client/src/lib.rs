@@ -43,7 +43,7 @@ pub struct Options {
 pub struct Hello {
     /// Name of the port that the agent owns.
     pub port: String,
-    /// Bit rate of the serial line, Bd, if the port is a serial line.
+    /// Bit rate of the serial line, Bd; `None` if the connection has no bit rate.
     pub baud: Option<u32>,
     /// `true` if the arm is simulated.
     pub simulated: bool,

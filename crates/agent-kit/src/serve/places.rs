@@ -31,7 +31,7 @@ pub(super) struct Places {
     asks_within: Duration,
 }
 
-/// Connections that are reserved for Stop and Pause, oldest first.
+/// Connections within the limit that is reserved for Stop and Pause, oldest first.
 #[derive(Default)]
 struct Kept {
     open: VecDeque<Open>,

@@ -64,7 +64,7 @@ pub struct SlcanBus {
     /// `true` if the adapter supports the command `F`; `None` before the host has sent this command.
     has_flags: Option<bool>,
     got_flags: bool,
-    /// `true` if an unknown line was received, for example the version.
+    /// `true` if a line was received that is of no other known kind, for example the version.
     got_text: bool,
     closed: bool,
 }

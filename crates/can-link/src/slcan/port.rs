@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Longest time for establishing a TCP connection.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Shortest timeout. Shortest timeout; with a shorter timeout, a read would not wait.
+/// Shortest timeout; with a shorter timeout, a read would not wait.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 pub(super) enum Port {

@@ -7,7 +7,7 @@ use std::time::Duration;
 const ENOBUFS: i32 = 105;
 /// Pause between two attempts: the duration of a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Time without space in the queue after which the bus is considered as failed.
+/// Time without space in the queue after which the bus is considered to have failed.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Calls the write function, and repeats the call while the queue is full. Returns an error with the likely causes

@@ -76,7 +76,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
         Some(status) => absent(&agent, status).await?,
         None => Vec::new(),
     };
-    // Held Stops and encoder jumps exist only while joints have torque.
+    // Held stops and encoder jumps exist only while joints have torque.
     let reactions = match &status {
         Some(status) if labels::has_torque(status) => agent.ask(|session| Ok(session.reactions())).await?,
         _ => None,

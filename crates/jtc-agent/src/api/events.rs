@@ -43,7 +43,7 @@ pub(super) async fn events(
 #[derive(serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage {
-    /// Status of the controller; a slow reader does not receive all older statuses.
+    /// Status of the controller; older statuses are omitted if the client reads slowly.
     Status(Box<StatusObject>),
 }
 

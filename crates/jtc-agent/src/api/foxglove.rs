@@ -46,7 +46,7 @@ const PERIOD: Duration = Duration::from_millis(40);
 const QUIET: Duration = Duration::from_millis(500);
 /// Interval at which the progress of a client is checked.
 const PING_TIME: Duration = Duration::from_millis(200);
-/// Time after which the agent sends no new data to a client that does not read.
+/// Time after which the agent sends no new data to a client that does not read, until the client reads again.
 const LATE: Duration = Duration::from_millis(400);
 /// Time after which the agent disconnects a client that does not read.
 const GONE: Duration = Duration::from_secs(10);

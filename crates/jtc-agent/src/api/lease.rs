@@ -66,7 +66,7 @@ impl Agent {
         Ok(http_session)
     }
 
-    /// Like [`http_session`](Self::commander), for requests that may move the arm. Refuses requests that were sent
+    /// Like [`http_session`](Self::http_session), for requests that may move the arm. Refuses requests that were made
     /// before the last Stop or Pause, and all requests within three seconds after a Stop or Pause of another client.
     /// The session of the client is reserved first, so that the permission to move does not apply to requests that
     /// cannot begin yet.

@@ -150,10 +150,10 @@ impl From<Payload> for PayloadObject {
     }
 }
 
-/// Held Stop and encoder state that the controller has reported.
+/// Held stop and encoder state that the controller has reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
-    /// Cause and age (ms) of the current held Stop.
+    /// Cause and age (ms) of the current held stop.
     pub stop: Option<(StopCause, u32)>,
     /// Joints with an encoder jump, one bit per joint.
     pub jumped: u8,

@@ -39,7 +39,7 @@ pub(super) struct RecoverRequest {
 }
 
 impl RecoverRequest {
-    /// Returns the source of the parameters that the controller lacks.
+    /// Returns the source of the parameters for a controller that lacks some of them.
     fn parameters(self) -> Result<RecoverParameters, Problem> {
         let Self { defaults, arm, accept_device_limits } = self;
         match arm {

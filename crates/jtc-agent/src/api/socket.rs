@@ -258,7 +258,7 @@ fn wish(line: &Line, client: ClientId, text: &str) {
     line.wake();
 }
 
-/// Sends a message. Sends a message; returns `false` if the client does not receive the message.
+/// Sends a message; returns `false` if the client does not receive the message.
 async fn send(to: &mut SplitSink<WebSocket, Message>, message: Message) -> bool {
     matches!(tokio::time::timeout(SEND_TIME, to.send(message)).await, Ok(Ok(())))
 }

@@ -219,7 +219,7 @@ impl HttpSession {
 }
 
 /// Runs the queued functions until no caller remains. Between the functions, the thread reads the deliveries, because
-/// the serial line disconnects a client that does not read.
+/// the shared line disconnects a client that does not read.
 fn serve(port: ClientPort, work: &Receiver<Work>) {
     let mut session = Session::new(port);
     loop {

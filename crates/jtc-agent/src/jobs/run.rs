@@ -28,15 +28,15 @@ const MOVING: Duration = Duration::from_secs(1);
 pub struct Order {
     /// Trajectory or target of the motion.
     pub course: Course,
-    /// `true` if the arm first moves to the first point when it is at another position.
+    /// `true` if the arm first moves to the first point, unless it is already there.
     pub approach: bool,
     /// Speed in % of the trajectory's own speed or of the limits. With `None`, a trajectory runs at its own speed, and
     /// a move or an approach at the default speed.
     pub speed_percent: Option<f64>,
     /// Number of runs.
     pub repeat: u32,
-    /// `true` if the user accepts the limits of a controller without extensions, although they differ from the limits
-    /// of the agent's arm.
+    /// `true` if the user confirms that the limits of a controller without extensions are safe for the arm, although
+    /// they differ from the limits of the agent's arm.
     pub accept_device_limits: bool,
 }
 

@@ -1,5 +1,5 @@
-//! Current held Stop of the arm (J-69). The status does not contain the cause of the stop, so the agent requests the
-//! cause from the controller once, when the Stop begins.
+//! Current held stop of the arm (J-69). The status does not contain the cause of the stop, so the agent requests the
+//! cause from the controller once, when the stop begins.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Default)]
 struct State {
-    /// Number of held Stops that have ended. An answer about a Stop that has ended is dropped.
+    /// Number of held stops that have ended. An answer about a stop that has ended is dropped.
     ended: u64,
     held: bool,
     asked: Option<Instant>,
@@ -25,13 +25,13 @@ struct State {
     jumped: u8,
 }
 
-/// Known data about the current held Stop.
+/// Known data about the current held stop.
 #[derive(Clone, Default)]
 pub struct Stops(Arc<Mutex<State>>);
 
 impl Stops {
-    /// Returns the cause of the current held Stop, and the age of this Stop in ms at the serial line's time `now`.
-    /// Returns `None` if no held Stop is active, or if its cause is not known.
+    /// Returns the cause of the current held stop, and the age of this stop in ms at the serial line's time `now`.
+    /// Returns `None` if no held stop is active, or if its cause is not known.
     pub fn cause(&self, status: &Status, now: Duration) -> Option<(StopCause, u32)> {
         let state = self.lock();
         let (at, reactions) = state.told.as_ref().filter(|_| status.is_held_stop())?;
@@ -45,7 +45,7 @@ impl Stops {
         if labels::has_torque(status) { self.lock().jumped } else { 0 }
     }
 
-    /// Takes a status. If the status shows a new held Stop, requests the cause from the controller.
+    /// Takes a status. If the status shows a new held stop, requests the cause from the controller.
     pub(super) fn see(&self, status: &Status, asker: &HttpSession) {
         let Some(stop) = self.begins(status) else { return };
         // Another query is in progress. The cause is requested at the next check.
@@ -59,7 +59,7 @@ impl Stops {
         });
     }
 
-    /// Returns the number of the held Stop whose cause must be requested. Returns `None` if no request is needed.
+    /// Returns the number of the held stop whose cause must be requested. Returns `None` if no request is needed.
     fn begins(&self, status: &Status) -> Option<u64> {
         let mut state = self.lock();
         if !labels::has_torque(status) {

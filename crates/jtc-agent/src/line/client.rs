@@ -134,7 +134,7 @@ pub(super) struct Client {
     /// End of the hold-off after a Stop or a Pause of another client. Before that time, no motion of this client
     /// begins.
     pub calm_until: Duration,
-    /// Number of the last Stop or Pause that the client knew when it sent its present requests.
+    /// Number of the last Stop or Pause that the client knew when it made its present requests.
     pub asked_after: u64,
     /// Number of Stops and Pauses of other clients since this client connected.
     pub halts: Halts,

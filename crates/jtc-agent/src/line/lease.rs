@@ -93,7 +93,7 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Releases the lease. Releases the lease, which passes to the client that has requested it, if any.
+    /// Releases the lease, which passes to the client that has requested it, if any.
     ///
     /// # Errors
     ///

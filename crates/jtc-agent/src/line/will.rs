@@ -14,7 +14,7 @@ pub enum Moves {
     Upload,
     /// Motion, including a paused motion.
     Motion,
-    /// Teaching. The arm is moved by hand (Teaching), or may soon be moved by hand.
+    /// Teaching. The arm is moved by hand, or may soon be moved by hand.
     Teaching,
 }
 

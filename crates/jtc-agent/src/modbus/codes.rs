@@ -54,7 +54,7 @@ numbered! {
         Clear = 9, "clear the errors of the controller and of all drives";
         /// Recover.
         Recover = 10, "recover: start a job that brings the controller back to a held arm";
-        /// Recovery with the controller's default parameters.
+        /// Recovery with the arm that the controller has stored, or with its defaults if it has none.
         RecoverWithDefaults = 11, "recover a controller that has not received its arm: it uses the stored arm, or its defaults if it has none";
         /// Speed.
         SetSpeed = 12, "set speed: run the present motion and later ones at `speed` % of their own speed";

@@ -17,7 +17,7 @@ pub struct Order {
     pub speed: u16,
     /// Number of runs.
     pub repeat: u16,
-    /// `true` if the arm first moves to the first point when it is at another position.
+    /// `true` if the arm first moves to the first point, unless it is already there.
     pub approach: bool,
     /// Watchdog, ms.
     pub watchdog_ms: u16,

@@ -45,7 +45,7 @@ pub struct View {
     pub lost: bool,
     /// Age and contents of the last status.
     pub status: Option<(Duration, Status)>,
-    /// Cause and age (ms) of the current held Stop.
+    /// Cause and age (ms) of the current held stop.
     pub stop: Option<(StopCause, u32)>,
     /// Joints with an encoder jump, one bit per joint.
     pub jumped: u8,
@@ -83,7 +83,7 @@ impl View {
         self.status(f32::NAN, known).to_bits()
     }
 
-    /// Returns a value of the cause of the current held Stop; 0 if no held Stop is active, or if its cause is not
+    /// Returns a value of the cause of the current held stop; 0 if no held stop is active, or if its cause is not
     /// known.
     fn stop(&self, read: impl FnOnce(&StopCause) -> u32) -> u32 {
         self.stop.as_ref().map_or(0, |(cause, _)| read(cause))

@@ -150,7 +150,7 @@ impl Plc {
         self.lock().coils.values().any(|coils| coils.contains(&true))
     }
 
-    /// Returns the policy for a motion when the PLC is silent, and the time after which this policy applies.
+    /// Returns the policy for a motion when the PLC is silent or disconnected, and the time after which this policy applies.
     pub(super) fn watchdog(&self) -> (Policy, Duration) {
         watchdog(&self.lock().handshake)
     }

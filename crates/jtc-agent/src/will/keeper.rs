@@ -100,7 +100,7 @@ impl Keeper {
         self.0.changed.notify_all();
     }
 
-    /// Reports to the keeper that the arm was stopped when the agent ended.
+    /// Reports to the keeper that the arm was at rest when the agent ended.
     pub fn forget(&self) {
         self.0.lock().wanted = None;
         self.0.changed.notify_all();

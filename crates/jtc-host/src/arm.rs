@@ -119,8 +119,8 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error with the position in the file if the file cannot be read, its format is unknown, or these drives cannot move the
-    /// arm with these numbers.
+    /// Returns an error with the position in the file if the file cannot be read, its format is unknown, or its numbers do not describe an
+    /// arm that these drives can move.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| e.in_file(path))
@@ -130,7 +130,8 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error with the position in the text if the format is unknown, or if these drives cannot move an arm with these numbers.
+    /// Returns an error with the position in the text if the format is unknown, or if the numbers do not describe an arm that these drives
+    /// can move.
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let arm = if is_xml(text) { Self::from_urdf(text)? } else { Self::from_toml(text)? };
         arm.checked()
@@ -158,8 +159,8 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read, is not a valid URDF, does not determine the six joints, or describes an arm that these
-    /// drives cannot move.
+    /// Returns an error if the file cannot be read, is not a valid URDF, does not determine the six joints, or does not describe an
+    /// arm that these drives can move.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::import_text(&text, choice).map_err(|e| e.in_file(path))
@@ -191,7 +192,7 @@ impl Arm {
         arm.map_err(|e| e.in_file(path))
     }
 
-    /// Returns the arm, or an error if these drives cannot move an arm with these numbers.
+    /// Returns the arm, or an error if its numbers do not describe an arm that these drives can move.
     fn checked(self) -> Result<Self, FileError> {
         self.is_physical()?;
         Ok(self)

@@ -1,7 +1,7 @@
 //! Check of a trajectory before it is sent. The check covers limits at and between the points, jumps, contradictory values, torque during
 //! the motion, torque at rest, the ability to stop, and the start pose.
 //!
-//! Between points the check runs the controller's own interpolation once per millisecond, with the rounded numbers of the CAN frames. So
+//! Between points the check runs the controller's own interpolation once per millisecond, with the rounded numbers of the serial frames. So
 //! the check computes the same values as the controller. The controller's own check (J-36) also uses these values, so the controller
 //! accepts every trajectory that passes this check.
 
@@ -69,7 +69,7 @@ impl Positions {
     }
 }
 
-/// Least significant bit of positions and velocities in a CAN frame.
+/// Least significant bit of positions and velocities in a serial frame.
 pub(crate) const POSITION_BIT: f64 = jtc_wire::POSITION_SCALE / 32767.0;
 const VELOCITY_BIT: f64 = jtc_wire::VELOCITY_SCALE / 32767.0;
 
@@ -84,7 +84,7 @@ impl<'a> Checker<'a> {
     pub fn check(&self, trajectory: &Trajectory) -> Verdict {
         let mut verdict = Verdict::new(trajectory);
         self.counts(trajectory, &mut verdict);
-        // Trajectory points with the values that the controller will receive. A number outside the range of a CAN frame is a problem. The
+        // Trajectory points with the values that the controller will receive. A number outside the range of a serial frame is a problem. The
         // check then continues with the unrounded number.
         let points: Vec<SetPoint> = trajectory
             .points

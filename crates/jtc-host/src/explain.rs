@@ -169,7 +169,7 @@ pub fn names(family: Family, word: u32) -> Vec<&'static str> {
 
 /// Returns the texts that commands print for this code.
 fn shown(page: &Page) -> Vec<String> {
-    // A decoded frame contains the node numbers that are used on the CAN bus.
+    // A decoded frame contains the node numbers of the protocol.
     let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
     own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
 }

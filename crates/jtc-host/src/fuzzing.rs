@@ -89,7 +89,7 @@ pub fn trajectory_yaml(data: &[u8]) {
     sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
 }
 
-/// Checks an arm that was read from a file. Its model must be physically possible, and its parameters must fit into their CAN frames unless
+/// Checks an arm that was read from a file. Its model must be physically possible, and its parameters must fit into their serial frames unless
 /// the parameter check rejects them.
 fn sound_arm(read: Result<Arm, FileError>) {
     let Ok(arm) = read else { return };

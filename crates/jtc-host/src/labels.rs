@@ -113,7 +113,7 @@ pub fn is_silent(s: &Status, node: usize) -> bool {
     s.can_current & can_flag::no_answer(node) != 0
 }
 
-/// Returns `true` if the drives of the arm produce torque.
+/// Returns `true` if the arm is under torque: the controller is in HoldPos, Operate or Teaching.
 pub fn has_torque(s: &Status) -> bool {
     s.state.is_in(&[ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching])
 }

@@ -57,7 +57,7 @@ const STEP_MS: u16 = 10;
 /// Duration of a change of the acceleration if the jerk is not limited, s. With a duration below two steps, the acceleration between the
 /// points (J-32) would be higher than at the points.
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
-/// Share of the velocity and acceleration limits that a plan uses. The remaining 2 % are reserved for the rounding in CAN frames.
+/// Share of the velocity and acceleration limits that a plan uses. The remaining 2 % are reserved for the rounding in serial frames.
 const SHARE: f64 = 0.98;
 /// Time (s) in which the remainder of a trajectory reaches its speed, followed by longer times that are tried if the check rejects the
 /// remainder.
@@ -149,7 +149,7 @@ impl<'a> Planner<'a> {
 
     /// Plans a motion that starts and ends at rest between two positions (rad, base to wrist). The motion is straight in joint space,
     /// unless a curved motion is faster. If a joint is outside its limits by at most the start tolerance, the motion begins at the nearest
-    /// position inside the limits (J-58). If the goal is outside the limits by at most the rounding of a CAN frame, it is moved to the
+    /// position inside the limits (J-58). If the goal is outside the limits by at most the rounding of a serial frame, it is moved to the
     /// limit (J-36).
     ///
     /// # Errors
@@ -323,7 +323,7 @@ impl<'a> Planner<'a> {
                 slowed = Some(worst);
                 continue;
             }
-            // The torque can exceed the margin because of the rounding in CAN frames, and between the samples of the plan.
+            // The torque can exceed the margin because of the rounding in serial frames, and between the samples of the plan.
             let excess = arm.as_ref().filter(|_| !timed);
             let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
             if let Some(excess) = excess {
@@ -361,7 +361,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Returns `place`, in which each joint is moved to its limit if it is outside by at most the rounding of a CAN frame (J-36).
+/// Returns `place`, in which each joint is moved to its limit if it is outside by at most the rounding of a serial frame (J-36).
 fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     std::array::from_fn(|j| {
         let range = PathRange::of(config, j, 0);

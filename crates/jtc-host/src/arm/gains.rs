@@ -4,8 +4,8 @@
 //! The controller computes the derivative over five ticks. This control loop is stable between a lower and an upper inertia. Below the
 //! lower inertia the delay of the derivative is too long; above the upper inertia the integral gain is too high.
 //!
-//! For coupled joints, D and U are the lower and upper inertias of the joints, and M is the mass matrix with rotors. The arm is stable if M
-//! − D and U − M are positive definite. This condition is exact if the gains of all joints have the same ratios.
+//! For coupled joints, D and U are the lower and upper inertias of the joints, and M is the mass matrix with rotors. The arm is stable if
+//! M − D and U − M are positive definite. This condition is exact if the gains of all joints have the same ratios.
 
 use std::f64::consts::PI;
 

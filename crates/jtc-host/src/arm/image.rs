@@ -33,7 +33,7 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error for a number that is out of range for its CAN frame.
+    /// Returns an error for a number that is out of range for its serial frame.
     pub fn image(&self) -> Result<Option<Vec<u8>>, EncodeError> {
         let (Some(pid), Some(friction)) = (&self.pid, self.friction()) else { return Ok(None) };
         let settings = self.settings();

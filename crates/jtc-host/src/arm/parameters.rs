@@ -20,7 +20,7 @@ pub struct ParameterSet {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParameterError {
-    /// A number is out of range for its CAN frame.
+    /// A number is out of range for its serial frame.
     #[error("{what} of {joint}: {value} does not fit into a 32-bit float")]
     NotFinite {
         /// Name of the number.
@@ -135,7 +135,7 @@ impl ParameterSet {
     ///
     /// # Errors
     ///
-    /// Returns an error with the first number that is out of range for its CAN frame, contradicts another number, or is not physically
+    /// Returns an error with the first number that is out of range for its serial frame, contradicts another number, or is not physically
     /// possible.
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {
@@ -166,7 +166,7 @@ fn finite(what: &'static str, joint: Joint, value: f64) -> Result<(), ParameterE
     if (value as f32).is_finite() { Ok(()) } else { Err(ParameterError::NotFinite { what, joint, value }) }
 }
 
-/// Checks that the values of both table axes increase and that all numbers fit into their CAN frames.
+/// Checks that the values of both table axes increase and that all numbers fit into their serial frames.
 pub(super) fn check_table(j: Joint, t: &TableOf<f32>) -> Result<(), ParameterError> {
     for (axis, values) in [("velocity", &t.velocity), ("temperature", &t.temperature)] {
         values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;

@@ -69,7 +69,7 @@ pub const RULES: [Rule; 11] = [
 const TEACH_DAMPING_RATE: f64 = 100.0;
 /// Tool speed limit of an imported arm, m/s. The value is the limit for setting up a robot next to people (ISO 10218).
 const TOOL_SPEED_MAX: f64 = 0.25;
-/// Damping ratio used for the proposed gains: Kd · (age of the derivative) / (least inertia) (J-71).
+/// Damping of the proposed gains: Kd · (age of the derivative) / (least inertia) (J-71).
 const DAMPING: f64 = 0.7;
 /// Age of the derivative, s: half of its time window, plus half a tick, the average delay of a torque that stays constant for one tick.
 const DERIVATIVE_AGE: f64 = 3e-3;
@@ -85,7 +85,7 @@ const RESERVE: f64 = 1.5;
 const REDUCTIONS: usize = 60;
 /// Acceleration limit (rad/s²) for which a proposed torque limit is sufficient.
 const ENOUGH_ACCELERATION: f64 = 3.0;
-/// Share of the torque limit minus the gravity torque that the acceleration limit may use.
+/// Share of the remaining torque (torque limit minus gravity torque) that the acceleration limit uses.
 const ACCELERATION_PART: f64 = 1.0 / 3.0;
 /// Maximum tracking error with the heaviest assumed rotor, as a share of the position error limit.
 const ERROR_PART: f64 = 0.2;

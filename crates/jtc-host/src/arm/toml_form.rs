@@ -76,7 +76,7 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error with the first key or number that is missing, unknown or of an invalid type, with the line number.
+    /// Returns an error with the first key or number that is missing, unknown or of the wrong form, with its line.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let arm = read(text)?;
         match arm.limit_faults().into_iter().next() {

@@ -127,7 +127,7 @@ impl CheckedTrajectory {
                 number: PASSED.fetch_add(1, Ordering::Relaxed),
                 basis: Arc::new((arm.clone(), config)),
             }),
-            // The verdict already contains a problem for each number that is outside the range of a CAN frame.
+            // The verdict already contains a problem for each number that is outside the range of a serial frame.
             _ => Err(CheckError::Refused(Box::new(verdict))),
         }
     }

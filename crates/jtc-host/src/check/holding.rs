@@ -1,4 +1,4 @@
-//! Check that the drives can hold the arm whenever it is at rest: at the start, at the end, and during pauses inside the path.
+//! Check that the drives can hold the arm wherever the path is at rest: at the start, at the end, and at rests in between.
 //!
 //! If the torque that holds an arm is close to a limit, the arm falls after some time, even without a motion. The gains amplify the encoder
 //! noise, so the commanded torque exceeds the limit repeatedly. More than 10 ms over the limit within 100 ms is an error (J-43). A path may
@@ -10,7 +10,7 @@ use jtc_wire::Joint;
 
 use super::{HOLD_SHARE, ProblemKind, Verdict};
 
-/// Joint speed up to which a joint is considered at rest, rad/s. The smallest velocity in a CAN frame is about 0.1 mrad/s.
+/// Joint speed up to which a joint is considered at rest, rad/s. The smallest velocity in a serial frame is about 0.1 mrad/s.
 const STANDS: f64 = 0.001;
 
 /// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit while the arm is at rest on the path. If

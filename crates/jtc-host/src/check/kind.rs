@@ -47,11 +47,11 @@ kinds! {
     SegmentPoints, "points per segment";
     /// The step time is 0.
     StepTime, "step time of 0 ms";
-    /// A position is outside the range of a CAN frame.
+    /// A position is outside the range of a serial frame.
     PositionScale, "position outside the range of a frame" in "rad";
-    /// A velocity is outside the range of a CAN frame.
+    /// A velocity is outside the range of a serial frame.
     VelocityScale, "velocity outside the range of a frame" in "rad/s";
-    /// An acceleration is outside the range of a CAN frame.
+    /// An acceleration is outside the range of a serial frame.
     AccelerationScale, "acceleration outside the range of a frame" in "rad/s²";
     /// Two points are too far apart for the arm to move from one to the other in one step.
     Jump, "jump" in "rad";

@@ -129,7 +129,7 @@ impl Seen {
 /// Formats a number with three significant digits.
 fn three_digits(value: f64) -> String {
     let before = if value > 0.0 { value.log10().floor() } else { 0.0 };
-    // Seven decimals are finer than the resolution of every CAN frame.
+    // Seven decimals are finer than the resolution of every serial frame.
     let decimals = (2.0 - before).clamp(0.0, 7.0) as usize;
     format!("{value:.decimals$}")
 }

@@ -231,7 +231,7 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     assert_eq!((verdict.problems[0].kind, verdict.problems[0].limit), (ProblemKind::Position, 2.9905));
 }
 
-/// Returns settings in which the limits of joint 2 lie between two positions that a CAN frame can represent. The nearest representable
+/// Returns settings in which the limits of joint 2 lie between two positions that a serial frame can represent. The nearest representable
 /// positions, 1.150041 and −0.550044 rad, are outside the limits.
 fn between_steps() -> Config {
     let mut config = Config::avena();
@@ -252,7 +252,7 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
             let verdict = Checker::new(&config).check(&t);
             assert!(verdict.is_ok() && verdict.problems.is_empty(), "{verdict}");
         }
-        // The next position that a CAN frame can represent is outside the limit.
+        // The next position that a serial frame can represent is outside the limit.
         let verdict = Checker::new(&config).check(&of_joint_2(from, limit + 96e-6 * f64::signum(limit)));
         let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
         assert_eq!((problem.kind, problem.limit), (ProblemKind::Position, limit));
@@ -265,7 +265,7 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
 #[test]
 fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     let config = between_steps();
-    // The CAN frames contain the raw positions 11 997, −5 739, 12 100 and 15 000. The rounding of the velocities adds some µrad.
+    // The serial frames contain the raw positions 11 997, −5 739, 12 100 and 15 000. The rounding of the velocities adds some µrad.
     for (end, excess) in [(1.150233, 0.000233), (-0.550236, 0.000236), (1.160108, 0.0101), (1.438151, 0.288)]
     {
         let verdict = Checker::new(&config).check(&of_joint_2(0.2, end));

@@ -66,7 +66,7 @@ pub enum ExtensionError {
     /// The payload cannot change while a motion runs (J-60).
     #[error("the payload cannot change during a motion (state {state}, trajectory {trajectory})")]
     PayloadInMotion {
-        /// State of the controller when the payload was sent.
+        /// State of the controller when it refused the payload.
         state: Code<ControllerState>,
         /// Trajectory execution state at that time.
         trajectory: Code<TrajectoryState>,

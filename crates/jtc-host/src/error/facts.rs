@@ -154,7 +154,7 @@ mod tests {
         let facts = refused.expect_err("it is over its limit").facts();
         assert_eq!((facts.joint, facts.point), (Some(2), Some(0)));
         assert_eq!(facts.limit, Some(limit));
-        // The resolution of the value is the resolution of a CAN frame.
+        // The resolution of the value is the resolution of a serial frame.
         assert!(facts.value.is_some_and(|value| (value - limit - 0.5).abs() < 1e-3), "{:?}", facts.value);
         assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
     }

@@ -57,7 +57,7 @@ pub enum MotionError {
     LinkLost {
         /// Last status that was received.
         last: Option<Box<Status>>,
-        /// `true` if a Stop was written to the port after the loss of the link.
+        /// `true` if a Stop was written to the port. The controller has not confirmed it.
         stop_sent: bool,
         /// Failure of the link.
         source: Box<LinkError>,

@@ -10,7 +10,7 @@ use crate::labels;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParametersError {
-    /// A value is out of range for its CAN frame, or is not physically possible.
+    /// A value is out of range for its serial frame, or is not physically possible.
     #[error(transparent)]
     Value(#[from] ParameterError),
     /// The controller refused a parameter that is out of the bounds of known controllers.

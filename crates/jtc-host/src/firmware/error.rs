@@ -95,7 +95,7 @@ pub enum FirmwareError {
         /// Description of the change.
         what: String,
     },
-    /// The drives of the arm produce torque, so the board must not be reset.
+    /// The arm has or may have torque, so the board must not be reset.
     #[error(
         "the controller at {port} holds an arm (state {state}); flashing resets the board, and the arm falls"
     )]
@@ -181,7 +181,7 @@ pub enum FirmwareError {
         /// Content of `FAIL.TXT`.
         text: String,
     },
-    /// The behaviour of the drive shows that it has not accepted the image.
+    /// The drive does not behave as it does after it has accepted an image.
     #[error("the image was copied, but {seen}{}", with_doubt(doubt))]
     NotTaken {
         /// Observed behaviour of the drive.

@@ -79,7 +79,7 @@ pub(super) fn catalogue(folder: &Path, boards: &[&str]) {
 pub(super) struct Board(Arc<Mutex<Flashed>>);
 
 struct Flashed {
-    /// `true` while the ST-LINK stops the processor.
+    /// `true` while the ST-LINK keeps the processor stopped.
     held: bool,
     program: Option<Program>,
     board: String,

@@ -29,7 +29,7 @@ pub enum Answers {
     Controller {
         /// State of the controller.
         state: Code<ControllerState>,
-        /// `true` if the drives of the arm produce torque.
+        /// `true` if the arm has or may have torque.
         torque: bool,
         /// Joints that do not answer the controller, so that their torque is unknown.
         silent: Vec<Joint>,

@@ -31,7 +31,7 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// Returns 120 s for `wait` and 250 ms for `pause`. The ST-LINK needs 30 s for one megabyte, and an operating system needs some more
+    /// Returns 120 s for `wait` and 250 ms for `pause`. The ST-LINK needs about 30 s for one megabyte, and an operating system needs some more
     /// seconds to mount a drive.
     fn default() -> Self {
         Self { wait: Duration::from_secs(120), pause: Duration::from_millis(250) }
@@ -232,7 +232,7 @@ pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Inf
 fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
     let mut session = Session::new(port);
     session.timeouts = Timeouts { status: limits.pause * 4, confirmation: limits.pause * 2, tries: 2 };
-    // While the ST-LINK stops the processor, a request would only time out.
+    // While the ST-LINK keeps the processor stopped, a request would only time out.
     session.next_status()?;
     session.info()
 }

@@ -318,7 +318,7 @@ impl Narrator<'_> {
     fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
         let name = labels::joint_errors(bit).first().copied().unwrap_or("an unnamed error");
         let j = joint.index();
-        // In the tick of the error the controller removes the torque, and the commanded value becomes 0. So the function also uses the
+        // In the tick of the error the controller removes the torque, and with it the commanded value. So the function also uses the
         // previous tick.
         let larger = |value: fn(&JointSample) -> f64| {
             let values = [value(&last.sample.joints[j]), value(&tick.sample.joints[j])];

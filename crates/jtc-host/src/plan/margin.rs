@@ -1,8 +1,8 @@
 //! Torque margin of a plan: the part of each torque limit that stays unused as a reserve for effects that the model does not contain.
 //!
 //! A plan keeps the model torque, including friction, below (100 % − margin) of each limit. This applies at the lowest bearing temperature
-//! of the plan and at the usual bearing temperature. If gravity and breakaway friction alone need nearly all of this reduced limit, another
-//! rule applies ([`ArmDynamics::usable_torque`]). The motion may then use a quarter of the torque that gravity and friction leave of the
+//! of the plan and at the usual bearing temperature. If gravity and breakaway friction alone need nearly all of this reduced limit or more,
+//! another rule applies ([`ArmDynamics::usable_torque`]). The motion may then use a quarter of the torque that gravity and friction leave of the
 //! whole limit, and at least 2 % of the limit. So the arm can also reach and leave every pose that it can hold.
 //! [`Verdict::margin`](crate::check::Verdict::margin) reports the margin of a motion.
 

@@ -15,7 +15,7 @@ const STEP_MAX_MS: f64 = 1000.0;
 /// Maximum deviation of a trajectory from the motion, between the points, rad.
 const ASIDE: f64 = 1e-3;
 /// Minimum number of points for each sharp corner. With fewer points the trajectory deviates more from the motion. A corner is sharp if the
-/// change of direction exceeds the given share, and its segments are longer than the given length (rad).
+/// change of direction exceeds `CORNER_TURN` (a share of the path length), and its segments are longer than `CORNER_LEG` (rad).
 const CORNER_POINTS: usize = 3;
 const CORNER_TURN: f64 = 0.5;
 const CORNER_LEG: f64 = 0.05;

@@ -26,7 +26,7 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// [`ParametersError::Unstable`] with the first finding about the gains.
+    /// [`ParametersError::Unstable`] with the first finding about the gains that is a problem.
     pub fn check_gains(&self) -> Result<(), ParametersError> {
         let mut findings = Vec::new();
         if self.is_physical().is_ok() {

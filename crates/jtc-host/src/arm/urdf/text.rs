@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use crate::file::{FileError, Place, short};
 
-/// Maximum nesting depth of elements; descriptions of arms have less.
+/// Maximum nesting depth of elements; descriptions of arms are less deep.
 const DEPTH_MAX: usize = 32;
 
 /// Tag in the text with its begin, its end, and the nesting depth of its element. The outermost element has depth 0.

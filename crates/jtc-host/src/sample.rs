@@ -107,7 +107,7 @@ impl From<&JointTelemetry> for JointSample {
 /// State of the arm and its controller at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// Time of the sample, in seconds since the start of the clock.
+    /// Time of the sample, in seconds since the start of the clock that the first sample uses.
     pub time_s: f64,
     /// State of the controller.
     pub state: Code<ControllerState>,

@@ -229,8 +229,8 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Reads all received bytes, and discards records and denials of earlier frames. Some of these records may have
-    /// arrived only a moment ago.
+    /// Reads all received bytes, and discards records and denials of earlier frames. Some of these records and denials may have arrived only a
+    /// moment ago.
     fn forget_the_past(&mut self) -> Result<(), LinkError> {
         self.catch_up()?;
         self.records.clear();

@@ -201,7 +201,7 @@ impl WaypointFile {
         self.waypoints.iter().skip(1).any(is_line)
     }
 
-    /// Returns the indices of the flange poses that the arm reaches by a leg in joint space from another flange pose.
+    /// Returns the indices of the waypoints that are flange poses and that a leg in joint space reaches from another flange pose.
     pub fn legs_between_flange_poses(&self) -> Vec<usize> {
         let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
         let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;

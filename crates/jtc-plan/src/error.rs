@@ -145,8 +145,8 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Returns the number (from 1) of the waypoint in the message, if the message contains one. Returns the waypoint
-    /// that is invalid, of two waypoints.
+    /// Returns the number (from 1) of the waypoint in the message, if the message contains one. Of two waypoints,
+    /// returns the invalid one.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::NotFinite { waypoint, .. }

@@ -4,8 +4,7 @@ use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Maximum holding torque of a joint without friction, as a share of the torque limit. At a share of 98 %, joints fell
-/// in tests.
+/// Maximum holding torque of a joint without friction, as a share of the torque limit. At a share of 98 %, joints have been observed to fall.
 pub const HOLD_SHARE: f64 = 0.97;
 
 /// Share of the torque above the holding torque that a motion may use with any margin, and the minimum of this torque

@@ -140,7 +140,7 @@ fault_kinds! {
     Wall "wall" {
         /// Point of the surface in the base frame, m.
         position: [f64; 3],
-        /// Direction out of the wall, as a vector in the base frame whose length must not be 0.
+        /// Direction out of the wall, as a vector in the base frame. The length of the vector must not be 0.
         normal: [f64; 3],
         /// Stiffness, N/m.
         stiffness: f64,

@@ -150,8 +150,8 @@ impl Gripper {
             return;
         }
         self.age = self.age.saturating_add(1);
-        // Only a change of the line has an effect. If the gripper is enabled while the line is already unsafe, it stays
-        // enabled.
+        // Only a change of the line to danger has an effect. If the gripper is enabled while the line is already
+        // unsafe, it stays enabled.
         let edge = self.safety_line && !self.line_before;
         self.line_before = self.safety_line;
         if edge && self.reacts_to_safety && self.state == NodeState::ENABLED {

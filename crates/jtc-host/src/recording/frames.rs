@@ -67,8 +67,8 @@ impl Frames {
         Self { placed: std::array::from_fn(placed), last: None }
     }
 
-    /// Writes the message with the transforms of a sample if the interval has passed. The message does not contain joints whose position is
-    /// unknown.
+    /// Writes the message with the transforms of a sample, unless a message was already written in the same interval ([`EVERY_NS`]) or no position
+    /// is known. The message does not contain joints whose position is unknown.
     pub(super) fn write<'a>(
         &mut self,
         cdr: &'a mut Encoder,

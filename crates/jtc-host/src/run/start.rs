@@ -218,7 +218,7 @@ mod tests {
         }
         let then = Course { later: &outside, ..course };
         assert!(matches!(start(&then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
-        // An approach would begin at the end of the path. The speed at that point is above the limit of the controller.
+        // An approach would begin at the end of the path. No approach can be planned with a speed of 0 %.
         let none = Course { approach_pct: Some(0.0), ..course };
         assert!(matches!(start(&none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
     }

@@ -23,7 +23,7 @@ pub enum Flow {
     Speed(u8),
     /// Stop the motion and follow it until the arm is at rest.
     Stop,
-    /// Return at once. Stop following; the motion continues.
+    /// Return at once. No Stop is sent: the motion continues, and this session no longer follows it.
     Cancel,
 }
 

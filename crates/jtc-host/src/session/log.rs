@@ -119,8 +119,8 @@ impl<P: Port> Session<P> {
         Ok(log)
     }
 
-    /// Returns points of the trajectory in the device's memory. If the memory contains fewer than `count` points,
-    /// returns all points.
+    /// Returns points of the trajectory in the device's memory. Returns `count` points from index `first` on, or fewer
+    /// if the trajectory ends before.
     fn log_points(&mut self, first: usize, count: usize) -> Result<Vec<RawPoint>, LinkError> {
         let mut all = Vec::new();
         while all.len() < count {

@@ -30,8 +30,7 @@ const BOOT: Duration = Duration::from_secs(1);
 const TAKEN_IN: Duration = Duration::from_millis(60);
 /// Maximum number of steps before the recovery fails.
 const ACTS_MAX: u8 = 24;
-/// Maximum number of times that a held stop is cleared. In the time of these attempts, a compliant joint comes to rest, or
-/// an operator frees the joint.
+/// Maximum number of times that a held stop is cleared. During these attempts, a compliant joint comes to rest, or an operator frees the joint.
 const HELD_CLEARS: u8 = 6;
 /// Maximum number of times that errors are cleared.
 const CLEARS_MAX: u8 = 6;

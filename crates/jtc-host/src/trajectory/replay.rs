@@ -15,7 +15,7 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Minimum spacing of points, ms. If two consecutive points are at least this far apart, all points are kept.
+/// Minimum spacing of points, ms. If at least one pair of consecutive points is this far apart or more, all points are kept.
 const GRID_MS: u32 = 10;
 
 /// Spacing of measured positions, s. With a smaller spacing, encoder noise would look like motion.

@@ -101,8 +101,8 @@ impl Place {
         is_inside.then(|| (time, product.ln()))
     }
 
-    /// Adds the contribution of this point to the derivatives with respect to the coefficients. The function is the
-    /// time plus `barrier` times the barriers.
+    /// Adds the contribution of this point to the derivatives of the time plus `barrier` times the barriers. The derivatives are with respect to the
+    /// coefficients.
     pub(super) fn add_to(
         &self,
         gradient: &mut [f64],

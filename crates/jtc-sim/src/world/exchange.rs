@@ -58,8 +58,8 @@ impl Exchange {
 }
 
 impl Board {
-    /// Returns the bytes that the tick with these outputs sends to the host. The bytes are a status, an answer to an
-    /// extension request, or no bytes.
+    /// Returns the bytes that the last tick, which had these outputs, sends to the host. The bytes are a status, an
+    /// answer to an extension request, or no bytes.
     pub fn bytes_to_host(&self, outputs: &Outputs) -> Vec<u8> {
         let status: &[u8] = if outputs.status { self.status_frame() } else { &[] };
         let answer = if outputs.answer_line.is_some() { self.answer_frame() } else { &[] };

@@ -49,9 +49,8 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Returns `true` if parameters must be sent. Every controller receives the parameters of an arm once. Only a
-    /// controller that lacks parameters uses the defaults. All three parameters are always sent, so that the parameters of
-    /// two arms are never mixed.
+    /// Returns `true` if parameters must be sent. Every controller receives the parameters of an arm once. Only a controller that lacks some
+    /// parameters is commanded to use its defaults. All three parameters are always sent, so that the parameters of two arms are never mixed.
     pub(super) fn due(&self, status: &Status, given: bool) -> bool {
         match self {
             ParameterSource::None => false,

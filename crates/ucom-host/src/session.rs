@@ -1,7 +1,7 @@
 //! A session on a bus: a master that is connected to the bus in real time, and the procedures that commands need.
 //!
 //! - [`Link`]: an open bus with its clock; [`Prompt`]: a bus with a short receive timeout; [`pump`]: moves frames between the bus and the
-//!   master, in an order that does not falsify times.
+//!   master, in the order that keeps times correct.
 //! - [`Driver`]: runs procedures from start to end, with an [`Operator`] who can stop the procedures and reads notes.
 //! - [`Examination`]: diagnosis of a bus; [`Watch`]: live view of a bus.
 //! - [`CleanupList`]: work that would remain undone if the process ended now.

@@ -1,6 +1,6 @@
 //! The compatibility profile: the board's interpretation of points that the published description leaves open.
 //!
-//! Each of these decisions has a key, so that this crate can also work with a board that interprets the description differently.
+//! Each decision about such a point has a key, so that this crate can also work with a board that interprets the description differently.
 //! [`KEYS`] lists the keys with default, range and meaning; [`Profile`] contains the values.
 
 mod keys;

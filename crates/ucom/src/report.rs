@@ -15,7 +15,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Returns the report of a board in mode `flash7`: which has one of 128 identifiers, one for each 7-bit flash id.
+    /// Returns the report of a board in mode `flash7`, which uses 128 identifiers, one for each 7-bit flash id.
     pub const fn flash7(flash_number: u16) -> Self {
         Self {
             k: (flash_number >> 5 & 3) as u8,

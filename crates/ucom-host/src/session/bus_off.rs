@@ -7,7 +7,7 @@ const AGAIN_US: u64 = 5_000_000;
 pub const WHY: &str =
     "too many of its frames failed: a wrong bit rate, no termination, or CAN_H and CAN_L swapped or shorted";
 
-/// Number of bus-off events reported so far.
+/// Record of the bus-off events reported so far.
 #[derive(Debug, Default)]
 pub struct BusOff {
     reported: u64,

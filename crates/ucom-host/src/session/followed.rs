@@ -96,7 +96,7 @@ impl Notice {
 pub struct Followed {
     boards: BTreeMap<u8, One>,
     asking: Option<ProcedureId>,
-    /// Time at which the last board left its loop.
+    /// Start of the time in which no board has been in its loop.
     nobody_since: Option<u64>,
 }
 
@@ -264,7 +264,7 @@ mod tests {
 
     use super::*;
 
-    /// Delivers frames of board 1 at the given times, and returns the notices.
+    /// Delivers frames of board 1 at the given time, and returns the notices.
     fn receive(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
         frames.iter().for_each(|text| master.handle(at_us, Ok(text.parse().unwrap())));
         let mut sent = Vec::new();

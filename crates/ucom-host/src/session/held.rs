@@ -229,7 +229,7 @@ impl Session {
         }
     }
 
-    /// Removes all data about a board whose number or application has changed, or which no longer exists.
+    /// Removes all data about a board whose number or application has changed or no longer exists.
     pub fn forget(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         held.runs_no_more(Some(board));

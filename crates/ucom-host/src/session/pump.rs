@@ -1,4 +1,4 @@
-//! Moves frames between the bus and the PC side, in an order that does not falsify times. Received frames are delivered before a timeout
+//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered before a timeout
 //! can end. Sending and receiving cannot block each other.
 
 use std::time::Duration;
@@ -8,7 +8,7 @@ use ucom::{Foreign, Frame};
 use super::error::SessionError;
 use crate::master::Master;
 
-/// Longest wait. Interval at which Ctrl-C is checked.
+/// Longest wait. Ctrl-C is checked at this interval.
 pub const LOOK: Duration = Duration::from_millis(50);
 /// Limits of the number of delivered frames, and of the time, before the due frames are sent. With these limits, heartbeats continue on a
 /// flooded bus.

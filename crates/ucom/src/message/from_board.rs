@@ -25,7 +25,7 @@ pub enum FromBoard {
     InitAck(u8),
     /// DSP_PROGFINISHED.
     ProgFinished,
-    /// A part of DSP_INFO, which consists of 8 bytes with the values of [`BoardInfo`](crate::BoardInfo) and a string.
+    /// A part of DSP_INFO. DSP_INFO consists of 8 bytes with the values of [`BoardInfo`](crate::BoardInfo), followed by a string.
     Info(Payload),
     /// DSP_READY: the board has accepted the block.
     Ready,
@@ -35,7 +35,7 @@ pub enum FromBoard {
     Report(Report),
     /// MCA_DSP_READY: the application is ready.
     McaReady,
-    /// A part of MCA_DUMP_IO_DESCRIPTION, which consists of 6 bytes of dimensions and of strings.
+    /// A part of MCA_DUMP_IO_DESCRIPTION. The description consists of 6 bytes of dimensions, followed by strings.
     IoDescription(Payload),
     /// MCA_ADMIN_DATA with the state of the board.
     Admin(Admin),
@@ -85,7 +85,7 @@ impl FromBoard {
         Frame::of(self.function(), sequence, payload)
     }
 
-    /// Decodes a frame. Returns the message and the sequence field of the frame's identifier.
+    /// Decodes a frame. Returns the sequence field of the frame's identifier, and the message.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, from) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);

@@ -81,7 +81,7 @@ impl ToBoard {
         Frame::of(self.function(), to, payload)
     }
 
-    /// Decodes a frame. Returns the destination of a frame and its message.
+    /// Decodes a frame. Returns the destination of the frame and the message.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, to) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);

@@ -4,7 +4,7 @@ use super::hardware::RECORD_LEN;
 use crate::profile::Endian;
 use crate::program::{Checksum, checksum};
 
-/// Record of the application in flash. If the record is not complete, the board treats the application as missing.
+/// Record of the application in flash. Without a complete record, the board has no application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
     /// Program ID (D-44).

@@ -1,7 +1,7 @@
 //! Detects the format of a file if no format option is set. Intel HEX and S-records are detected by their first line; other content is
 //! accepted as raw bytes only if it cannot be text.
 //!
-//! If the reader accepted a text as raw bytes, the text would be flashed and reported as verified, and the board would have no program.
+//! If the reader accepted a text as raw bytes, the text would be flashed and reported as verified, and the board would no longer have a program.
 //! Therefore raw bytes are only read from a `.bin` file without printable text. With the option for raw bytes, the reader also accepts
 //! files with other names, and text in a `.bin` file. Records are never read as raw bytes, even if they are damaged.
 

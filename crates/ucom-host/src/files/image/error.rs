@@ -164,7 +164,7 @@ pub enum LineProblem {
     /// An address already has another value.
     #[error("byte address 0x{address:X} has two different values")]
     Overlap {
-        /// First byte address whose value is different.
+        /// First byte address that has two different values.
         address: u64,
     },
     /// The data would make the image larger than the limit.

@@ -146,7 +146,7 @@ impl Core {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
 
-    /// Queues a frame. Queues a frame. Returns the serial number of the frame for [`Core::left`].
+    /// Queues a frame. Returns the serial number of the frame for [`Core::left`].
     pub(crate) fn queue(
         &mut self,
         owner: Option<ProcedureId>,

@@ -163,7 +163,7 @@ pub enum Incomplete {
     /// The answer contains more frames than its totals announce.
     #[error("the board sent more frames than it had announced")]
     Surplus,
-    /// The answer announces more strings than a bus could carry.
+    /// The answer announces more strings than possible.
     #[error("the board announces {strings} strings, which is too many; check the byte order")]
     TooMany {
         /// Number of strings.

@@ -75,8 +75,8 @@ impl IoDescription {
         }
     }
 
-    /// Returns the index of a signal. The signal is selected by its text, with or without the unit in brackets, or by its index (`#3` or
-    /// `3`). The letter case is ignored if only one signal then matches.
+    /// Returns the index of a signal. The signal is selected by its text, with or without the unit in brackets at its end, or by its index
+    /// (`#3` or `3`). The letter case is ignored if only one signal then matches.
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {

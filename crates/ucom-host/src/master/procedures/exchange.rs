@@ -122,7 +122,7 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
 /// Sends PC_INFO and reads the answer with the description. Makes at most three attempts.
 ///
 /// If the description is never complete, returns the values of the first frame without it. If an answer contains another number, the
-/// request is sent again. If the next answer contains this wrong number too, the procedure ends at once with an error (D-24).
+/// request is sent again. If a later answer contains the same wrong number, the procedure ends at once with an error (D-24).
 pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     info_for(link, board, true).await
 }

@@ -29,7 +29,7 @@ impl Link {
         if !already && !force {
             let (since, listen, now) =
                 self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
-            // The listening time includes the time before the command.
+            // The listening time includes the time before the command in which this PC has already listened to the bus.
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }

@@ -11,7 +11,7 @@ const FRESH: u64 = 2_000 * MS;
 /// Time between two PC_INFO requests in µs. Because of this pause, the answers of 31 boards do not arrive as one burst.
 const SPACING: u64 = 2 * MS;
 
-/// Checks that each of the given numbers belongs to only one board, so no other board answers PC_INFO within the allowed time. A number to
+/// Checks that each of the given numbers belongs to only one board: no other board answers PC_INFO within the allowed time. A number to
 /// which no board answers is not an error.
 pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), IdentityError> {
     let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));

@@ -116,7 +116,7 @@ async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(seen.into_iter().filter(|(_, times)| *times > 1).map(|(flash_number, _)| flash_number).collect())
 }
 
-/// Sends one PC_INFO. Returns the flash numbers in all answers to this number, not only in the first answer.
+/// Sends one PC_INFO. Returns the flash numbers in all answers to it, not only in the first answer.
 async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
     link.listen(1 << number, &[Function::DspInfo]);
@@ -172,7 +172,7 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The board works. Only the outgoing pin of this board must be on, so the command sets only the pin.
+        // The board works. The only missing step is to switch on its outgoing pin, so only the pin is set.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

@@ -48,8 +48,8 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// Stops a board that received a start command and does not show the start yet. Such a board may start at any time until `start.timeout`
-/// has passed. Therefore the board gets the stop command in any state, and its state is read again after that time.
+/// Stops a board to which a start command was sent and which does not show the start yet. Such a board may start at any time until
+/// `start.timeout` has passed. Therefore the board gets the stop command in any state, and its state is read again after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;

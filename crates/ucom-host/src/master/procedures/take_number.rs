@@ -29,7 +29,7 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
                     acknowledged = true;
                     break;
                 }
-                // The board may not have sent its previous acknowledgement yet (D-24), so the procedure waits for it.
+                // The board has not sent its previous acknowledgement yet (D-24), so the procedure waits for it.
                 FromBoard::Error(ErrorCode::Reinit) if received.from == nobody || received.from == number => {
                     until = until.max(link.now() + 100 * MS);
                 }

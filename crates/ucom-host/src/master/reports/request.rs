@@ -15,7 +15,7 @@ use ucom::{Admin, BoardInfo, Status};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ProcedureId(pub(crate) u64);
 
-/// Request that starts a procedure. With `force`, the procedure also runs if another PC is on the bus, or if another check would refuse it.
+/// Request that starts a procedure. With `force`, the procedure runs even if another PC is on the bus or another check would refuse it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
@@ -58,7 +58,7 @@ pub enum Request {
         mask: u8,
         /// Second byte of PC_SETSTATUS.
         value: u8,
-        /// See above. With `force`, the command is also sent if control loops run.
+        /// See above. With `force`, the command is sent even if control loops run.
         force: bool,
     },
     /// Sends PC_RESET.

@@ -29,7 +29,7 @@ pub struct RunOptions {
     pub boards: Vec<RunBoard>,
     /// `true` to enable the outputs at the end.
     pub active: bool,
-    /// Permission to run if the bus load would be too high or another PC is on the bus.
+    /// Permission to run even if the bus load would be too high or another PC is on the bus.
     pub force: bool,
 }
 

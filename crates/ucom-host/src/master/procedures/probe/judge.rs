@@ -141,7 +141,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         seen.infos.len()
     );
     let value = broadcast.map(|b| b.to_string());
-    // The number 0 is evaluated after the broadcast number, because 0 cannot be both the broadcast number and the first board's number.
+    // Determined after the broadcast number, because 0 cannot be both the broadcast number and the number of the first board.
     let first = if seen.zero_answers {
         Some("0")
     } else {

@@ -54,9 +54,9 @@ pub(super) async fn one(
     Ok(())
 }
 
-/// Starts the exloader, with programming enabled, of a board that has been checked.
+/// Puts a board that has been checked into its exloader, with programming enabled.
 ///
-/// Reads the board before each XRESET, because another board may have received its number since the previous step.
+/// Reads the board before each XRESET, because another board may have its number since the check or the previous attempt.
 pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Result<(), Error> {
     let flash_number = session.flash_number(board);
     if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)

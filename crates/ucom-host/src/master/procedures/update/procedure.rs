@@ -120,8 +120,8 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
     Ok(())
 }
 
-/// The update ends early. If this PC is already the master, ends the programming mode of the boards that were in this mode. If this PC is
-/// not the master, it may not send frames to these boards (D-08), so they are reported.
+/// The update ends early. If this PC is already the master, ends the programming mode of boards that were found in it. If this PC is not
+/// the master, it may not send frames to these boards (D-08), so they are reported.
 async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
     while let Some(board) = session.programming.first().copied() {
         let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();

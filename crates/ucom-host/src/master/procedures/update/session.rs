@@ -15,7 +15,7 @@ pub(super) enum Stage {
     Untouched,
     /// Frames that erase the memory were sent, and the board may have received them.
     MaybeErased,
-    /// The board received the command to erase its memory.
+    /// The board was commanded to erase its memory.
     Erased,
     /// The board reported that the program is written.
     Written,
@@ -27,9 +27,9 @@ pub(super) enum Stage {
 pub(super) struct UpdateSession {
     pub options: UpdateOptions,
     pub results: Vec<UpdateResult>,
-    /// Boards that received an XRESET and whose update has not ended.
+    /// Boards to which an XRESET was sent and whose update has not ended.
     pub active: Vec<u8>,
-    /// Board that received the command to start its application.
+    /// Board that is commanded to start its application.
     pub starting: Option<u8>,
     /// Boards that already show the program and will be started at the end.
     pub to_start: Vec<u8>,
@@ -127,7 +127,7 @@ impl UpdateSession {
         self.fail(board, failure);
     }
 
-    /// Records a cancel by the user. If the board received a start command and is not known to be stopped, it may be running.
+    /// Records a cancel by the user. If a start command was sent to the board and it is not known to be stopped, it may be running.
     pub(super) fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
         let started = self.starting == Some(board);

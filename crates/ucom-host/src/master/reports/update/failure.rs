@@ -77,7 +77,7 @@ pub enum UpdateFailure {
     /// The board shows the program, but the application did not start.
     #[error("the board shows the program, but the start failed: {0}")]
     NotRunning(Box<Error>),
-    /// The board already showed the program, but it was in programming mode and did not leave this mode.
+    /// The board already showed the program, but it was in programming mode, and this mode could not be ended.
     #[error("the board already shows the program, but may still be in programming mode: {0}")]
     StillProgramming(Box<Error>),
     /// A step failed after memory was erased.

@@ -63,14 +63,14 @@ pub struct UpdateOptions {
     pub mode: UpdateMode,
     /// `true` to perform only the checks, including the check for another PC. Only queries are sent.
     pub dry_run: bool,
-    /// Permission to update if boards are running (U-2), if another PC is on the bus, or if the board already shows the program (U-3).
+    /// Permission to update even if boards are running (U-2), another PC is on the bus, or the board already shows the program (U-3).
     pub force: bool,
-    /// Permission to update if the board already shows the program (U-3). Other checks still apply.
+    /// Permission to update even if the board already shows the program (U-3). Other checks still apply.
     pub rewrite: bool,
     /// `true` to start the application at the end.
     pub start: bool,
-    /// `true` to accept an image that cannot be verified: with plan `raw`, or with `prog.header` or `prog.checksum` `none`, and without
-    /// [`expect_program_id`](Self::expect_program_id). The value also applies to a board that already shows the program but whose flash
+    /// `true` to report no failure for an image that cannot be verified: with plan `raw`, or with `prog.header` or `prog.checksum` `none`,
+    /// and without [`expect_program_id`](Self::expect_program_id). This also applies to a board that already shows the program but whose flash
     /// content is not known (D-62).
     pub accept_unverified: bool,
     /// `true` to continue with the next board after a failure.

@@ -102,8 +102,8 @@ impl UpdateReport {
         is_shown.then(|| format!("flashed {}", date_text(profile, before.date)))
     }
 
-    /// Returns the outcome of a board in words. If the board keeps another date, the text contains the date: `up-to-date (flashed
-    /// 2026-11-25)` (U-3).
+    /// Returns the outcome of a board in words. If the board keeps another date, the text contains the date, as in
+    /// `up-to-date (flashed 2026-11-25)` (U-3).
     pub fn outcome_words(&self, result: &UpdateResult, profile: &Profile) -> String {
         let name = result.outcome.name();
         self.flashed(result, profile).map_or_else(|| name.into(), |flashed| format!("{name} ({flashed})"))

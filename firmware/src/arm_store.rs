@@ -3,7 +3,7 @@
 //!
 //! At the start [`load`] finds the newest complete image and copies it into memory, before the first tick. When a host
 //! requests a store, the tick passes an image to [`begin`] and reads the result with [`progress`]. The loop that
-//! serves the links stores the image, one small step per pass ([`Store::step`]). Code does not wait for the flash, and
+//! serves the links stores the image, one small step per pass ([`Store::step`]). No code waits for the flash, and
 //! interrupts are delayed by at most a few instructions.
 //!
 //! `jtc_core::slots` defines the contents of the slots and the order of the steps; [`bank2`] operates the flash itself.

@@ -143,7 +143,8 @@ pub fn log(boot: &Boot) {
     }
 }
 
-/// Brings the arm into a safe state, writes the failure record, and resets the processor. Interrupts stay disabled.
+/// Drives the safety output to 0, writes the failure record, sends zero torque to the drives if the bus still works, and
+/// resets the processor. Interrupts stay disabled.
 fn end(words: LastWords) -> ! {
     cortex_m::interrupt::disable();
     board::safety_output_low();

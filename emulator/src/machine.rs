@@ -62,7 +62,7 @@ impl Machine {
         self.register(RegisterARM::PC)
     }
 
-    /// Returns `true` if the core is in lock-up because a fault occurred in a fault handler.
+    /// Returns `true` if the core is in lock-up because a fault occurred in HardFault or while FAULTMASK was set.
     pub fn locked_up(&self) -> bool {
         self.sleep == Sleep::Lockup
     }

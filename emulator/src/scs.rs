@@ -207,7 +207,7 @@ impl Scs {
             return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
         };
         let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
-        // The region is strongly ordered memory or device memory. This code does not distinguish read-only memory.
+        // `true` for strongly ordered memory and device memory. This code does not distinguish read-only memory.
         let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
         Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
     }

@@ -175,8 +175,8 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
     }
 }
 
-/// J-03, J-07: noise of any kind causes exactly one record. Frames after the noise are not lost, with or without a
-/// gap.
+/// J-03, J-07: noise of any kind causes only one or two error records. Frames after the noise are not lost, with or
+/// without a gap.
 #[test]
 fn j03_noise_costs_no_frame_that_follows() {
     let mut rig = Rig::new(BOARDS[0]);

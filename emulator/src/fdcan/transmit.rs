@@ -95,8 +95,8 @@ impl Fdcan {
         match outcome {
             Outcome::NoAcknowledge => {
                 self.last_error(lec::ACK);
-                // If a frame is not acknowledged, an error-passive node does not increase its error counter,
-                // because no other node may be connected.
+                // If a frame is not acknowledged, an error-passive node does not increase its error counter, because it
+                // may be the only node on the bus.
                 if self.tec < 128 {
                     self.tec += 8;
                 }

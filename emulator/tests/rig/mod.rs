@@ -111,7 +111,7 @@ impl Rig {
         let ms = self.board.now_ms();
         let resets = self.board.machine.chip().observers.resets.clone();
         for reset in &resets[self.resets..] {
-            // The program restarts. The shadow controller restarts, too, but the log continues.
+            // The program restarts. Everything that runs in parallel restarts, too, except the log.
             if let Some(shadow) = self.shadow.take() {
                 self.log = shadow.into_log();
             }

@@ -44,7 +44,7 @@ pub struct Response {
     pub frame_type: u8,
     /// Result of the reception of the frame.
     pub status: FrameStatus,
-    /// Result of the check of the frame data; Idle unless `status` is NoError.
+    /// Result for the data of the frame; Idle unless `status` is NoError.
     pub data: DataStatus,
     /// Number of received bytes; 0 if unknown.
     pub length: u16,

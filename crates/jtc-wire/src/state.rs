@@ -31,13 +31,13 @@ states! {
         /// Set-up is not complete.
         #[default]
         Start = 0;
-        /// The controller enables the nodes and waits for parameters. The torque is zero.
+        /// The controller brings the nodes to ReadyToOperate and waits for parameters. The torque is zero (J-20).
         Init = 1;
         /// Holds a position.
         HoldPos = 2;
         /// Follows the trajectory.
         Operate = 3;
-        /// Compensates gravity and the estimated load, and damps the joints, so that the operator can guide the arm by hand.
+        /// Compensates gravity and the load found, and damps the joints, so that the operator can guide the arm by hand.
         Teaching = 4;
         /// The torque is zero until the cause has ended and the host has cleared the error.
         Error = 5;

@@ -7,8 +7,8 @@
 //! From the position of the frame in the stream, the controller detects that the command has already taken effect. An Execute that was
 //! received before the command must no longer be executed.
 //!
-//! A disadvantage is that these seven bytes in the body of another frame also stop the arm. This error is safe, because the arm stops. In a body of
-//! random bytes, the probability of this error is 2⁻⁵⁶ per position.
+//! A disadvantage is that these seven bytes in the body of another frame also stop the arm. This error is on the safe side, because the arm
+//! stops. In a body of random bytes, the probability of this error is 2⁻⁵⁶ per position.
 use crate::command::ExecCommand;
 use crate::fixed;
 
@@ -106,7 +106,7 @@ struct Tail {
     /// Stream position at which the last of these commands ended.
     hit: u64,
     /// Number of bytes that had been received on this line when the last urgent command of any line arrived. A frame that began before
-    /// this position is older than the urgent command.
+    /// this position counts as older than the urgent command.
     overtaken: u64,
 }
 

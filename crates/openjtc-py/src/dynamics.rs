@@ -69,7 +69,7 @@ impl Dynamics {
         Ok(array::as_given(py, &torques, states.one))
     }
 
-    /// Computes joint accelerations. If `rotors` is set, the torques include the rotor inertias of the arm.
+    /// Computes joint accelerations. If `rotors` is set, the rotor inertias of the arm are included.
     fn forward<'py>(
         &self,
         py: Python<'py>,

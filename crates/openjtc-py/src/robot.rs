@@ -173,7 +173,7 @@ impl Link {
         self.worker.now().unwrap_or_default()
     }
 
-    /// Discards all earlier requests and stops the motion of this connection. Does not wait for standstill.
+    /// Discards all earlier requests and stops the motion of this connection. Does not wait.
     fn halt(&self) {
         self.worker.halt();
     }

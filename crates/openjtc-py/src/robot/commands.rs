@@ -106,7 +106,8 @@ impl WorkerState {
         self.session.settle_for_jog_until(|| asked.is_halted())?;
         let end = self.session.now() + time;
         let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // When the jog ends for any reason, the arm is stopped at once, without waiting for the jog timeout of the controller.
+        // When the jog ends for any reason, the arm is brought to rest at once, without waiting for the jog timeout of
+        // the controller.
         let rested = self.session.jog_to_rest();
         if let Ok(Some(_)) = rested {
             self.shared.set_moves(false);

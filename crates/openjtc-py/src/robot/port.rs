@@ -132,7 +132,7 @@ impl AnyPort {
         }
     }
 
-    /// Writes a Stop frame for each new Stop that must stop every motion. For other Stops, a frame is written only
+    /// Writes a Stop frame after a new Stop that must stop every motion. After other Stops, a frame is written only
     /// while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();

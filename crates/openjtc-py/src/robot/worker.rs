@@ -161,7 +161,7 @@ impl Worker {
         Ok(self.shared.queue.stops())
     }
 
-    /// Cancels all earlier requests and stops the motion of this connection. Does not wait for standstill.
+    /// Cancels all earlier requests and stops the motion of this connection. Does not wait.
     pub(super) fn halt(&self) {
         if !self.is_foreign() {
             self.shared.halt();

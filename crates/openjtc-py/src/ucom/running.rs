@@ -136,7 +136,7 @@ pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -
             let mut wanted = state.started();
             match state.driver.numbers_to_stop(&Boards::All) {
                 Ok(found) => wanted.extend(found),
-                // A board without a number cannot be running.
+                // A board without a number does not run.
                 Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) if !wanted.is_empty() => {}
                 Err(error) => return Err(error.into()),
             }

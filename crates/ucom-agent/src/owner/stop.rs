@@ -17,7 +17,7 @@ impl Worker {
         let mut not_stopped = Vec::new();
         match self.driver.numbers_to_stop(&Boards::All) {
             Ok(found) => wanted.extend(found),
-            // A board without a number cannot be running.
+            // A board without a number does not run.
             Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) => {}
             Err(error) => not_stopped.push(error.to_string()),
         }

@@ -416,7 +416,7 @@ fn a_client_that_sends_too_much_can_stop_the_arm_all_the_same() {
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
 }
 
-/// If a jog key is pressed during a Stop, the user must release the key before it can move the arm again.
+/// If a jog key is held down during a Stop, the user must release the key before it can move the arm again.
 #[test]
 fn who_goes_on_asking_for_a_jog_behind_a_stop_does_not_get_it() {
     let mut board = Board::new(115_200);
@@ -442,7 +442,8 @@ fn j04_a_stop_that_the_line_damages_is_sent_again_for_whoever_asked() {
     board.run_ms(2_000);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert!(board.line.is_idle());
-    // Many clients request a Stop or a Pause. The last command on the serial line is a Stop, and each client receives a response record.
+    // A viewer requests many Pauses before and after the Stop of another client. The last command on the serial line is a Stop, and the viewer
+    // receives a response record.
     for _ in 0..100 {
         board.send(viewer, &PAUSE);
     }

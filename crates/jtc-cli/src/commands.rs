@@ -1,4 +1,4 @@
-//! The commands. Implementation of the commands. Each command or family of commands has a separate file.
+//! Implementation of the commands. Each command or family of commands has a separate file.
 
 mod arm;
 mod bench;

@@ -35,7 +35,7 @@ impl LinkArgs {
     /// token. The inner error is the error of opening a serial port that no agent of this user owns.
     pub(crate) fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
-            // The agent does not answer, so a second attempt would fail too.
+            // The agent does not answer, so a second attempt would only take time.
             ErrorKind::NoLink => Err(error),
             _ => self.open_as(None, false).map_err(|_| error),
         })

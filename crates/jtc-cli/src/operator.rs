@@ -134,7 +134,8 @@ impl<'a> Operator<'a> {
                 (false, Some(_)) => self.out.note("moving"),
                 // The motion begins.
                 (_, None) if before.is_none() => {}
-                // Another program has paused the motion, or the controller has paused it because this program sent no frames (J-59).
+                // Another program has paused the motion, or the controller has paused it after a timeout without
+                // frames of this program (J-59).
                 (true, None) => {
                     self.out.note("paused; `jtc traj resume` resumes the motion, `jtc traj stop` ends it");
                 }

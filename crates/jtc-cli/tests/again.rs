@@ -142,7 +142,7 @@ fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
     moving_while(sim, &[&["traj", "run"], words].concat(), 1.0)
 }
 
-/// After a Stop by the user or a killed program, the remainder runs from the last recorded position.
+/// After a Stop by the user, or if the program was killed, the remainder runs from the last recorded position.
 #[test]
 fn a_run_that_was_broken_off_goes_on_where_it_was() {
     let sim = Sim::start(&["--no-throttle"]).held();

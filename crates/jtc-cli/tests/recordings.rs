@@ -64,7 +64,7 @@ fn a_simulator_that_is_ended_completes_its_recording() {
     assert!(!info["notes"].to_string().contains("completed"), "{info}");
 }
 
-/// If the recording program is killed during a motion, only the last 0.2 s can be missing in the recording.
+/// If the recording program is killed during a motion, the recording lacks only the last moments of the motion.
 #[test]
 fn a_run_that_is_killed_leaves_its_recording() {
     for name in ["run.mcap", "run.csv"] {

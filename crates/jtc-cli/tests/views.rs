@@ -37,7 +37,7 @@ fn j33_the_stop_key_of_the_view_stops() {
     assert!(terminal.is_as_before());
 }
 
-/// For every cause, the view ends at once and restores the terminal.
+/// For every cause of its end, the view ends at once and restores the terminal.
 #[test]
 fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     let sim = Sim::start(&["--no-throttle"]);

@@ -41,7 +41,8 @@ fn pump(rig: &mut Rig, on: bool) {
     rig.run(2);
 }
 
-/// Runs ticks and checks that the arm is not disturbed. The arm has no error and no change of state, and 19 of 20 ticks send a Move.
+/// Runs ticks and checks that the arm is not disturbed. The arm has no error and no change of state, and at most about one of 20 ticks
+/// sends another frame than Move.
 fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     let from = rig.sent.len();
     for _ in 0..ticks {

@@ -22,7 +22,7 @@ use crate::progress::Progress;
 
 /// Longest time for which a program does not accept Stops after it has opened the port, or before it closes the port.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
-/// Like [`CHANGES_HANDS`], for a port that a program of this user has used. The program may be waiting for the end of another Stop.
+/// Like [`CHANGES_HANDS`], for a port for which a program of this user has accepted Stops. The program may be waiting for the end of another Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Largest number of programs that may open the port one after another during one Stop.
 const OWNERS: usize = 16;

@@ -61,7 +61,7 @@ pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     };
     // The arm is stopped at once after every end of the jog, without waiting for the timeout of the controller.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // An error that has released the arm causes all other failures, so it is reported first.
+    // An error that has released the arm causes all other failures, and may be the only failure, so it is reported first.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
         // The controller refuses a jog during a held stop.

@@ -216,7 +216,7 @@ fn ready(session: &mut Session<LinkPort>, operator: &Operator) -> Result<Status,
 }
 
 impl Job {
-    /// Returns the options for the trajectory check on the controller.
+    /// Returns the options for the trajectory check of this job.
     fn options(&self, course: &Course) -> CheckOptions {
         let accept_device_limits = course.accepts_device_limits();
         CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() }

@@ -1,5 +1,5 @@
-//! Generates and checks the part of docs/troubles.md about `ucom`. The real program runs each case against `ucom
-//! sim`. `UPDATE_DOCS=1` rewrites that part.
+//! Generates and checks the part of docs/troubles.md about `ucom`. The real program runs each case against
+//! `ucom sim`. `UPDATE_DOCS=1` rewrites that part.
 #![cfg(target_os = "linux")]
 
 use crate::common;

@@ -25,7 +25,7 @@ pub(super) enum Act {
     ResetGripper,
     /// Frame that the host sends.
     Frame(&'static [u8]),
-    /// Frame that follows one byte of noise, and a byte of noise every 6 ms.
+    /// Frame directly after one byte of noise, and one more byte of noise every 6 ms.
     InNoise(&'static [u8]),
     /// Frame that follows thousands of short frames in the same millisecond.
     Behind(&'static [u8]),

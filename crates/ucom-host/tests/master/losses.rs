@@ -17,7 +17,8 @@ fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
 }
 
 /// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The later frames with this number show
-/// that a board has accepted it. If this conclusion were missing, boards that switch on their pin by themselves would get one number twice.
+/// that a board has accepted it. Without this conclusion, boards that switch on their pin by themselves would get the
+/// same number twice.
 #[test]
 fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     let profile = Profile { chain_auto_opinit: true, ..Profile::default() };

@@ -1,4 +1,4 @@
-//! Repair of one board's number (5.4). A repair with any losses never succeeds while two boards have one number.
+//! Repair of one board's number (5.4). After any losses, the repair never succeeds while two boards have the same number.
 
 use super::bench::Exit;
 use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};

@@ -231,7 +231,7 @@ fn d24_outputs_are_turned_off_on_both() {
     assert!((0..2).all(|i| !bench.board(i).application.running));
 }
 
-/// An init that assigns one number to two boards removes the number from both boards and reports this.
+/// An init that assigns the same number to two boards removes the number from both boards and reports this.
 #[test]
 fn d24_an_init_leaves_no_number_to_two_boards() {
     let mut bench = strapped([0x21, 0x42]);

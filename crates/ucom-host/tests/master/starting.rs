@@ -45,7 +45,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
     assert!(matches!(error, Error::Running(RunningError::Load(_))) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
-    // All boards have one program, and its description is known.
+    // All boards have the same program, and its description is known.
     assert_eq!(bench.count("301#"), 0, "nothing was started");
 
     let mut bench = initialised(&IDS);

@@ -158,7 +158,7 @@ impl Kinematics {
         }
     }
 
-    /// Returns an error with the distance by which a pose without a solution is out of reach.
+    /// Returns an error with the distance between the reach of the arm and a pose without a solution.
     fn missing(&self, goal: &Frame) -> PoseError {
         let least = |weights: [f64; 6], from: &JointVec| {
             search::descend(&self.chain, goal, *from, &Vector6::from(weights), 100)

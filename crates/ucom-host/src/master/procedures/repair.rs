@@ -172,7 +172,7 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The board works. The only missing step is to switch on its outgoing pin, so only the pin is set.
+        // The board works. Only its outgoing pin is missing, so the repair switches on this pin alone.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

@@ -45,7 +45,12 @@ fn forgotten(package: &Path) -> Result<Vec<PathBuf>> {
         let declaration = format!("mod {name};");
         let declares = |parent: &PathBuf| {
             let text = read_to_string(parent).unwrap_or_default();
-            text.lines().any(|line| line.trim_start_matches("pub ") == declaration)
+            let visibility = |line: &str| {
+                ["pub(crate) ", "pub(super) ", "pub "]
+                    .iter()
+                    .find_map(|word| line.strip_prefix(word).map(str::to_owned))
+            };
+            text.lines().any(|line| visibility(line).as_deref().unwrap_or(line) == declaration)
         };
         if !parents.iter().any(declares) {
             forgotten.push(file);

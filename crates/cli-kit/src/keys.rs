@@ -167,7 +167,9 @@ mod terminal {
 }
 
 #[cfg(not(unix))]
-pub use console::{Keys, restore};
+pub use console::Keys;
+#[cfg(not(unix))]
+pub(crate) use console::restore;
 
 #[cfg(not(unix))]
 mod console {
@@ -179,7 +181,7 @@ mod console {
     use super::Key;
 
     /// Does not do anything, because a console does not need another mode for single keys.
-    pub fn restore() {}
+    pub(crate) fn restore() {}
 
     /// Key input from the console.
     pub struct Keys(());

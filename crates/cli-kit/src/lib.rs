@@ -9,13 +9,13 @@ mod lines;
 mod output;
 pub mod output_file;
 pub mod pages;
-#[cfg(feature = "trial")]
+#[cfg(feature = "testing")]
 pub mod reference;
 mod screen;
 mod signal;
 mod size;
 mod stdout;
-#[cfg(feature = "trial")]
+#[cfg(feature = "testing")]
 pub mod testing;
 pub mod usage;
 pub mod variables;

@@ -6,7 +6,7 @@
 //! override a check have no variable, because a variable stays set for later commands in the shell. `audit` checks
 //! these rules for all options of a command line.
 
-#[cfg(feature = "trial")]
+#[cfg(feature = "testing")]
 pub mod audit;
 
 use std::collections::BTreeMap;
@@ -289,5 +289,5 @@ fn shown(value: &OsStr) -> String {
     text
 }
 
-#[cfg(all(test, feature = "trial"))]
+#[cfg(all(test, feature = "testing"))]
 mod tests;

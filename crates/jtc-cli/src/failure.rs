@@ -12,7 +12,7 @@ pub(crate) fn output_lost(failure: impl Into<Failure>) -> Failure {
 }
 
 /// Returns the failure of an interrupted recording. The data that was already written is kept.
-pub(crate) fn recording_broken_off(failure: impl Into<Failure>) -> Failure {
+pub(crate) fn recording_interrupted(failure: impl Into<Failure>) -> Failure {
     let message = format!("{}; the recording ends at this point", failure.into().message);
     Failure::new(ErrorKind::Fault, "output-lost", message).next(MAKE_ROOM)
 }

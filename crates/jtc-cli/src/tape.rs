@@ -1,6 +1,6 @@
 //! Recordings that are written during a motion.
 
-use crate::failure::recording_broken_off;
+use crate::failure::recording_interrupted;
 use std::fs::File;
 
 use cli_kit::output_file::{OutputFile, settle};
@@ -52,8 +52,8 @@ impl Tape {
     /// Completes the recording with the result of the run.
     pub(crate) fn finish(self, ending: &Ending) -> Result<(), Failure> {
         let Self { name, live, on_disk } = self;
-        live.finish(ending).map_err(recording_broken_off)?;
-        settle(&on_disk).map_err(|e| recording_broken_off(Failure::usage(format!("{name}: {e}"))))
+        live.finish(ending).map_err(recording_interrupted)?;
+        settle(&on_disk).map_err(|e| recording_interrupted(Failure::usage(format!("{name}: {e}"))))
     }
 
     /// Ends the recording without completing the file. The caller will start the file again.

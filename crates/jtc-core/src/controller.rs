@@ -54,7 +54,7 @@ pub struct Controller<M> {
     pub(crate) last_stop: LastStop,
     // Progress of the present host command, followed by other fields of the link to the host.
     pub(crate) slice_progress: SliceProgress,
-    pub(crate) overtaking: [Priority; HOST_LINES],
+    pub(crate) priorities: [Priority; HOST_LINES],
     pub(crate) uploads: [LineUpload; HOST_LINES],
     pub(crate) records: ResponseQueues,
     pub(crate) since_status_ms: u16,
@@ -86,7 +86,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             motion: Motion::default(),
             last_stop: LastStop::default(),
             slice_progress: SliceProgress::Begin,
-            overtaking: [Priority::default(); HOST_LINES],
+            priorities: [Priority::default(); HOST_LINES],
             uploads: [LineUpload::default(); HOST_LINES],
             records: ResponseQueues::new(),
             since_status_ms: 0,

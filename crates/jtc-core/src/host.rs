@@ -73,20 +73,20 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Executes Stop and Pause at once (J-04). The response records of Stop and Pause are sent later, when their frames are processed.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
         let stops = command == UrgentCommand::Stop;
-        self.overtaking.iter_mut().for_each(|overtaking| overtaking.stopped |= stops);
+        self.priorities.iter_mut().for_each(|priority| priority.stopped |= stops);
         if self.execute(command.into()).is_ok()
-            && let Some(overtaking) = self.overtaking.get_mut(line)
+            && let Some(priority) = self.priorities.get_mut(line)
         {
-            overtaking.accept(command, count);
+            priority.accept(command, count);
         }
     }
 
     /// Executes one event or a slice of the event. When the event is completed, its response record is queued.
     fn serve(&mut self, received: &HostEvent<'_>) -> Served {
-        let Some(overtaking) = self.overtaking.get_mut(received.line) else { return Served::Quickly };
+        let Some(priority) = self.priorities.get_mut(received.line) else { return Served::Quickly };
         let mut plain = received.plain;
         if !received.overtaken {
-            *overtaking = Priority::default();
+            *priority = Priority::default();
         }
         let (response, noise, served) = match received.event {
             LinkEvent::Bad(response) => (response, false, Served::Quickly),
@@ -101,7 +101,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         let mut computes = false;
                         let (progress, served) = match command {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
-                                (overtaking.overtaken(exec, self.trajectory).into(), Served::Quickly)
+                                (priority.overtaken(exec, self.trajectory).into(), Served::Quickly)
                             }
                             // The Jog was received before a Stop or a Pause that has already taken effect.
                             Command::Jog(_) if received.overtaken => {

@@ -59,7 +59,7 @@ fn along_the_steps(steps: &[Step]) -> Vec<f64> {
     let mut squares = vec![0.0; steps.len() + 1];
     for (i, step) in steps.iter().enumerate() {
         let next = squares[i] + 2.0 * step.length * step.fastest(squares[i]);
-        squares[i + 1] = next.clamp(0.0, highest[i + 1]);
+        squares[i + 1] = next.max(0.0).min(highest[i + 1]);
     }
     squares
 }
@@ -153,7 +153,7 @@ impl Step {
         let slope = -0.5 / self.length;
         let (to_next, to_rest) = (Line { at: -slope * next, by: slope }, Line { at: 0.0, by: slope });
         let mut square = self.cap;
-        for _ in 0..self.upper.len() + self.lower.len() {
+        for _ in 0..self.upper.len() + self.lower.len() + 2 {
             let at = |line: Line| (line.at + line.by * square, line);
             let (most, least) = (self.most(square), self.least(square));
             let most = if at(to_next).0 < most.0 { at(to_next) } else { most };

@@ -185,9 +185,6 @@ impl Link {
 
     /// Stops the motion and teaching of this connection, and closes the connection.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
-        if self.worker.is_closed() {
-            return Ok(());
-        }
         self.worker.end(py)
     }
 

@@ -766,3 +766,24 @@ def test_whatever_ends_a_task_stops_its_arm(live):
             await live.run_async(openjtc.example("motion"), repeat=0)
 
     asyncio.run(main())
+
+
+def test_a_closing_connection_takes_no_request_and_every_close_waits_for_its_end():
+    """No request begins after the Stop of ``close``, and a second ``close`` returns after standstill too."""
+    robot = openjtc.connect("sim:", speed=1.0)
+    motion = robot.start(openjtc.example("motion"), approach=True)
+    while motion.progress[0] != "motion":
+        time.sleep(0.01)
+    closing = threading.Thread(target=robot.close)
+    closing.start()
+    while not robot.is_closed:
+        time.sleep(0.001)
+    with pytest.raises(openjtc.NoLinkError) as refused:
+        robot.start(openjtc.example("motion"), approach=True)
+    assert refused.value.code == "closed"
+    # This returns only after the thread of the connection has ended, so the other call returns at once.
+    robot.close()
+    closing.join(timeout=5)
+    assert not closing.is_alive()
+    with contextlib.suppress(openjtc.StoppedError):
+        assert motion.wait().outcome == "stopped"

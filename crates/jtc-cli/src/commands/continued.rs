@@ -65,7 +65,7 @@ impl Left {
         let finished = recording.runs_finished(&first, &then);
         let behind = asked.unwrap_or(1).saturating_sub(finished);
         let current = if finished == 0 { first } else { then.clone() };
-        match recording.broken_off(&current) {
+        match recording.resume_point(&current) {
             Ok(broken) => Ok(Self { current: Some((current, broken)), then, runs: behind.saturating_sub(1) }),
             Err(NothingLeft::Finished) if behind > 0 => Ok(Self { current: None, then, runs: behind }),
             Err(error) => Err(Failure::nothing_sent(error)),

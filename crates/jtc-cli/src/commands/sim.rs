@@ -132,7 +132,7 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
 
 /// Returns an error, because pseudo-terminals exist only on Unix.
 #[cfg(not(unix))]
-pub fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
+pub(super) fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
     Err(Failure::usage("jtc sim needs pseudo-terminals, but this system has none")
         .next("use jtc demo, which needs no pseudo-terminal"))
 }

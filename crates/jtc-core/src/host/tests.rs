@@ -60,10 +60,10 @@ fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
     let before = Priority { stops: 2, pauses: 1, cancelled: true, stopped: true };
     for (overtaken, left) in [(true, before), (false, Priority::default())] {
         let mut controller = holding();
-        controller.overtaking = [before; HOST_LINES];
+        controller.priorities = [before; HOST_LINES];
         let event = LinkEvent::Bad(Response::bad(0, FrameStatus::IncorrectHeader, 0));
         controller.serve(&HostEvent { line: 1, overtaken, plain: false, event });
-        assert_eq!(controller.overtaking, [before, left]);
+        assert_eq!(controller.priorities, [before, left]);
     }
 }
 

@@ -31,7 +31,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         // The segment was received before a Stop that has taken effect.
         let stopped =
-            received.overtaken && self.overtaking.get(received.line).is_some_and(|before| before.stopped);
+            received.overtaken && self.priorities.get(received.line).is_some_and(|before| before.stopped);
         if first && !received.plain && stopped {
             self.store.refuse_rest();
             return SliceOutcome::Refused(DataStatus::NotAllowed);

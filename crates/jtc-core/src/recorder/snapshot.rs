@@ -88,7 +88,7 @@ pub(crate) struct Dynamic {
     safety_stop_ms: Option<u16>,
     motion: Motion,
     last_stop: LastStop,
-    overtaking: [Priority; HOST_LINES],
+    priorities: [Priority; HOST_LINES],
     uploads: [LineUpload; HOST_LINES],
     tick_overruns: TickOverruns,
     observed: Observed,
@@ -113,7 +113,7 @@ bit_codec!(Dynamic {
     safety_stop_ms,
     motion,
     last_stop,
-    overtaking,
+    priorities,
     uploads,
     tick_overruns,
     observed,
@@ -190,7 +190,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             motion,
             last_stop,
             slice_progress: _,
-            overtaking,
+            priorities,
             uploads,
             records: _,
             since_status_ms: _,
@@ -215,7 +215,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         safety_stop_ms.write(to);
         motion.write(to);
         last_stop.write(to);
-        overtaking.write(to);
+        priorities.write(to);
         uploads.write(to);
         tick_overruns.write(to);
         observed.write(to);
@@ -243,7 +243,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             safety_stop_ms,
             motion,
             last_stop,
-            overtaking,
+            priorities,
             uploads,
             tick_overruns,
             observed,
@@ -259,7 +259,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (self.trajectory, self.clock, self.phase) = (trajectory, clock, phase);
         (self.braking_ms, self.safety_stop_ms) = (braking_ms, safety_stop_ms);
         (self.motion, self.last_stop) = (motion, last_stop);
-        (self.overtaking, self.uploads) = (overtaking, uploads);
+        (self.priorities, self.uploads) = (priorities, uploads);
         (self.tick_overruns, self.observed) = (tick_overruns, observed);
         self.extensions.hosts_silent_ms = hosts_silent_ms;
         self.extensions.jogs_refused_ms = jogs_refused_ms;

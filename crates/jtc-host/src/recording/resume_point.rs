@@ -118,7 +118,7 @@ impl Recording {
     ///
     /// Returns [`NothingLeft`] if the run reached the end of the path, if the recording contains no run, or if the run is on another
     /// trajectory.
-    pub fn broken_off(&self, trajectory: &Trajectory) -> Result<ResumePoint, NothingLeft> {
+    pub fn resume_point(&self, trajectory: &Trajectory) -> Result<ResumePoint, NothingLeft> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
         let number = self.samples.iter().rposition(moving).ok_or(NothingLeft::NoExecution)?;
         let (last, behind) = (&self.samples[number], &self.samples[number + 1..]);
@@ -248,7 +248,7 @@ mod tests {
     fn the_last_sample_in_motion_counts() {
         use TrajectoryState::{Execute, Finish, Null, Pause, Stop};
         let of = |points: &[(u32, TrajectoryState)], outcome| {
-            recording(points, outcome).broken_off(&demo_motion())
+            recording(points, outcome).resume_point(&demo_motion())
         };
         let way = [(0, Execute), (40, Execute), (4_000, Execute)];
         let at = |last_ms| Ok(ResumePoint { last_ms });
@@ -264,11 +264,11 @@ mod tests {
         // The recorded points belong to another path.
         let mut approach = recording(&way, "fault");
         approach.samples[2].joints[1].set_position += 0.1;
-        assert_eq!(approach.broken_off(&demo_motion()), Err(NothingLeft::Other));
+        assert_eq!(approach.resume_point(&demo_motion()), Err(NothingLeft::Other));
         // If the recording contains this trajectory, the arm was moving to its first point.
         approach.info =
             Some(RecordingInfo { commanded: Some(Arc::new(demo_motion())), ..RecordingInfo::default() });
-        assert_eq!(approach.broken_off(&demo_motion()), at(0));
+        assert_eq!(approach.resume_point(&demo_motion()), at(0));
     }
 
     /// The function counts completed runs, but not the approaches between the runs. The first run may be the remainder of an interrupted
@@ -315,7 +315,7 @@ mod tests {
         // The remainder of a run is followed by two complete runs.
         let rest = joined(&[approach(), run(), part()], "stopped");
         assert_eq!(rest.runs_finished(&other, &demo), 2);
-        assert_eq!(rest.broken_off(&demo), Ok(ResumePoint { last_ms: 5_000 }));
+        assert_eq!(rest.resume_point(&demo), Ok(ResumePoint { last_ms: 5_000 }));
     }
 
     /// After a Stop, the point index of the controller is 0 again. The position of the arm at rest shows the progress.
@@ -333,19 +333,19 @@ mod tests {
         };
         let stood = |last: u32, ms: u32| stopped(last, path.at_ms(ms).unwrap().position[0]);
         for ms in [3_400, 3_580, 3_700, 4_200] {
-            let found = stood(3_400, ms).broken_off(&path).unwrap().last_ms;
+            let found = stood(3_400, ms).resume_point(&path).unwrap().last_ms;
             assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
         }
         // The path has reversed its direction before the Stop, so the arm is at an earlier position. In this case the reversal is executed
         // again instead of being skipped.
-        assert!(stood(4_900, 5_100).broken_off(&path).unwrap().last_ms < 4_920);
+        assert!(stood(4_900, 5_100).resume_point(&path).unwrap().last_ms < 4_920);
         // If the arm is elsewhere on the path, away from the path, or without torque, its position does not prove the progress.
         let elsewhere = stood(3_400, 12_000);
         let (mut beside, mut error) = (stood(3_400, 3_700), stood(3_400, 3_700));
         beside.samples[2].joints[3].position += 0.05;
         error.samples[2].errors = 1;
         for recording in [elsewhere, beside, error] {
-            assert_eq!(recording.broken_off(&path), Ok(ResumePoint { last_ms: 3_400 }));
+            assert_eq!(recording.resume_point(&path), Ok(ResumePoint { last_ms: 3_400 }));
         }
     }
 

@@ -58,7 +58,7 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
 /// complete even if the run was interrupted.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
-    let note = match recording.broken_off(whole) {
+    let note = match recording.resume_point(whole) {
         Ok(broken) => format!(
             "the whole trajectory of the recording; the run reached {:.3} s of its {:.3} s, and `jtc traj continue` runs only the remainder",
             f64::from(broken.last_ms) * 1e-3,

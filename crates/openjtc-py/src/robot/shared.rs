@@ -86,9 +86,9 @@ impl Shared {
         self.ended.load(Ordering::SeqCst)
     }
 
-    /// Ends the thread after its current request.
-    pub(crate) fn end(&self) {
-        self.ended.store(true, Ordering::SeqCst);
+    /// Ends the thread after its current request. Returns `true` for the first call.
+    pub(crate) fn end(&self) -> bool {
+        !self.ended.swap(true, Ordering::SeqCst)
     }
 
     pub(crate) fn moves(&self) -> bool {

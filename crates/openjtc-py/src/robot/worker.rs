@@ -276,23 +276,27 @@ impl Worker {
         Ok(())
     }
 
-    /// Takes no further requests, stops the motion and the teaching of this connection, waits for standstill, and ends the connection. A
-    /// signal ends the wait.
+    /// Takes no further requests, stops the motion and the teaching of this connection, waits for standstill, and ends the connection.
+    /// Requests that wait are refused, except Stops. A signal ends the wait. A second caller only waits.
     pub(super) fn end(&self, py: Python<'_>) -> PyResult<()> {
-        if self.is_foreign() {
+        if self.is_foreign() || self.shared.is_gone() {
             return Ok(());
         }
         // The flag is set before the Stop, so that a request cannot begin after the Stop.
-        self.shared.end();
-        let came = self.overtake(WorkerState::rest)?;
-        let rested = self.wait(py, came);
-        let Some(thread) = lock(&self.thread).take() else { return Ok(rested??) };
-        while !thread.is_finished() {
+        let rested = match self.shared.end() {
+            true => {
+                self.overtake(WorkerState::rest).map_err(PyErr::from).and_then(|came| self.wait(py, came))
+            }
+            false => Ok(Ok(())),
+        };
+        while !lock(&self.thread).as_ref().is_none_or(JoinHandle::is_finished) {
             py.detach(|| std::thread::sleep(Duration::from_millis(2)));
             py.check_signals()?;
         }
-        // The thread itself has already reported its panic.
-        let _ = thread.join();
+        if let Some(thread) = lock(&self.thread).take() {
+            // The thread itself has already reported its panic.
+            let _ = thread.join();
+        }
         Ok(rested??)
     }
 

@@ -7,7 +7,7 @@ use std::io::{Seek, Write};
 use cli_kit::{Failure, OutputFile};
 use jtc_host::waypoints::{self, thinned};
 
-use crate::failure::recording_broken_off;
+use crate::failure::recording_interrupted;
 
 /// Largest movement at which the arm counts as at rest, rad.
 const STILL: f64 = 0.002;
@@ -91,7 +91,7 @@ impl TaughtFile {
         };
         let Some(file) = &mut self.file else { return Ok(()) };
         let done = file.write_all(&self.text.as_bytes()[fresh..]);
-        done.map_err(|e| recording_broken_off(Failure::usage(format!("{}: {e}", self.name))))
+        done.map_err(|e| recording_interrupted(Failure::usage(format!("{}: {e}", self.name))))
     }
 
     fn row(&mut self, slot: i64, position: [f64; 6]) {
@@ -136,7 +136,8 @@ impl TaughtFile {
             }
             Ok(())
         };
-        settle().map_err(|e: std::io::Error| recording_broken_off(Failure::usage(format!("{name}: {e}"))))?;
+        settle()
+            .map_err(|e: std::io::Error| recording_interrupted(Failure::usage(format!("{name}: {e}"))))?;
         Ok(Some(text))
     }
 }

@@ -687,7 +687,7 @@ def test_a_program_that_keeps_the_motion_alone_stops_it_at_its_end(port: str):
 def test_a_child_process_leaves_the_connection_to_its_parent(tmp_path: Path):
     program = (
         "import os, time, openjtc\n"
-        "with openjtc.connect('sim:', speed=5.0) as robot:\n"
+        "with openjtc.connect('sim:', speed=1.0) as robot:\n"
         "    motion = robot.start(openjtc.example('motion'), approach=True)\n"
         "    while motion.progress[0] != 'motion': pass\n"
         "    child = os.fork()\n"

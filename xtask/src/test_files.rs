@@ -42,15 +42,11 @@ fn forgotten(package: &Path) -> Result<Vec<PathBuf>> {
             continue;
         }
         let (parents, name) = parents(&file, &tests, &programs).context("a test in no folder")?;
-        let declaration = format!("mod {name};");
+        let declarations =
+            ["", "pub ", "pub(crate) ", "pub(super) "].map(|visibility| format!("{visibility}mod {name};"));
         let declares = |parent: &PathBuf| {
             let text = read_to_string(parent).unwrap_or_default();
-            let visibility = |line: &str| {
-                ["pub(crate) ", "pub(super) ", "pub "]
-                    .iter()
-                    .find_map(|word| line.strip_prefix(word).map(str::to_owned))
-            };
-            text.lines().any(|line| visibility(line).as_deref().unwrap_or(line) == declaration)
+            text.lines().any(|line| declarations.iter().any(|declaration| declaration == line))
         };
         if !parents.iter().any(declares) {
             forgotten.push(file);

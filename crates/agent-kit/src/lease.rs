@@ -204,8 +204,7 @@ impl<P: Clone> Leases<P> {
         if held {
             self.hold(key, now);
         } else if let Some(lease) = &mut self.held {
-            // No other client waits: this was checked above.
-            let _ = lease.want(key.to_owned(), |_| false);
+            lease.wanted_by = Some(key.to_owned());
         }
         Ok((id, held))
     }
@@ -265,13 +264,16 @@ impl<P: Clone> Leases<P> {
 
     /// Returns the key of the client that waits for the lease, if this client is still registered and not silent.
     fn first(&self, now: Duration) -> Option<&String> {
-        self.held
-            .as_ref()?
-            .first(|key| self.clients.get(key).is_some_and(|client| client.presence().is_present(now)))
+        self.held.as_ref()?.first(|key| {
+            let client = self.clients.get(key);
+            client.is_some_and(|client| {
+                Presence { lasts: Some(client.lasts), seen: client.seen }.is_present(now)
+            })
+        })
     }
 
     fn pass_on(&mut self, held: &Lease<String>, now: Duration) {
-        self.held = held.next(|next| self.clients.get(next).map(|client| client.presence().lasts), now);
+        self.held = held.next(|next| self.clients.get(next).map(|client| Some(client.lasts)), now);
         // The new holder is treated as if it had just sent a request, so that the holder is not removed too early.
         let next = self.held.as_ref().and_then(|held| self.clients.get_mut(&held.holder));
         next.into_iter().for_each(|client| client.seen = now);
@@ -292,17 +294,11 @@ impl<P: Clone> Leases<P> {
     }
 
     fn hold(&mut self, key: &str, now: Duration) {
-        let Some(lasts) = self.clients.get(key).map(|client| client.presence().lasts) else { return };
+        let Some(lasts) = self.clients.get(key).map(|client| Some(client.lasts)) else { return };
         match &mut self.held {
             Some(held) if held.holder == key => held.renew(lasts, now),
             held => *held = Some(Lease::begin(key.into(), lasts, now)),
         }
-    }
-}
-
-impl<P> Client<P> {
-    fn presence(&self) -> Presence {
-        Presence { lasts: Some(self.lasts), seen: self.seen }
     }
 }
 

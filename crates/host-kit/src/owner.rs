@@ -119,9 +119,10 @@ impl<D, T: Clone> Queue<D, T> {
     }
 
     /// Like [`Queue::stop`], for a Stop that needs no function, for example because another program has already stopped
-    /// the device. [`Queue::refuse_late`] should follow.
-    pub fn count_stop(&self) -> u64 {
-        self.lock().count_stop()
+    /// the device. Also refuses the late requests, like [`Queue::refuse_late`].
+    pub fn count_stop(&self) {
+        self.lock().count_stop();
+        self.refuse_late();
     }
 
     fn overtake(&self, tag: T, act: Act<D>, alike: bool) -> u64 {

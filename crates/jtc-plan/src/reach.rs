@@ -1,5 +1,4 @@
 //! Time-optimal path parameterisation by reachability analysis (Pham and Pham 2018).
-
 use crate::cells::{Cell, End, Room};
 use crate::{ArmDynamics, JOINTS, Limits};
 
@@ -64,11 +63,18 @@ fn along_the_steps(steps: &[Step]) -> Vec<f64> {
     squares
 }
 
-/// Bound of s̈ that is linear in ṡ², with the value at + by·ṡ².
+/// Bound of s̈ that is linear in ṡ², with the value start + slope·ṡ².
 #[derive(Clone, Copy)]
 struct Line {
-    at: f64,
-    by: f64,
+    start: f64,
+    slope: f64,
+}
+
+impl Line {
+    /// Returns the bound at this ṡ².
+    fn at(&self, square: f64) -> f64 {
+        self.start + self.slope * square
+    }
 }
 
 /// Limits of ṡ² and s̈ from one point of the path to the next point.
@@ -110,36 +116,30 @@ impl Step {
                 }
                 if !negligible {
                     let bounds = if by_acceleration > 0.0 { &mut upper } else { &mut lower };
-                    bounds.push(Line { at: limit / by_acceleration, by: -by_speed / by_acceleration });
+                    bounds.push(Line { start: limit / by_acceleration, slope: -by_speed / by_acceleration });
                 }
             }
         }
         Self { length, cap, upper, lower }
     }
 
-    /// Returns the largest s̈ at this ṡ², and its bound. With an infinite s̈, no bound exists.
-    fn most(&self, square: f64) -> (f64, Line) {
-        let none = (f64::INFINITY, Line { at: f64::INFINITY, by: 0.0 });
-        self.upper
-            .iter()
-            .map(|line| (line.at + line.by * square, *line))
-            .fold(none, |a, b| if b.0 < a.0 { b } else { a })
+    /// Returns the upper bound that is lowest at this ṡ². `None` if s̈ has no upper bound.
+    fn most(&self, square: f64) -> Option<Line> {
+        self.upper.iter().copied().reduce(|a, b| if b.at(square) < a.at(square) { b } else { a })
     }
 
-    /// Returns the smallest s̈ at this ṡ², and its bound.
-    fn least(&self, square: f64) -> (f64, Line) {
-        let none = (f64::NEG_INFINITY, Line { at: f64::NEG_INFINITY, by: 0.0 });
-        self.lower
-            .iter()
-            .map(|line| (line.at + line.by * square, *line))
-            .fold(none, |a, b| if b.0 > a.0 { b } else { a })
+    /// Returns the lower bound that is highest at this ṡ². `None` if s̈ has no lower bound.
+    fn least(&self, square: f64) -> Option<Line> {
+        self.lower.iter().copied().reduce(|a, b| if b.at(square) > a.at(square) { b } else { a })
     }
 
     /// Returns the largest possible s̈ at this ṡ². If rounding has made it smaller than the smallest s̈, the bound with less rounding
     /// error has priority. The bound with less rounding error is the bound that depends less on ṡ².
     fn fastest(&self, square: f64) -> f64 {
-        let (most, least) = (self.most(square), self.least(square));
-        if most.0 < least.0 && least.1.by.abs() < most.1.by.abs() { least.0 } else { most.0 }
+        let Some(most) = self.most(square) else { return f64::INFINITY };
+        let crossed =
+            |least: &Line| most.at(square) < least.at(square) && least.slope.abs() < most.slope.abs();
+        self.least(square).filter(crossed).unwrap_or(most).at(square)
     }
 
     /// Returns the largest ṡ² from which a possible s̈ results in a squared speed between 0 and `next` at the next point.
@@ -151,17 +151,17 @@ impl Step {
             return self.cap.min(next);
         }
         let slope = -0.5 / self.length;
-        let (to_next, to_rest) = (Line { at: -slope * next, by: slope }, Line { at: 0.0, by: slope });
+        let (to_next, to_rest) = (Line { start: -slope * next, slope }, Line { start: 0.0, slope });
         let mut square = self.cap;
         for _ in 0..self.upper.len() + self.lower.len() + 2 {
-            let at = |line: Line| (line.at + line.by * square, line);
-            let (most, least) = (self.most(square), self.least(square));
-            let most = if at(to_next).0 < most.0 { at(to_next) } else { most };
-            let least = if at(to_rest).0 > least.0 { at(to_rest) } else { least };
-            if most.0 >= least.0 {
+            let most =
+                self.most(square).filter(|most| most.at(square) <= to_next.at(square)).unwrap_or(to_next);
+            let least =
+                self.least(square).filter(|least| least.at(square) >= to_rest.at(square)).unwrap_or(to_rest);
+            if most.at(square) >= least.at(square) {
                 break;
             }
-            let crossing = (most.1.at - least.1.at) / (least.1.by - most.1.by);
+            let crossing = (most.start - least.start) / (least.slope - most.slope);
             if crossing >= square {
                 // The rounding error is larger than the remaining difference.
                 break;

@@ -15,6 +15,7 @@ mod run;
 mod simulated;
 mod simulator;
 mod telemetry;
+mod threads;
 mod trajectory;
 mod ucom;
 mod wire;

@@ -25,13 +25,14 @@ use pyo3::types::PyDict;
 use crate::arm::Arm;
 use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
+use crate::threads::lock;
 use crate::trajectory::Trajectory;
 use crate::{array, number};
 use motion::{Course, Order};
 use motion_handle::Motion;
 pub(crate) use queries::samples as samples_of;
 use shared::{Asked, Wish};
-use worker::{Waited, Worker, lock};
+use worker::{Waited, Worker};
 use worker_state::{Simulated, Target, Way, WorkerState};
 
 /// Interval at which a waiting call checks for the next status of a motion.

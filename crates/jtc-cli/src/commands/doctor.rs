@@ -17,7 +17,7 @@ const LISTEN: Duration = Duration::from_secs(2);
 /// Listening time at each of the other bit rates.
 const TRY: Duration = Duration::from_millis(300);
 
-/// Checks the link, the bus and the set-up. The exit code is 0 if no problem was found, 3 if there is no link, and 1 for other problems.
+/// Checks the link, the bus and the set-up. The exit code is 0 without problems, 3 without a link, and 1 for other problems.
 pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));

@@ -60,7 +60,7 @@ impl Summary {
 pub(super) struct Figures {
     /// Times of the first and the last recorded sample.
     recorded: Option<(f64, f64)>,
-    /// Sums over the samples before an execution. If there is no execution, this includes all samples.
+    /// Sums over the samples before an execution. Without an execution, the sums include all samples.
     before: Sums,
     executed: Sums,
 }

@@ -20,7 +20,7 @@ pub(super) struct Watch {
     start_s: Option<f64>,
     in_motion: bool,
     /// First error before an execution, followed by the first error since the start of the execution. The error before an execution is used
-    /// only if there is no execution.
+    /// only without an execution.
     before: Option<Around>,
     since: Option<Around>,
 }

@@ -10,9 +10,9 @@ use jtc_host::{Error, LinkError, Port as _, PortError, StateError, labels};
 use jtc_wire::{ControllerState, TrajectoryState, fixed};
 
 use super::shared::Asked;
-use super::worker::lock;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
+use crate::threads::lock;
 
 /// Maximum time from a Stop to standstill. The arm needs 0.5 s, or 1 s if it brakes with full torque (J-33).
 const STANDSTILL: Duration = Duration::from_secs(5);

@@ -23,9 +23,9 @@ use super::port::AnyPort;
 use super::recording::Recording;
 use super::shared::{Asked, Progress, Shared};
 use super::tape::Tape;
-use super::worker::lock;
 use super::worker_state::{WorkerState, observe};
 use crate::error::Failure;
+use crate::threads::lock;
 
 /// Order for a run: the motion and its options.
 pub(crate) struct Order {

@@ -9,10 +9,11 @@ use pyo3::prelude::*;
 use super::Link;
 use super::motion::{Order, Ran};
 use super::shared::{Pending, Progress};
-use super::worker::{Waited, closed, lock};
+use super::worker::{Waited, closed};
 use crate::error::Failure;
 use crate::number;
 use crate::run::Samples;
+use crate::threads::lock;
 
 /// Check interval and number of checks after another thread has received the result.
 const LOOK: Duration = Duration::from_millis(2);

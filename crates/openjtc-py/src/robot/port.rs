@@ -12,7 +12,7 @@ use jtc_host::{Port, PortError};
 use jtc_wire::{FrameType, fixed};
 
 use super::shared::Shared;
-use super::worker::lock;
+use crate::threads::lock;
 
 /// Maximum duration of a read before it checks for a requested Stop.
 const LOOK: Duration = Duration::from_millis(10);

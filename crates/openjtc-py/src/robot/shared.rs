@@ -11,9 +11,9 @@ use jtc_host::session::Flow;
 use jtc_sim::World;
 use jtc_wire::Status;
 
-use super::worker::lock;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
+use crate::threads::lock;
 
 /// Disturbance of a simulated arm.
 pub(super) type Touch = Box<dyn FnOnce(&mut World) + Send>;
@@ -67,7 +67,6 @@ impl Shared {
     /// Cancels all earlier requests. The port then stops the motion of this connection.
     pub(crate) fn halt(&self) {
         self.queue.count_stop();
-        self.queue.refuse_late();
     }
 
     /// Announces a Stop that also stops the arm if another program moves it. The Stop itself must follow this call.

@@ -5,7 +5,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -17,16 +17,12 @@ use pyo3::prelude::*;
 use super::shared::{Asked, Shared};
 use super::worker_state::{Target, Way, WorkerState};
 use crate::error::Failure;
+use crate::threads::{Process, join, lock};
 
 /// Interval at which a waiting thread checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 /// Maximum wait for standstill after a Stop; a second Ctrl-C ends the wait.
 const STANDSTILL: Duration = Duration::from_secs(15);
-
-/// Locks a mutex, even after a panic, because the protected data is consistent after each statement.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// Result of a wait.
 pub(super) enum Waited<T> {
@@ -40,8 +36,7 @@ pub(super) enum Waited<T> {
 /// The connection's thread.
 pub(super) struct Worker {
     simulated: bool,
-    /// Process that opened the connection. A forked child process does not have the thread.
-    process: u32,
+    process: Process,
     /// Name of the port.
     pub port: String,
     pub shared: Arc<Shared>,
@@ -75,7 +70,7 @@ impl Worker {
         let thread = std::thread::Builder::new().name("openjtc".into()).spawn(body)?;
         let mut worker = Self {
             simulated,
-            process: std::process::id(),
+            process: Process::this(),
             port: String::new(),
             shared,
             thread: Mutex::new(Some(thread)),
@@ -100,14 +95,6 @@ impl Worker {
             }
             job(state, &asked)
         })
-    }
-
-    /// Like [`Self::ask`], for requests that a Stop does not cancel, because they only read data or end Teaching.
-    fn ask_always<T: Send + 'static>(
-        &self,
-        job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
-    ) -> Result<Receiver<Result<T, Failure>>, Failure> {
-        self.put(NEVER_LATE, job)
     }
 
     fn put<T: Send + 'static>(
@@ -170,7 +157,6 @@ impl Worker {
 
     /// Stops the arm, even if another program moves it, and waits for standstill. All earlier requests are cancelled.
     pub(super) fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        self.is_here()?;
         self.shared.will_stop_all();
         let came = self.overtake(WorkerState::stop)?;
         Ok(self.wait(py, came)??)
@@ -186,13 +172,13 @@ impl Worker {
         Ok(self.wait(py, came)??)
     }
 
-    /// Like [`Self::call`], for requests that a Stop does not cancel.
+    /// Like [`Self::call`], for requests that a Stop does not cancel, because they only read data or end Teaching.
     pub(super) fn call_always<T: Send + 'static>(
         &self,
         py: Python<'_>,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
-        let came = self.ask_always(job)?;
+        let came = self.put(NEVER_LATE, job)?;
         Ok(self.wait(py, came)??)
     }
 
@@ -289,20 +275,13 @@ impl Worker {
             }
             false => Ok(Ok(())),
         };
-        while !lock(&self.thread).as_ref().is_none_or(JoinHandle::is_finished) {
-            py.detach(|| std::thread::sleep(Duration::from_millis(2)));
-            py.check_signals()?;
-        }
-        if let Some(thread) = lock(&self.thread).take() {
-            // The thread itself has already reported its panic.
-            let _ = thread.join();
-        }
+        join(py, &self.thread)?;
         Ok(rested??)
     }
 
     /// Returns `true` if another process owns the connection.
     pub(super) fn is_foreign(&self) -> bool {
-        self.process != std::process::id()
+        !self.process.is_this()
     }
 
     /// Returns `true` if the connection does not accept further requests.
@@ -359,11 +338,13 @@ fn serve(state: &mut WorkerState) {
     while !shared.has_ended() || shared.queue.stop_waits() {
         let done = catch_unwind(AssertUnwindSafe(|| {
             match shared.queue.take() {
-                Some(turn) => turn.run(state),
+                Some(turn) => {
+                    turn.run(state);
+                    shared.queue.done();
+                }
                 None if state.time_passes() => state.idle(),
                 None => std::thread::park(),
             }
-            shared.queue.done();
             state.look();
         }));
         if done.is_err() {

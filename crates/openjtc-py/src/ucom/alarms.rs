@@ -7,8 +7,8 @@ use host_kit::ErrorKind;
 use ucom_host::master::{Error, IdentityError};
 use ucom_host::session::{Change, SessionError};
 
-use super::shared::lock;
 use crate::error::Failure;
+use crate::threads::lock;
 
 /// Alarms that were not raised yet: boards that were lost or have left their control loops, and other failures.
 #[derive(Default)]

@@ -10,10 +10,11 @@ use pyo3::prelude::*;
 use serde_json::Value;
 use ucom_host::session::Link;
 
-use super::shared::{Halt, Process, Shared, failure, fault, lock};
+use super::shared::{Halt, Shared, failure, fault};
 use super::worker_state::{Config, WorkerState};
 use crate::error::Failure;
 use crate::json;
+use crate::threads::{Process, join, lock};
 
 /// Interval of the checks for signals (Ctrl-C) while Python waits.
 pub(super) const LOOK: Duration = Duration::from_millis(50);
@@ -227,20 +228,7 @@ impl Owner {
             return Ok(Vec::new());
         }
         self.shared.end();
-        loop {
-            let over = py.detach(|| {
-                std::thread::sleep(Duration::from_millis(2));
-                lock(&self.thread).as_ref().is_none_or(JoinHandle::is_finished)
-            });
-            if over {
-                break;
-            }
-            py.check_signals()?;
-        }
-        if let Some(thread) = lock(&self.thread).take() {
-            // A panic of that thread was already printed.
-            drop(thread.join());
-        }
+        join(py, &self.thread)?;
         Ok(self.shared.take_left())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -12,8 +12,8 @@ use ucom::Profile;
 use ucom_host::files::recording::{RecordingError, RecordingFormat};
 use ucom_host::session::{Prompt, Recorder};
 
-use super::shared::Process;
 use crate::error::Failure;
+use crate::threads::{Process, lock};
 
 /// Interval at which the recorded frames are written to the file.
 const FLUSH: Duration = Duration::from_secs(1);
@@ -27,11 +27,11 @@ pub(super) struct Sink(Arc<Mutex<Option<Sender<Taken>>>>);
 
 impl Sink {
     fn is_taken(&self) -> bool {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+        lock(&self.0).is_some()
     }
 
     fn set(&self, sender: Option<Sender<Taken>>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = sender;
+        *lock(&self.0) = sender;
     }
 }
 
@@ -52,7 +52,7 @@ impl Tap {
     }
 
     fn take(&self, frame: &CanFrame) {
-        if let Some(sender) = &*self.sink.0.lock().unwrap_or_else(PoisonError::into_inner) {
+        if let Some(sender) = &*lock(&self.sink.0) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
             // An error is ignored: if the disk is full, the writer has ended and reports the error itself.
@@ -138,7 +138,7 @@ impl ChainRecording {
     }
 
     fn finish(&self) -> Result<Option<(u64, u64)>, Failure> {
-        let writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let writer = lock(&self.writer).take();
         let Some(writer) = writer.filter(|_| self.process.is_this()) else { return Ok(None) };
         self.sink.set(None);
         let written = writer.join().map_err(|_| failed("internal error of the writer"))?;

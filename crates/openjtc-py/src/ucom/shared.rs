@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use host_kit::ErrorKind;
@@ -14,6 +14,7 @@ use ucom_host::session::Known;
 use super::alarms::Alarms;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
+use crate::threads::lock;
 
 /// Maximum number of stored events; the newest event is the last one.
 const EVENTS_MAX: usize = 4096;
@@ -85,11 +86,6 @@ pub(super) struct Shared {
     seen: Mutex<Value>,
 }
 
-/// Locks a mutex, even after a panic of a thread, because the protected data is always consistent.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Makes a failure of the session itself.
 pub(super) fn failure(kind: ErrorKind, code: &'static str, message: &str, next: &'static str) -> Failure {
     Failure::new(kind, code, message).next(next)
@@ -97,21 +93,6 @@ pub(super) fn failure(kind: ErrorKind, code: &'static str, message: &str, next: 
 
 fn stopped() -> Failure {
     failure(ErrorKind::Fault, "cancelled", "the call was cancelled by a stop before it began", "")
-}
-
-/// Process that created an object. A forked child process has the memory of its parent, but none of its threads.
-pub(super) struct Process(u32);
-
-impl Process {
-    /// Returns the current process.
-    pub(super) fn this() -> Self {
-        Self(std::process::id())
-    }
-
-    /// Returns `true` in the process that created the object.
-    pub(super) fn is_this(&self) -> bool {
-        self.0 == std::process::id()
-    }
 }
 
 /// Returns the failure for a fault of the chain's thread.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -11,8 +11,8 @@ use pyo3::prelude::*;
 use ucom::Profile;
 use ucom_sim::{ChainConfig, ChainServer, ChainSim, Fault};
 
-use super::shared::Process;
 use crate::error::Failure;
+use crate::threads::{Process, lock};
 
 /// Maximum wait between two checks for requests of other programs.
 const LOOK: Duration = Duration::from_millis(10);
@@ -94,7 +94,7 @@ impl Simulated {
     /// Ends the chain and waits until its thread has ended.
     fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
-        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let thread = lock(&self.thread).take();
         if let Some(thread) = thread.filter(|_| self.process.is_this()) {
             // A panic of that thread was already printed.
             drop(thread.join());
@@ -148,7 +148,7 @@ impl SimulatedChain {
     fn fault(&self, line: &str) -> Result<(), Failure> {
         Fault::from_line(line)
             .map_err(|e| Failure::usage(e.to_string()).next("ucom help faults lists the faults"))?;
-        let sender = self.inner.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        let sender = lock(&self.inner.faults);
         sender.send(line.into()).map_err(|_| Failure::usage("the simulated chain has ended"))
     }
 

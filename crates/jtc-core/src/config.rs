@@ -1,10 +1,14 @@
 //! Settings of the controller.
+pub(crate) mod bounds;
+pub(crate) mod defaults;
+pub(crate) mod limits;
+
 use jtc_bus::{TORQUE_FULL_SCALE, config};
 use jtc_dynamics::Payload;
 
 use crate::JOINTS;
-use crate::bounds::ParameterBounds;
-use crate::limits::JointConfig;
+use crate::config::bounds::ParameterBounds;
+use crate::config::limits::JointConfig;
 
 /// Half of the drives' working area, in rad from zero in each direction (J-43).
 pub const WORKING_AREA: f64 = 2.9905;

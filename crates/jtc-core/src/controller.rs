@@ -1,7 +1,6 @@
 //! Memory and state changes of the controller (J-20 to J-25).
 use jtc_wire::{RawPoint, STATUS_LEN};
 
-use crate::check::{TrajectoryCheck, Violation};
 use crate::config::Config;
 use crate::errors::Errors;
 use crate::execution::phase::Phase;
@@ -13,12 +12,13 @@ use crate::host_parameters::HostParameters;
 use crate::last_stop::LastStop;
 use crate::motion::Motion;
 use crate::nodes::{Goal, Nodes};
-use crate::path::PathClock;
 use crate::response_queue::{HOST_LINES, ResponseQueues};
 use crate::states::{Conditions, next_state};
-use crate::store::Store;
 use crate::telemetry::Observed;
 use crate::tick_overruns::TickOverruns;
+use crate::trajectory::check::{TrajectoryCheck, Violation};
+use crate::trajectory::path::PathClock;
+use crate::trajectory::store::Store;
 use crate::{ControllerState, TrajectoryState};
 
 /// Joint trajectory controller. `M` is the memory for the trajectory, with space for [`crate::POINTS_MAX`] points.

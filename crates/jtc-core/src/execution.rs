@@ -3,11 +3,11 @@ pub(crate) mod phase;
 
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, StopCause, StopKind};
 
-use crate::check::PathRange;
 use crate::controller::Controller;
-use crate::hold_back::{HoldBack, Next};
 use crate::motion::{self, ControlMode, LawInputs};
-use crate::path::PathClock;
+use crate::motion::{HoldBack, HoldBackStep};
+use crate::trajectory::check::PathRange;
+use crate::trajectory::path::PathClock;
 use crate::{ControllerState, JOINTS, TrajectoryState, joint_error};
 use phase::Phase;
 
@@ -122,7 +122,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             _ => &self.clock,
         };
         let next = self.motion.hold_back.step(&pressed, clock);
-        if next == Next::Stop || lags.contains(&true) {
+        if next == HoldBackStep::Stop || lags.contains(&true) {
             let cause = |j: usize| match (lags[j], self.motion.hold_back.has_pressed(j)) {
                 (true, _) => joint_error::POSITION_ERROR,
                 (false, true) => joint_error::TORQUE,
@@ -130,7 +130,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             };
             let kind = if lags.contains(&true) { StopKind::PositionError } else { StopKind::Overload };
             self.hold_stop(&core::array::from_fn(cause), kind);
-        } else if next == Next::Restore {
+        } else if next == HoldBackStep::Restore {
             self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
         }
     }

@@ -10,8 +10,8 @@ use jtc_wire::StopKind;
 
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
+use crate::config::limits::JointConfig;
 use crate::interpolation::smooth;
-use crate::limits::JointConfig;
 use crate::parameters::PidGains;
 use crate::{DT, JOINTS};
 

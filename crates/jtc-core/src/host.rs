@@ -9,9 +9,8 @@ use jtc_wire::{
     UrgentCommand,
 };
 
-use crate::check;
+use crate::config::defaults;
 use crate::controller::Controller;
-use crate::defaults;
 use crate::errors::Errors;
 use crate::friction::celsius;
 use crate::host_parameters::{HostParameters, read_pid};
@@ -19,6 +18,7 @@ use crate::io::{HostEvent, Inputs};
 use crate::last_stop::LastStop;
 use crate::nodes::GRIPPER;
 use crate::parameters::PidGains;
+use crate::trajectory::check;
 use crate::{Config, ControllerState, JOINTS, TrajectoryState};
 use line_upload::LineUpload;
 use priority::Priority;

@@ -1,6 +1,7 @@
 //! Parameters received from the host: gains, model and friction. Each parameter is accepted completely or not at all (J-06).
 mod floats;
 mod frames;
+mod payload;
 
 pub(crate) use frames::read_pid;
 use jtc_dynamics::{ArmModel, Dynamics};
@@ -9,12 +10,12 @@ use jtc_wire::{DataStatus, missing_parameter};
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
-use crate::defaults;
+use crate::config::defaults;
 use crate::gains::{FeltInertia, POSES, Trial};
 use crate::host::slices::{SliceOutcome, SliceProgress};
+use crate::host_parameters::payload::{BlendState, PayloadBlend};
 use crate::motion::ControlParameters;
 use crate::parameters::{PidGains, TableOf};
-use crate::payload::{BlendState, PayloadBlend};
 
 /// Number of floats in the friction table of one joint. A tick checks or copies the table of one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;

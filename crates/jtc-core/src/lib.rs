@@ -3,14 +3,9 @@
 #![forbid(unsafe_code)]
 
 mod bit_codec;
-mod bounds;
-mod catch;
-pub mod check;
 mod commanded;
 mod config;
 mod controller;
-mod deceleration;
-mod defaults;
 #[cfg(test)]
 mod docs_check;
 mod errors;
@@ -18,23 +13,14 @@ mod execution;
 mod extension;
 pub mod friction;
 mod gains;
-mod held_stop;
-mod hold_back;
 mod host;
 mod host_parameters;
 mod interpolation;
 mod io;
-mod jog;
 mod last_stop;
-mod limits;
-mod load;
 mod motion;
 mod nodes;
-mod overspeed;
 mod parameters;
-mod path;
-mod payload;
-mod pid;
 mod reaction;
 pub mod recorder;
 mod report;
@@ -42,17 +28,14 @@ mod response_queue;
 mod safety_input;
 pub mod settings;
 pub mod slots;
-mod soft_end;
 mod states;
-mod store;
-mod teach;
 mod telemetry;
 mod tick;
 mod tick_overruns;
-mod yielding;
+mod trajectory;
 
-pub use bounds::{OutOfBounds, ParameterBounds};
-pub use check::{PathRange, TrajectoryCheck, Violation};
+pub use config::bounds::{OutOfBounds, ParameterBounds};
+pub use config::limits::JointConfig;
 pub use config::{Config, ConfigError, WORKING_AREA};
 pub use controller::Controller;
 pub use extension::{Identity, firmware_hash};
@@ -61,10 +44,10 @@ pub use interpolation::{SetPoint, interpolate, position_speed};
 pub use io::{BusState, HostEvent, Inputs, Outputs};
 pub use jtc_dynamics::Payload;
 pub use jtc_wire::{ControllerState, TrajectoryState, error, joint_error};
-pub use limits::JointConfig;
 pub use parameters::{Friction, Parameters, PidGains, TableOf};
 pub use response_queue::{HOST_LINES, RECORDS_MAX};
 pub use telemetry::{JointTelemetry, Telemetry};
+pub use trajectory::check::{self, PathRange, TrajectoryCheck, Violation};
 
 /// Number of joints of the arm.
 pub const JOINTS: usize = 6;

@@ -2,35 +2,49 @@
 //!
 //! Each part has its own state and runs one step per tick. [`Motion`] connects the parts, and applies a change of the controller's state to
 //! all of them.
+mod catch;
+mod deceleration;
+mod hold_back;
+mod jog;
 mod law;
 mod limiter;
+mod load;
+mod overspeed;
+mod pid;
 mod ramp;
 mod room;
 mod set_values;
+mod soft_end;
+mod teach;
 mod torque;
 mod transfer;
+mod yielding;
 
 use jtc_dynamics::Dynamics;
 
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
-use crate::catch::Catch;
 use crate::config::Config;
-use crate::deceleration::moves;
-use crate::hold_back::HoldBack;
 use crate::interpolation::SetPoint;
 use crate::nodes::Nodes;
-use crate::overspeed::OverSpeed;
 use crate::parameters::PidGains;
-use crate::path::PathClock;
-use crate::teach::Taught;
+use crate::trajectory::path::PathClock;
+use catch::Catch;
+use deceleration::moves;
+pub(crate) use hold_back::{HoldBack, HoldBackStep};
+pub(crate) use jog::LASTS_MS as JOG_LASTS_MS;
 use law::ControlLaw;
 pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
 pub(crate) use limiter::{Found, RUSH};
 use limiter::{Limited, Limiter};
+use overspeed::OverSpeed;
+#[cfg(test)]
+pub(crate) use pid::PidTorque;
 use ramp::PathRamp;
 use set_values::SetValues;
 pub(crate) use set_values::approach;
+use teach::Taught;
+pub(crate) use teach::too_fast;
 #[cfg(test)]
 pub(crate) use torque::JointTorque;
 #[cfg(test)]

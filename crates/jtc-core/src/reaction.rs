@@ -15,6 +15,8 @@
 //!
 //! The first row that applies to a joint is used. All reactions except releasing the arm and holding back path time end in a held stop
 //! (J-69). In a held stop, the arm is held, the cause is shown, and the arm does not move until the host clears the stop.
+mod held_stop;
+
 use jtc_wire::{RawPoint, StopCause, StopKind};
 
 use crate::controller::Controller;

@@ -124,8 +124,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 mod tests {
     use super::*;
     use crate::Config;
-    use crate::motion::JointTorque;
-    use crate::pid::PidTorque;
+    use crate::motion::{JointTorque, PidTorque};
 
     #[test]
     fn j40_j41_j42_telemetry_tells_every_part_of_a_torque() {

@@ -4,7 +4,7 @@ use jtc_dynamics::{Payload, PayloadError};
 use jtc_wire::SettingValue;
 
 use crate::JOINTS;
-use crate::bounds::OutOfBounds;
+use crate::config::bounds::OutOfBounds;
 use crate::config::{Config, ConfigError};
 
 mod table;

@@ -2,11 +2,11 @@
 use jtc_bus::Frame;
 use jtc_wire::{RawPoint, Response};
 
-use crate::check::PathRange;
 use crate::controller::Controller;
 use crate::interpolation::ROUNDING;
 use crate::io::{Inputs, Outputs};
 use crate::motion::{ControlMode, Found, LawInputs};
+use crate::trajectory::check::PathRange;
 use crate::{ControllerState, JOINTS, joint_error};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {

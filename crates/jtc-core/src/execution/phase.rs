@@ -1,7 +1,7 @@
 //! Phases of the execution of a trajectory.
 use crate::bit_codec::{BitCodec, BitSink, BitSource};
 use crate::motion::ControlMode;
-use crate::path::PathClock;
+use crate::trajectory::path::PathClock;
 use crate::{JOINTS, TrajectoryState};
 
 /// Phase of the execution in state Operate.

@@ -3,7 +3,7 @@ use jtc_wire::{BootCause, Hash, LogState, Name, Program, StoreState};
 
 use super::answers::Answers;
 use super::image::StoredArm;
-use crate::defaults;
+use crate::config::defaults;
 
 /// Request of a host to the recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ pub(crate) struct Extensions {
 impl Extensions {
     /// Refuses jogs after a jog was stopped, so that a key that is still held down causes no motion (J-58).
     pub(crate) fn refuse_jogs(&mut self) {
-        self.jogs_refused_ms = crate::jog::LASTS_MS;
+        self.jogs_refused_ms = crate::motion::JOG_LASTS_MS;
     }
 
     pub(crate) fn new() -> Self {

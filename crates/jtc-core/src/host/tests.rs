@@ -5,8 +5,8 @@ use std::vec::Vec;
 use jtc_wire::{FrameRef, FrameStatus, FrameType, Segment, missing_parameter};
 
 use super::*;
-use crate::check::TrajectoryCheck;
 use crate::nodes::Nodes;
+use crate::trajectory::check::TrajectoryCheck;
 use crate::{Config, HOST_LINES};
 
 type Bench = Controller<[RawPoint; 64]>;

@@ -2,9 +2,9 @@
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, Segment};
 
 use super::slices::{SliceOutcome, SliceProgress};
-use crate::check::{TrajectoryCheck, Violation};
 use crate::controller::Controller;
 use crate::io::HostEvent;
+use crate::trajectory::check::{TrajectoryCheck, Violation};
 use crate::{ControllerState, TrajectoryState};
 
 /// Highest number of ticks for checking a segment (J-36), and for copying a segment. Check, copy and response record together take less

@@ -6,13 +6,13 @@ use super::torque::JointTorque;
 use super::transfer::Transfer;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
-use crate::limits::{JointConfig, within};
-use crate::load::Load;
+use crate::config::limits::{JointConfig, within};
+use crate::motion::load::Load;
+use crate::motion::pid::{Pid, PidTorque};
+use crate::motion::teach::{LedJoint, Taught};
+use crate::motion::yielding::{Joint, Yield, Yielded};
 use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
-use crate::pid::{Pid, PidTorque};
-use crate::teach::{LedJoint, Taught};
-use crate::yielding::{Joint, Yield, Yielded};
 use crate::{JOINTS, friction, gains, joint_error};
 
 /// Speed in rad/s below which the torque that the integral finds in motion may be an error of the friction model. No load is learned from

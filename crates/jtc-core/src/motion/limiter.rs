@@ -2,7 +2,7 @@
 use super::law::{ControlLaw, ControlMode, LawInputs};
 use super::set_values::SetValues;
 use crate::bit_codec::bit_codec;
-use crate::limits::{self, Recent, Saturation, Turns};
+use crate::config::limits::{self, Recent, Saturation, Turns};
 use crate::{JOINTS, joint_error};
 
 /// Speed in rad/s above which a saturated torque along the motion is not considered part of a catch.

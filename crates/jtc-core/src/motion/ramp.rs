@@ -4,10 +4,10 @@ use jtc_dynamics::Dynamics;
 use super::law::ControlLaw;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
-use crate::deceleration::{STEEPEST_LED, moves};
 use crate::interpolation::SetPoint;
+use crate::motion::deceleration::{STEEPEST_LED, moves};
 use crate::nodes::Nodes;
-use crate::path::{Bounds, PathClock, SlopeBounds};
+use crate::trajectory::path::{Bounds, PathClock, SlopeBounds};
 use crate::{DT, JOINTS};
 
 /// Shares of the acceleration and torque limits that a pause, a stop or a resume may use. The remainder is for changes within a tick and

@@ -5,7 +5,8 @@ use jtc_dynamics::sqrt;
 
 use super::Motion;
 use super::law::{LawInputs, compensation};
-use crate::{JOINTS, jog};
+use crate::JOINTS;
+use crate::motion::jog;
 
 /// Highest share of a torque limit that an approach uses. The feedback of a fast approach needs up to a fifth of the limit.
 const APPROACH_TORQUE: f64 = 0.8;

@@ -1,14 +1,14 @@
 //! Set values (J-40 to J-44) of the held arm, of joints that come to rest, of the approach, and of the path.
 use crate::bit_codec::bit_codec;
-use crate::catch::Catch;
 use crate::commanded::Commanded;
 use crate::config::Config;
-use crate::deceleration::{Deceleration, moves};
+use crate::config::limits::JointConfig;
 use crate::interpolation::SetPoint;
-use crate::jog::Jog;
-use crate::limits::JointConfig;
+use crate::motion::catch::Catch;
+use crate::motion::deceleration::{Deceleration, moves};
+use crate::motion::jog::Jog;
 use crate::nodes::Nodes;
-use crate::path::PathClock;
+use crate::trajectory::path::PathClock;
 use crate::{DT, JOINTS};
 
 /// Commanded motion of the arm, including joints that have not come to rest yet. In HoldPos, [`hold`](Self::hold) steps the motion. In

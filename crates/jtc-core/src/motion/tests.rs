@@ -1,9 +1,9 @@
 //! Tests of the set values, of the position hold, and of joints that come to rest (J-40 to J-44).
 use super::*;
 use crate::DT;
-use crate::catch::Catch;
-use crate::deceleration::Deceleration;
 use crate::interpolation::SetPoint;
+use crate::motion::catch::Catch;
+use crate::motion::deceleration::Deceleration;
 
 /// Returns the motion of an arm that holds these joints.
 fn holding(joints: [bool; JOINTS]) -> Motion {

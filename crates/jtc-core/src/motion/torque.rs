@@ -1,6 +1,6 @@
 //! Parts of the torque of one joint.
 use crate::bit_codec::bit_codec;
-use crate::pid::PidTorque;
+use crate::motion::pid::PidTorque;
 
 /// Parts of one joint's torque, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -7,7 +7,7 @@ use super::node::Node;
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
-use crate::limits::JointConfig;
+use crate::config::limits::JointConfig;
 
 /// Number of ticks between two checks of the same joint. Each tick checks at most one joint.
 const PERIOD: u8 = 10;

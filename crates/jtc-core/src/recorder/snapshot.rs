@@ -17,11 +17,11 @@ use crate::host_parameters::HostParametersState;
 use crate::last_stop::LastStop;
 use crate::motion::Motion;
 use crate::nodes::Nodes;
-use crate::path::PathClock;
 use crate::response_queue::HOST_LINES;
-use crate::store::StoreState;
 use crate::telemetry::Observed;
 use crate::tick_overruns::TickOverruns;
+use crate::trajectory::path::PathClock;
+use crate::trajectory::store::StoreState;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
 /// Identity of the device, the arm and the trajectory of a snapshot.

@@ -1,12 +1,12 @@
 //! Tests of the parts of the control law, each in the control modes in which the part is active (section 6).
 use super::*;
 use crate::Parameters;
-use crate::catch::Catch;
-use crate::deceleration::Deceleration;
+use crate::motion::catch::Catch;
+use crate::motion::deceleration::Deceleration;
 use crate::motion::limiter::DRIVEN;
+use crate::motion::pid::PidTorque;
 use crate::motion::{Found, Motion};
 use crate::parameters::Friction;
-use crate::pid::PidTorque;
 
 /// Pose of a bent arm, in which gravity loads joint 2 with several tens of N·m.
 const POSE: [f64; JOINTS] = [0.1, 0.9, 0.4, -0.2, 0.3, 0.5];

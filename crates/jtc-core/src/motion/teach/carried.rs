@@ -5,10 +5,10 @@
 //! acts again. A load is removed permanently only if a motion without a hand cannot be explained otherwise.
 use crate::DT;
 use crate::bit_codec::bit_codec;
+use crate::config::limits::JointConfig;
 use crate::interpolation::smooth;
-use crate::limits::JointConfig;
-use crate::load::Load;
-use crate::soft_end::SOFT_END;
+use crate::motion::load::Load;
+use crate::motion::soft_end::SOFT_END;
 
 /// Speeds along the load (rad/s) at which the acting share begins to fall and at which it is zero. `DRIVES` is for a joint with little
 /// damping, which is fast before its speed is measured. `DAMPED` is added if the damping of the joint balances the load.
@@ -68,7 +68,7 @@ impl Carried {
     }
 
     /// Runs one tick. `balanced` is the share of the load that the damping of the joint balances. `depth` is the compression of the joint's
-    /// soft end in rad, like [`depth`](crate::soft_end::depth).
+    /// soft end in rad, like [`depth`](crate::motion::soft_end::depth).
     pub(super) fn step(&mut self, by_mass: f64, velocity: f64, balanced: f64, depth: f64) -> f64 {
         let whole = self.whole(by_mass);
         let along = if whole < 0.0 { -velocity } else { velocity };

@@ -6,7 +6,7 @@
 //! joint is at its torque limit any more.
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
-use crate::path::PathClock;
+use crate::trajectory::path::PathClock;
 
 /// Time for which the inertia of the arm is assumed to be constant, ms.
 const INERTIA_MS: u16 = 60;
@@ -44,7 +44,7 @@ bit_codec!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_m
 
 /// Result of one tick of `step`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Next {
+pub(crate) enum HoldBackStep {
     /// The path continues as before.
     Nothing,
     /// The path returns to its normal rate.
@@ -92,18 +92,18 @@ impl HoldBack {
     }
 
     /// Runs one tick on the path. `joints` is `true` for each joint at its torque limit. `clock` is the clock of the motion.
-    pub(crate) fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
+    pub(crate) fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> HoldBackStep {
         for (j, at_limit) in joints.iter().enumerate() {
             self.pressed |= u8::from(*at_limit) << j;
         }
         let stands = clock.rate < STANDS && clock.ramping();
         self.stands_ms = if stands { self.stands_ms.saturating_add(1) } else { 0 };
         if self.stands_ms > STANDS_MS {
-            return Next::Stop;
+            return HoldBackStep::Stop;
         }
         if !self.active {
             self.restores &= clock.ramping();
-            return Next::Nothing;
+            return HoldBackStep::Nothing;
         }
         let pressed = joints.contains(&true);
         self.since_ms = self.since_ms.saturating_add(1);
@@ -114,12 +114,12 @@ impl HoldBack {
             (self.pressed_ms, self.quiet_ms) = (0, self.quiet_ms.saturating_add(1));
         }
         if self.pressed_ms > PRESSED_MS || self.run_ms > RUN_MS {
-            Next::Stop
+            HoldBackStep::Stop
         } else if self.quiet_ms >= QUIET_MS {
             (self.active, self.restores) = (false, true);
-            Next::Restore
+            HoldBackStep::Restore
         } else {
-            Next::Nothing
+            HoldBackStep::Nothing
         }
     }
 }
@@ -158,11 +158,12 @@ mod tests {
         for pressed in [true, false, true] {
             assert_eq!(
                 hold_back.step(&[false, false, pressed, false, false, false], &going()),
-                Next::Nothing
+                HoldBackStep::Nothing
             );
         }
-        (1..QUIET_MS).for_each(|_| assert_eq!(hold_back.step(&[false; JOINTS], &going()), Next::Nothing));
-        assert_eq!(hold_back.step(&[false; JOINTS], &going()), Next::Restore);
+        (1..QUIET_MS)
+            .for_each(|_| assert_eq!(hold_back.step(&[false; JOINTS], &going()), HoldBackStep::Nothing));
+        assert_eq!(hold_back.step(&[false; JOINTS], &going()), HoldBackStep::Restore);
         assert!(!hold_back.is_active());
     }
 
@@ -170,7 +171,7 @@ mod tests {
     fn j75_what_lasts_too_long_in_one_go_or_in_a_run_is_a_stop() {
         let mut hold_back = HoldBack::default();
         hold_back.begin();
-        let after = (1..1_000).find(|_| hold_back.step(&PRESSED, &going()) == Next::Stop);
+        let after = (1..1_000).find(|_| hold_back.step(&PRESSED, &going()) == HoldBackStep::Stop);
         assert_eq!(after, Some(PRESSED_MS + 1));
         let mut hold_back = HoldBack::default();
         let mut ms = 0;
@@ -178,11 +179,11 @@ mod tests {
             hold_back.begin();
             ms += 1;
             match hold_back.step(&[ms % 100 < 50; JOINTS], &going()) {
-                Next::Nothing => {}
+                HoldBackStep::Nothing => {}
                 next => break next,
             }
         };
-        assert_eq!((next, ms), (Next::Stop, RUN_MS + 1));
+        assert_eq!((next, ms), (HoldBackStep::Stop, RUN_MS + 1));
     }
 
     #[test]
@@ -190,12 +191,13 @@ mod tests {
         for (rate, stops) in [(0.0, true), (0.03, false)] {
             let mut hold_back = HoldBack::default();
             hold_back.begin();
-            let next = (0..5_000).find(|_| hold_back.step(&[false; JOINTS], &at(rate)) == Next::Stop);
+            let next = (0..5_000).find(|_| hold_back.step(&[false; JOINTS], &at(rate)) == HoldBackStep::Stop);
             assert_eq!(next, stops.then_some(u32::from(STANDS_MS)), "{rate}");
         }
         let mut hold_back = HoldBack::default();
         hold_back.begin();
-        (0..QUIET_MS).for_each(|_| assert_ne!(hold_back.step(&[false; JOINTS], &going()), Next::Stop));
+        (0..QUIET_MS)
+            .for_each(|_| assert_ne!(hold_back.step(&[false; JOINTS], &going()), HoldBackStep::Stop));
         assert!(hold_back.is_watched());
         hold_back.step(&[false; JOINTS], &PathClock::start(1.0));
         assert!(!hold_back.is_watched(), "it has its pace again");

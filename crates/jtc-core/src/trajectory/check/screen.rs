@@ -132,8 +132,8 @@ impl SpeedRange {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::PathRange;
     use crate::config::Config;
+    use crate::trajectory::check::PathRange;
 
     /// Without this margin, an interval that the exact check refuses could pass the quick part because of rounding.
     #[test]

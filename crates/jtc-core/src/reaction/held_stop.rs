@@ -4,7 +4,7 @@ use jtc_wire::{DataStatus, ExecCommand, RawPoint, Reactions, StopCause, StopKind
 use crate::controller::Controller;
 use crate::last_stop::LastStop;
 use crate::motion::RUSH;
-use crate::teach::too_fast;
+use crate::motion::too_fast;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
 /// Returns this `error` for each joint of a mask.

@@ -5,9 +5,9 @@ use jtc_dynamics::sqrt;
 
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
+use crate::config::limits::JointConfig;
 use crate::interpolation::SetPoint;
-use crate::limits::JointConfig;
-use crate::path::PathClock;
+use crate::trajectory::path::PathClock;
 use crate::{DT, JOINTS};
 
 /// Time without a new command after which the joints come to rest, ticks.
@@ -231,7 +231,7 @@ mod tests {
     extern crate std;
 
     use super::*;
-    use crate::limits::check_set;
+    use crate::config::limits::check_set;
     use crate::motion::Ramp;
     use proptest::prelude::*;
 

@@ -2,8 +2,8 @@
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::bit_codec::bit_codec;
-use crate::check::{Passed, SpeedRange, Violation};
 use crate::interpolation::{SetPoint, Step};
+use crate::trajectory::check::{Passed, SpeedRange, Violation};
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 /// Share of a step before a point. A time within this share is treated as the time of the point.

@@ -11,8 +11,8 @@ use jtc_dynamics::Dynamics;
 
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
+use crate::config::limits::JointConfig;
 use crate::interpolation::smooth;
-use crate::limits::JointConfig;
 use crate::{DT, JOINTS};
 use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};

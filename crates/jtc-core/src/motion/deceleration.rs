@@ -3,8 +3,8 @@
 use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
+use crate::config::limits::JointConfig;
 use crate::interpolation::smooth;
-use crate::limits::JointConfig;
 
 /// Highest speed at which a joint is considered at rest, rad/s.
 const STANDING: f64 = 0.02;

@@ -8,9 +8,9 @@
 //! A joint that lowers a load has no spring. The damper alone lets the load sink slowly, at any torque within the limit. The torque that
 //! the damper needs becomes part of the load, so a load that the limit can hold comes to rest.
 use crate::bit_codec::bit_codec;
-use crate::limits::{JointConfig, within};
-use crate::pid::PidTorque;
-use crate::soft_end;
+use crate::config::limits::{JointConfig, within};
+use crate::motion::pid::PidTorque;
+use crate::motion::soft_end;
 use crate::{DT, JOINTS};
 
 mod swing;

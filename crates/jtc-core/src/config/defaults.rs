@@ -2,9 +2,9 @@
 //! build time.
 use jtc_dynamics::{ArmModel, Link, Origin, Payload};
 
-use crate::bounds::ParameterBounds;
 use crate::config::Config;
-use crate::limits::JointConfig;
+use crate::config::bounds::ParameterBounds;
+use crate::config::limits::JointConfig;
 use crate::parameters::{Friction, Parameters, PidGains, TableOf};
 
 /// Constants that the build script has generated.

@@ -2,10 +2,10 @@
 use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
+use crate::config::limits::JointConfig;
 use crate::interpolation::smooth;
-use crate::limits::JointConfig;
-use crate::soft_end;
-use crate::yielding::SPRING_RATE;
+use crate::motion::soft_end;
+use crate::motion::yielding::SPRING_RATE;
 
 /// Speeds of a joint between which the damping increases, rad/s.
 const FAST: (f64, f64) = (0.4, 0.8);

@@ -2,7 +2,7 @@
 //! controller.
 use crate::DT;
 use crate::bit_codec::bit_codec;
-use crate::limits::JointConfig;
+use crate::config::limits::JointConfig;
 
 /// Number of ticks between two observations of the same joint. Each tick observes a single joint.
 const PERIOD: f64 = crate::JOINTS as f64;

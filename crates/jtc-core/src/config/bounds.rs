@@ -2,8 +2,8 @@
 use jtc_dynamics::{ArmModel, Payload};
 use jtc_wire::DataStatus;
 
+use crate::config::limits::JointConfig;
 use crate::friction;
-use crate::limits::JointConfig;
 use crate::parameters::{PidGains, TableOf};
 
 /// Share of the velocity limit up to which friction has been measured. Above this velocity, a fitted curve may have any value.

@@ -8,8 +8,8 @@
 //! oscillation would never end.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
-use crate::deceleration::moves;
-use crate::limits::JointConfig;
+use crate::config::limits::JointConfig;
+use crate::motion::deceleration::moves;
 
 /// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. The time is longer than the
 /// low-speed phase at the reversal of a swing.

@@ -8,6 +8,7 @@ mod terminal;
 use std::io::Write;
 use std::process::{Child, Command, Stdio};
 
+use host_kit::{Action, FrontEnd};
 use serde_json::Value;
 
 #[cfg(unix)]
@@ -31,6 +32,34 @@ pub fn check_help_is_wrapped_once(command: &clap::Command) {
         }
     }
     command.get_subcommands().for_each(check_help_is_wrapped_once);
+}
+
+/// Checks that the command line has each command that a next step names. Words in capitals stand for a value that the
+/// user chooses.
+///
+/// # Panics
+///
+/// The command line does not have a command or an option.
+pub fn check_commands_of_next_steps(program: &clap::Command) {
+    let own = format!("{} ", program.get_name());
+    let commands = Action::ALL.iter().map(|action| action.name(FrontEnd::Command));
+    for (name, words) in commands.filter_map(|name| Some((name, name.strip_prefix(&own)?))) {
+        let is_typed = |word: &&str| word.chars().all(|c| c.is_lowercase() || c == '-');
+        let mut command = program;
+        for word in words.split(' ').take_while(is_typed) {
+            let found = match word.strip_prefix("--") {
+                Some(option) => command.get_arguments().any(|arg| arg.get_long() == Some(option)),
+                None => match command.find_subcommand(word) {
+                    Some(sub) => {
+                        command = sub;
+                        true
+                    }
+                    None => word == "all",
+                },
+            };
+            assert!(found, "{name}: {word}");
+        }
+    }
 }
 
 /// Output of a command and its exit code.

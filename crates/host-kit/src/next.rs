@@ -110,6 +110,8 @@ actions! {
     /// End Teaching.
     TeachOff:
         "jtc teach off", "End teaching (POST /api/teach with on: false)", "end the block `with robot.teach():`";
+    /// Record a motion for which the user guides the arm by hand.
+    TeachRecord: "jtc teach record FILE", "jtc teach record FILE", "robot.teach()";
     /// Check a trajectory.
     TrajCheck: "jtc traj check FILE", "GET /api/trajectories/{number}/check", "robot.check(…)";
     /// Run a trajectory.
@@ -125,16 +127,45 @@ actions! {
     Resume: "jtc traj resume", "Resume (POST /api/resume)", "robot.resume()";
     /// End the motion.
     Stop: "jtc traj stop", "Stop (POST /api/stop)", "robot.stop()";
+
+    /// List the boards of the chain.
+    ChainScan: "ucom scan", "Scan (POST /api/scan)", "ucom scan";
+    /// Give a number to each board of the chain.
+    ChainInit: "ucom init", "Number the chain (POST /api/init)", "ucom init";
+    /// Find the cause of a problem on the bus or in a board.
+    ChainDoctor: "ucom doctor", "Look for what is wrong (POST /api/doctor)", "ucom doctor";
+    /// Stop all boards.
+    ChainStop: "ucom stop all", "Stop (POST /api/stop)", "ucom stop all";
+    /// Show identity and program of a board.
+    BoardInfo: "ucom info {number}", "GET /api/boards/{number}", "ucom info {number}";
+    /// Show names, ranges and values of a board's inputs, outputs and parameters.
+    BoardValues: "ucom io {number}", "GET /api/boards/{number}/values", "ucom io {number}";
+    /// Show the state of a board.
+    BoardStatus: "ucom status {number}", "GET /api/boards/{number}", "ucom status {number}";
+    /// Start the application of a board.
+    BoardStart: "ucom start {number}", "Start (POST /api/boards/{number}/start)", "ucom start {number}";
+    /// End the application of a board.
+    BoardStop: "ucom stop {number}", "Stop application (POST /api/boards/{number}/stop)", "ucom stop {number}";
+    /// Write an image to a board.
+    BoardUpdate: "ucom update {number} IMAGE", "Update (POST /api/updates)", "ucom update {number} IMAGE";
 }
+
+/// Placeholder of a board number in the name of an action.
+const NUMBER: &str = "{number}";
 
 /// Part of a next step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Part {
     /// Words that all front ends show. Commands are enclosed in backticks.
     Words(Cow<'static, str>),
-    /// Action, for which each front end shows its own name. The command line shows the command instead, if one
-    /// is set.
-    Action(Action, Option<String>),
+    /// Action, for which each front end shows its own name.
+    Action {
+        action: Action,
+        /// Command with all arguments, which the command line shows instead of the name.
+        command: Option<String>,
+        /// Numbers of the boards that the name contains.
+        boards: Option<String>,
+    },
 }
 
 /// Sentence about the next step, without a full stop; empty if no step helps.
@@ -172,17 +203,35 @@ impl Next {
 
     /// Returns `true` if the sentence contains this action.
     pub fn names(&self, wanted: Action) -> bool {
-        self.0.iter().any(|part| matches!(part, Part::Action(action, _) if *action == wanted))
+        self.0.iter().any(|part| matches!(part, Part::Action { action, .. } if *action == wanted))
     }
 
     /// Sets the command of an action, with all arguments, wherever the sentence contains the action.
     #[must_use]
     pub fn with_command(mut self, wanted: Action, command: &str) -> Self {
         for part in &mut self.0 {
-            if let Part::Action(action, typed) = part
+            if let Part::Action { action, command: typed, .. } = part
                 && *action == wanted
             {
                 *typed = Some(command.to_owned());
+            }
+        }
+        self
+    }
+
+    /// Sets the board of all actions of the sentence that concern one board.
+    #[must_use]
+    pub fn of_board(self, board: u8) -> Self {
+        self.of_boards(&[board])
+    }
+
+    /// Sets the boards of all actions of the sentence that concern boards.
+    #[must_use]
+    pub fn of_boards(mut self, numbers: &[u8]) -> Self {
+        let list = numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(",");
+        for part in &mut self.0 {
+            if let Part::Action { boards, .. } = part {
+                *boards = Some(list.clone());
             }
         }
         self
@@ -197,21 +246,26 @@ impl Next {
 
     /// Creates a next step from an action and its command with all arguments.
     pub fn typed(action: Action, command: impl Into<String>) -> Self {
-        Self(vec![Part::Action(action, Some(command.into()))])
+        Self(vec![Part::Action { action, command: Some(command.into()), boards: None }])
     }
 
     /// Returns the sentence for a front end, with commands, requests and expressions in backticks.
     pub fn sentence(&self, front_end: FrontEnd) -> String {
-        let parts = self.0.iter().map(|part| {
-            let name = match part {
-                Part::Words(words) => return words.clone(),
-                Part::Action(_, Some(command)) if front_end == FrontEnd::Command => {
-                    return format!("`{command}`").into();
-                }
-                Part::Action(action, _) => action.name(front_end),
-            };
-            // Some names are words that contain an expression in backticks.
-            if name.contains('`') { name.into() } else { format!("`{name}`").into() }
+        let parts = self.0.iter().map(|part| match part {
+            Part::Words(words) => words.clone(),
+            Part::Action { command: Some(command), .. } if front_end == FrontEnd::Command => {
+                format!("`{command}`").into()
+            }
+            Part::Action { action, boards, .. } => {
+                let name = action.name(front_end);
+                let name = match (boards, front_end) {
+                    (Some(boards), _) => Cow::from(name.replace(NUMBER, boards)),
+                    (None, FrontEnd::Agent) => name.into(),
+                    (None, _) => name.replace(NUMBER, "N").into(),
+                };
+                // Some names are words that contain an expression in backticks.
+                if name.contains('`') { name } else { format!("`{name}`").into() }
+            }
         });
         parts.collect()
     }
@@ -236,7 +290,7 @@ impl Serialize for Next {
 
 impl From<Action> for Next {
     fn from(action: Action) -> Self {
-        Self(vec![Part::Action(action, None)])
+        Self(vec![Part::Action { action, command: None, boards: None }])
     }
 }
 
@@ -285,6 +339,12 @@ mod tests {
         assert!(check.names(Action::TrajCheck) && !check.names(Action::TrajRun));
         let run = next!("then {}", TrajRun).with_command(Action::TrajRun, "jtc traj run 'my motion.csv'");
         assert_eq!(run.to_string(), "then `jtc traj run 'my motion.csv'`");
+        let start = next!("{} first", BoardStart);
+        assert_eq!(start.to_string(), "`ucom start N` first");
+        let start = start.of_board(2);
+        assert_eq!(start.to_string(), "`ucom start 2` first");
+        assert_eq!(start.plain(FrontEnd::Agent), "Start (POST /api/boards/2/start) first");
+        assert_eq!(Next::from(Action::BoardStop).of_boards(&[1, 3]).to_string(), "`ucom stop 1,3`");
         let block = Next::from(Action::TeachOff).sentence(FrontEnd::Python);
         assert_eq!(block, "end the block `with robot.teach():`");
     }

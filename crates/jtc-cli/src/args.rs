@@ -416,7 +416,6 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
-    use host_kit::{Action, FrontEnd};
 
     use super::*;
 
@@ -447,31 +446,8 @@ mod tests {
         walk(&Cli::command(), "jtc");
     }
 
-    /// Words in capitals stand for what a person chooses.
     #[test]
     fn each_command_of_a_next_step_is_there() {
-        for action in Action::ALL {
-            let name = action.name(FrontEnd::Command);
-            let Some(words) = name.strip_prefix("jtc ") else {
-                assert!(name.starts_with("--"), "{name} is neither a command nor an option");
-                continue;
-            };
-            let all = Cli::command();
-            let mut command = &all;
-            for word in words.split(' ').take_while(|word| word.chars().all(|c| c.is_lowercase() || c == '-'))
-            {
-                let found = match word.strip_prefix("--") {
-                    Some(option) => command.get_arguments().any(|arg| arg.get_long() == Some(option)),
-                    None => match command.find_subcommand(word) {
-                        Some(sub) => {
-                            command = sub;
-                            true
-                        }
-                        None => false,
-                    },
-                };
-                assert!(found, "{name}: {word}");
-            }
-        }
+        cli_kit::testing::check_commands_of_next_steps(&Cli::command());
     }
 }

@@ -108,6 +108,25 @@ pub fn part(file: &str, name: &'static str, text: &str) {
     Page { text: text.to_owned(), ..Page::new(file, name) }.finish();
 }
 
+/// Checks that the description of an API has each request in `names`, such as `Stop (POST /api/stop)`. A name without a
+/// request must be a command.
+///
+/// # Panics
+/// If the description does not have a request.
+pub fn check_requests<'a>(description: &str, names: impl Iterator<Item = &'a str>) {
+    let description: serde_json::Value = serde_json::from_str(description).expect("JSON");
+    for name in names {
+        let words: Vec<&str> = name.split([' ', '(', ')']).collect();
+        let Some(i) = words.iter().position(|word| word.starts_with('/')) else {
+            let typed = name.starts_with("jtc ") || name.ends_with(": true");
+            assert!(typed, "{name} is neither a request nor a command");
+            continue;
+        };
+        let (method, path) = (words[i - 1].to_lowercase(), words[i]);
+        assert!(description["paths"][path][&method].is_object(), "{name}: {method} {path}");
+    }
+}
+
 /// Compares `docs/FILE` with this text, or writes the file if `UPDATE_DOCS=1` is set.
 ///
 /// # Panics

@@ -1,17 +1,16 @@
-//! Checks that docs/ucom-openapi.json equals the API description that an agent serves. `UPDATE_DOCS=1 cargo
-//! test -p ucom-agent --test suite description::` writes it.
-use std::path::Path;
+//! Description of the API. `UPDATE_DOCS=1 cargo test -p ucom-agent --test suite description::` writes docs/ucom-openapi.json.
+use host_kit::{Action, FrontEnd};
+use test_kit::page;
 
 #[test]
 fn the_description_in_the_docs_is_that_of_the_code() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/ucom-openapi.json");
-    let description = format!("{}\n", ucom_agent::api::description());
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        std::fs::write(&path, &description).expect("the page can be written");
-    }
-    let written = std::fs::read_to_string(&path).expect("docs/ucom-openapi.json");
-    assert!(
-        written == description,
-        "docs/ucom-openapi.json is old: UPDATE_DOCS=1 cargo test -p ucom-agent --test suite description::"
-    );
+    page::whole("ucom-openapi.json", &format!("{}\n", ucom_agent::api::description()));
+}
+
+/// The next step of an error names a request, or a command if the API has no request for this step.
+#[test]
+fn each_request_of_a_next_step_exists() {
+    let is_own = |action: &&Action| action.name(FrontEnd::Command).starts_with("ucom ");
+    let names = Action::ALL.iter().filter(is_own).map(|action| action.name(FrontEnd::Agent));
+    page::check_requests(&ucom_agent::api::description(), names);
 }

@@ -437,6 +437,11 @@ mod tests {
     }
 
     #[test]
+    fn each_command_of_a_next_step_is_there() {
+        cli_kit::testing::check_commands_of_next_steps(&Cli::command());
+    }
+
+    #[test]
     fn the_command_line_is_sound_and_has_an_example_for_each_command() {
         Cli::command().debug_assert();
         cli_kit::testing::check_help_is_wrapped_once(&Cli::command());

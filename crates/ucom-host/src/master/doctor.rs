@@ -1,8 +1,8 @@
 //! Findings about bus, chain and boards. Each finding names the next command.
 use crate::master::engine::{Boards, Life, Statistics};
-use crate::master::error::SHARED_CAUSE;
+use crate::master::error::{SHARED_CAUSE, shared_remedy};
 use crate::master::reports::{InitFinding, InitReport, ScanFinding, ScanReport};
-use host_kit::{Diagnose, Findings};
+use host_kit::{Action, Diagnose, Findings, Next, next};
 pub use host_kit::{Finding, Severity};
 
 use crate::master::counted::counted;
@@ -81,7 +81,7 @@ fn bus(o: &Observation, f: &mut Findings) {
             let what = format!(
                 "the adapter left the bus {times} while ucom listened (bus-off), and is on the bus again"
             );
-            f.problem(what, off_why, "check rate, cable and termination, then ucom doctor again");
+            f.problem(what, off_why, next!("check rate, cable and termination, then {} again", ChainDoctor));
         } else if c.no_acknowledge > 0 && received == 0 {
             let why = "no board with power is connected, or all boards use another bit rate";
             f.problem(
@@ -117,7 +117,7 @@ fn bus(o: &Observation, f: &mut Findings) {
         f.problem(
             format!("no frame within {s:.1} s"),
             why,
-            "`ucom scan`; check that this is the right interface",
+            next!("{}; check that this is the right interface", ChainScan),
         );
     }
 }
@@ -190,15 +190,16 @@ fn initialised(init: &InitReport, f: &mut Findings) {
 }
 
 /// Returns the command that the user should run next after a finding of an init.
-fn after_init(finding: &InitFinding) -> String {
+fn after_init(finding: &InitFinding) -> Next {
     match finding {
-        InitFinding::NoBoards => "check power, cable and bit rate, then `ucom doctor` again".to_owned(),
+        InitFinding::NoBoards => next!("check power, cable and bit rate, then {} again", ChainDoctor),
         InitFinding::NotReached { after: 0, .. } => {
             "the first board does not take number 1: check that its incoming init pin is strapped active"
                 .into()
         }
         InitFinding::NotReached { after, .. } => {
-            format!("check the init wire from board {after} to the next one, then `ucom init`")
+            Next::from(format!("check the init wire from board {after} to the next one, then "))
+                .then(Action::ChainInit)
         }
         InitFinding::MoreBoardsThanReports { .. } | InitFinding::DuplicateFlash { .. } => {
             "give one of the boards another flash number".into()
@@ -206,17 +207,16 @@ fn after_init(finding: &InitFinding) -> String {
         InitFinding::UnexpectedOrder { .. } | InitFinding::Missing { .. } => {
             "if boards were swapped, `ucom init --inventory FILE` writes the new order".into()
         }
-        InitFinding::Refused { error, .. } => error.hint(),
+        InitFinding::Refused { error, .. } => error.diagnosis().next,
         InitFinding::ByteOrder { .. } => BYTE_ORDER.into(),
-        _ => "`ucom init` again".into(),
+        _ => next!("{} again", ChainInit),
     }
 }
 
 /// Adds the findings of a scan.
 fn scanned(scan: &ScanReport, f: &mut Findings) {
     for shared in scan.findings.iter().filter_map(ScanFinding::error) {
-        let (why, next) = SHARED_CAUSE;
-        f.problem(shared.to_string(), why, next);
+        f.problem(shared.to_string(), SHARED_CAUSE, shared_remedy());
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
         // The other values of these boards were read in the wrong byte order, so no findings are derived from these values.
@@ -228,12 +228,12 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
     for finding in scan.findings.iter().filter(|x| !reported(x)) {
         let next = match finding {
             ScanFinding::SameFlash { .. } | ScanFinding::Ambiguous { .. } => {
-                "give one of them another flash number"
+                "give one of them another flash number".into()
             }
-            ScanFinding::Disagrees { .. } => "`ucom probe`",
-            ScanFinding::Status { .. } => "`ucom probe`; then `ucom reset` and `ucom init`",
-            ScanFinding::Contradicts { .. } => "`ucom init` numbers the boards again",
-            _ => "`ucom scan` again",
+            ScanFinding::Disagrees { .. } => "`ucom probe`".into(),
+            ScanFinding::Status { .. } => next!("`ucom probe`; then `ucom reset` and {}", ChainInit),
+            ScanFinding::Contradicts { .. } => next!("{} numbers the boards again", ChainInit),
+            _ => next!("{} again", ChainScan),
         };
         f.warn(finding.to_string(), "", next);
     }
@@ -243,7 +243,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
             f.warn(
                 format!("board {n} has no valid application"),
                 "never programmed, or an update was interrupted",
-                format!("`ucom update {n} IMAGE`"),
+                Next::from(Action::BoardUpdate).of_board(n),
             );
         }
     }
@@ -259,7 +259,7 @@ fn numbers(scan: &ScanReport, f: &mut Findings) {
                 n => format!("{n} boards, none has a number"),
             },
             "the boards were powered up or reset after they got numbers",
-            "`ucom init`",
+            Action::ChainInit,
         );
     } else if unnumbered > 0 {
         let after = scan.boards.last().map_or(0, |b| b.number);
@@ -270,7 +270,7 @@ fn numbers(scan: &ScanReport, f: &mut Findings) {
                 (n, numbered) => format!("{n} of {} boards have no number", n + numbered),
             },
             why,
-            "`ucom init` shows the position",
+            next!("{} shows the position", ChainInit),
         );
     } else if !scan.boards.is_empty() {
         f.good(match scan.boards.len() {
@@ -286,14 +286,14 @@ fn boards(o: &Observation, f: &mut Findings) {
             f.problem(
                 format!("board {n} rebooted and lost its number"),
                 "a power loss, a watchdog reset or a crash of its application",
-                "`ucom init`",
+                Action::ChainInit,
             );
         }
         match board.life {
             Life::Lost => f.problem(
                 format!("board {n} gives no heartbeat"),
                 "the board lost power or its connection to the bus",
-                format!("`ucom info {n}`, cable and power of this board"),
+                next!("{}, cable and power of this board", BoardInfo).of_board(n),
             ),
             Life::Late => f.warn(
                 format!("board {n} is late with its heartbeats"),

@@ -14,7 +14,7 @@ mod words;
 pub use address::AddressError;
 pub use exchange::{ExchangeError, Incomplete, LastReceived, Received};
 pub use identity::IdentityError;
-pub(crate) use identity::SHARED_CAUSE;
+pub(crate) use identity::{SHARED_CAUSE, shared_remedy};
 pub use master::MasterError;
 pub use plan::{PlanError, SecondImageError, TargetError};
 pub use procedure::Error;

@@ -1,5 +1,7 @@
 //! Bus-off (ISO 11898-1). The message reports that the CAN controller of this computer has left the bus, and names the next command.
 
+use host_kit::{Action, Next, next};
+
 /// Minimum time between two messages in µs. With a bad wire, the controller enters bus-off repeatedly.
 const AGAIN_US: u64 = 5_000_000;
 
@@ -33,13 +35,14 @@ impl BusOff {
 
 /// Returns the command that ends the bus-off or shows its cause. Only the kernel's CAN interfaces stay off the bus until a command restarts
 /// them.
-pub fn next(url: &str) -> String {
+pub fn next(url: &str) -> Next {
     match url.strip_prefix("socketcan:") {
-        Some(interface) => format!(
+        Some(interface) => Next::from(format!(
             "run sudo ip link set {interface} type can restart (with restart-ms 100 in its set-up, the interface \
-             restarts by itself), then ucom doctor"
-        ),
-        None => "check the bus with ucom doctor".into(),
+             restarts by itself), then "
+        ))
+        .then(Action::ChainDoctor),
+        None => next!("check the bus with {}", ChainDoctor),
     }
 }
 
@@ -55,7 +58,7 @@ mod tests {
         assert_eq!(off.look(0, 0, url), None);
         let message = off.look(1, 10, url).expect("reported at once");
         assert!(
-            message.contains("is bus-off:") && message.contains("next: check the bus with ucom doctor"),
+            message.contains("is bus-off:") && message.contains("next: check the bus with `ucom doctor`"),
             "{message}"
         );
         assert_eq!(off.look(1, 20_000_000, url), None);
@@ -68,7 +71,7 @@ mod tests {
 
     #[test]
     fn an_interface_of_the_kernel_is_restarted() {
-        assert!(next("socketcan:can3").contains("ip link set can3 type can restart"));
-        assert!(!next("slcan:/dev/ttyACM0").contains("ip link"));
+        assert!(next("socketcan:can3").to_string().contains("ip link set can3 type can restart"));
+        assert!(!next("slcan:/dev/ttyACM0").to_string().contains("ip link"));
     }
 }

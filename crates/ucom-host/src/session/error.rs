@@ -1,6 +1,6 @@
 //! Errors of a session. Either a procedure failed, or a file, a bus or a value that the procedure needs is not usable.
 use can_link::{CanError, InvalidFrame, OpenError};
-use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
+use host_kit::{Action, Diagnose, Diagnosis, ErrorKind, Facts, Next, next};
 
 use super::bus_off;
 use crate::files::InventoryError;
@@ -188,38 +188,41 @@ impl Diagnose for SessionError {
             Self::Procedure(e) => return e.diagnosis(),
             Self::Values(e) => return e.diagnosis(),
             Self::BusOff { failure, url } => {
-                return Diagnosis { next: bus_off::next(url).into(), ..failure.diagnosis() };
+                return Diagnosis { next: bus_off::next(url), ..failure.diagnosis() };
             }
-            Self::Inventory(_) => (Usage, "usage", ""),
+            Self::Inventory(_) => (Usage, "usage", Next::default()),
             Self::Open(e) if matches!(**e, OpenError::Url(_)) => {
-                (Usage, "usage", "ucom --help shows the forms of --bus")
+                (Usage, "usage", "ucom --help shows the forms of --bus".into())
             }
             Self::Open(_) => {
-                (NoLink, "bus", "check that the bus exists and is up; ucom sim makes a simulated bus")
+                (NoLink, "bus", "check that the bus exists and is up; ucom sim makes a simulated bus".into())
             }
             Self::Partly { failure, .. } => return failure.diagnosis(),
-            Self::Bus(_) => (NoLink, "bus", "check the bus with ucom doctor"),
-            Self::Frame(_) => (Fault, "frame", ""),
-            Self::NoBoards => (NoLink, "no-boards", "find the cause with ucom doctor"),
-            Self::NoNumbers { .. } => (NoLink, "no-numbers", "number the boards with ucom init"),
-            Self::Lost { .. } => (Fault, "lost", "check bus and boards with ucom doctor"),
+            Self::Bus(_) => (NoLink, "bus", next!("check the bus with {}", ChainDoctor)),
+            Self::Frame(_) => (Fault, "frame", Next::default()),
+            Self::NoBoards => (NoLink, "no-boards", next!("find the cause with {}", ChainDoctor)),
+            Self::NoNumbers { .. } => (NoLink, "no-numbers", next!("number the boards with {}", ChainInit)),
+            Self::Lost { .. } => (Fault, "lost", next!("check bus and boards with {}", ChainDoctor)),
             Self::LeftLoop { .. } => (
                 Fault,
                 "left-loop",
-                "find the cause with ucom doctor: another PC on the bus, lost heartbeats, or an application \
-                 that stops",
+                next!(
+                    "find the cause with {}: another PC on the bus, lost heartbeats, or an application that \
+                     stops",
+                    ChainDoctor
+                ),
             ),
             Self::NoNames { failed } => {
                 let started = failed.iter().all(|(_, e)| e.is_not_started());
                 let first = failed.first().map(|(_, e)| e.diagnosis());
                 let mut diagnosis = first.unwrap_or(Diagnosis::new(NoLink, "no-boards", ""));
                 if started {
-                    let boards: Vec<String> = failed.iter().map(|(board, _)| board.to_string()).collect();
-                    diagnosis.next = format!("`ucom start {}`", boards.join(",")).into();
+                    let boards: Vec<u8> = failed.iter().map(|(board, _)| *board).collect();
+                    diagnosis.next = Next::from(Action::BoardStart).of_boards(&boards);
                 }
                 return diagnosis;
             }
-            Self::Unexpected(_) => (Fault, "internal", "this is an error in ucom; please report it"),
+            Self::Unexpected(_) => (Fault, "internal", "this is an error in ucom; please report it".into()),
         };
         Diagnosis::new(kind, code, next)
     }
@@ -260,18 +263,24 @@ impl Diagnose for ValuesError {
             Self::Value { board, .. } => Diagnosis::new(
                 Refused,
                 "value",
-                format!("ucom io {board} shows types, scales and units; a word as 0x05DC is sent as it is"),
+                next!("{} shows types, scales and units; a word as 0x05DC is sent as it is", BoardValues)
+                    .of_board(*board),
             ),
             Self::Unknown { board, .. } => Diagnosis::new(
                 Fault,
                 "unknown",
-                format!("ucom status {board} shows its state; ucom start {board}, and write them again"),
+                next!("{} shows its state; {}, and write them again", BoardStatus, BoardStart)
+                    .of_board(*board),
             ),
             Self::File { hint, .. } => Diagnosis::new(Usage, "usage", *hint),
             Self::Misfit { .. } => Diagnosis::new(
                 Refused,
                 "params",
-                "nothing was written; ucom io shows names and ranges, ucom info the boards",
+                next!(
+                    "nothing was written; {} shows names and ranges, {} the boards",
+                    BoardValues,
+                    BoardInfo
+                ),
             ),
         }
     }

@@ -1,6 +1,6 @@
 //! Errors of an address assignment that was refused.
 use crate::master::error::identity::OTHER_PROTOCOL;
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Action, Diagnose, Diagnosis, ErrorKind, Next, next};
 
 /// Reasons why boards did not get numbers.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -46,11 +46,14 @@ impl Diagnose for AddressError {
             Self::MayTakeNumber { other, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "may-take-number",
-                format!("`ucom repair {other}` first, or number all boards again: `ucom init`"),
+                Next::from(format!("`ucom repair {other}` first, or number all boards again: "))
+                    .then(Action::ChainInit),
             ),
-            Self::NotNumbered { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "not-numbered", "`ucom init`, then repeat the command")
-            }
+            Self::NotNumbered { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "not-numbered",
+                next!("{}, then repeat the command", ChainInit),
+            ),
         }
     }
 }

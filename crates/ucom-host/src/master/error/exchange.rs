@@ -2,7 +2,7 @@
 use core::fmt;
 
 use crate::master::error::words::MEASURE_ORDER;
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use ucom::{ErrorCode, Function};
 
 /// Reasons why an exchange with a board failed.
@@ -70,23 +70,22 @@ impl Diagnose for ExchangeError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::NoBoard { .. } => {
-                Diagnosis::new(ErrorKind::Usage, "no-board", "`ucom scan` lists the boards")
+                Diagnosis::new(ErrorKind::Usage, "no-board", next!("{} lists the boards", ChainScan))
             }
             Self::NoAnswer { board, last: None, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "no-answer",
-                format!(
-                    "no frame of board {board} was received: `ucom scan` lists the boards that answer, \
-                     `ucom doctor` shows the cause"
-                ),
+                Next::from(format!("no frame of board {board} was received: ")).then(next!(
+                    "{} lists the boards that answer, {} shows the cause",
+                    ChainScan,
+                    ChainDoctor
+                )),
             ),
             Self::NoAnswer { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "no-answer",
-                format!(
-                    "board {board} sends frames but does not answer this request: `ucom info {board}`, then \
-                     `ucom doctor`"
-                ),
+                Next::from(format!("board {board} sends frames but does not answer this request: "))
+                    .then(next!("{}, then {}", BoardInfo, ChainDoctor).of_board(*board)),
             ),
             Self::Incomplete { problem: Incomplete::ByteOrder { .. }, .. } => {
                 Diagnosis::new(ErrorKind::NoLink, "incomplete-answer", MEASURE_ORDER)
@@ -101,11 +100,13 @@ impl Diagnose for ExchangeError {
             Self::Incomplete { .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "incomplete-answer",
-                "frames are lost: `ucom doctor` checks bus load, error counters and termination",
+                next!("frames are lost: {} checks bus load, error counters and termination", ChainDoctor),
             ),
-            Self::Contradiction { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "contradiction", "number the boards again: `ucom init`")
-            }
+            Self::Contradiction { .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "contradiction",
+                next!("number the boards again: {}", ChainInit),
+            ),
             Self::Device { code, .. } => Diagnosis::new(ErrorKind::Device, "device-error", code.reaction()),
         }
     }

@@ -2,7 +2,7 @@
 use core::fmt;
 
 use crate::master::error::words::{MEASURE_ORDER, other_order};
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use ucom::profile::Endian;
 
 /// Reasons why a board is not the intended one.
@@ -65,16 +65,18 @@ impl Diagnose for IdentityError {
             Self::WrongBoard { board, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "wrong-board",
-                format!(
-                    "`ucom info {board}` shows the board with this number; if boards were swapped: `ucom \
-                     init`"
-                ),
+                next!(
+                    "{} shows the board with this number; if boards were swapped: {}",
+                    BoardInfo,
+                    ChainInit
+                )
+                .of_board(*board),
             ),
             Self::ByteOrder { .. } => Diagnosis::new(ErrorKind::Refused, "byte-order", MEASURE_ORDER),
             Self::NumberShared { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "number-shared",
-                format!("{}; {}", SHARED_CAUSE.0, SHARED_CAUSE.1),
+                Next::from(format!("{SHARED_CAUSE}; ")).then(shared_remedy()),
             ),
         }
     }
@@ -97,13 +99,19 @@ impl fmt::Display for Sharing<'_> {
     }
 }
 
-/// Cause of a number that two boards share, and the remedy.
-pub(crate) const SHARED_CAUSE: (&str, &str) = (
-    "both boards took the number from one PC_INIT: an init pin is strapped or shorted, or a PC repeated \
-     PC_INIT without a check",
-    "`ucom stop all` if a board runs, then `ucom init` numbers all boards again; if the error returns, \
-     power one of the two boards down and check the init wires",
-);
+/// Cause of a number that two boards share.
+pub(crate) const SHARED_CAUSE: &str = "both boards took the number from one PC_INIT: an init pin is strapped or shorted, or a PC repeated \
+     PC_INIT without a check";
+
+/// Returns the remedy for a number that two boards share.
+pub(crate) fn shared_remedy() -> Next {
+    next!(
+        "{} if a board runs, then {} numbers all boards again; if the error returns, power one of the two boards \
+         down and check the init wires",
+        ChainStop,
+        ChainInit
+    )
+}
 
 /// Remedy if identifier and data contain different numbers.
 pub(crate) const OTHER_PROTOCOL: &str = "two boards may share a number, or the board interprets the \

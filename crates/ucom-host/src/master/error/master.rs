@@ -1,6 +1,6 @@
 //! Errors of procedures that this PC did not begin, or that it ended early.
 use crate::master::error::words::Boards;
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use ucom::Function;
 
 /// Reasons why this PC did not begin a procedure, or ended it early.
@@ -52,11 +52,13 @@ impl Diagnose for MasterError {
             Self::Bus { .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "bus",
-                "check the bus and the plug of the adapter: `ucom doctor`",
+                next!("check the bus and the plug of the adapter: {}", ChainDoctor),
             ),
-            Self::Cancelled => {
-                Diagnosis::new(ErrorKind::Fault, "cancelled", "`ucom scan` shows the state of the boards")
-            }
+            Self::Cancelled => Diagnosis::new(
+                ErrorKind::Fault,
+                "cancelled",
+                next!("{} shows the state of the boards", ChainScan),
+            ),
         }
     }
 }

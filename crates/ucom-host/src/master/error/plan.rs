@@ -1,5 +1,5 @@
 //! Reasons why an update cannot be planned.
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use ucom::profile::Plan;
 
 /// Reasons why the selection of boards for an update is not clear.
@@ -18,7 +18,7 @@ pub enum TargetError {
 
 impl Diagnose for TargetError {
     fn diagnosis(&self) -> Diagnosis {
-        Diagnosis::new(ErrorKind::Usage, "plan", "give a number, a list or `all`: `ucom update N IMAGE`")
+        Diagnosis::new(ErrorKind::Usage, "plan", next!("give a number, a list or `all`: {}", BoardUpdate))
     }
 }
 

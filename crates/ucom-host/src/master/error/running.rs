@@ -1,7 +1,7 @@
 //! Errors that occur because control loops run or cannot run.
 use crate::master::error::words::Boards;
 use crate::master::load::LoadForecast;
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 
 /// Reasons why control loops prevent an action or cannot run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -34,7 +34,7 @@ impl Diagnose for RunningError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::Running { .. } | Self::LoopRuns { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "running", "`ucom stop all` first")
+                Diagnosis::new(ErrorKind::Refused, "running", next!("{} first", ChainStop))
             }
             Self::Load(_) => Diagnosis::new(
                 ErrorKind::Refused,
@@ -44,10 +44,12 @@ impl Diagnose for RunningError {
             Self::Lost { board } => Diagnosis::new(
                 ErrorKind::Fault,
                 "lost",
-                format!(
-                    "check if the board rebooted or lost power: `ucom info {board}`; `ucom doctor` checks \
-                     bus and boards"
-                ),
+                next!(
+                    "check if the board rebooted or lost power: {}; {} checks bus and boards",
+                    BoardInfo,
+                    ChainDoctor
+                )
+                .of_board(*board),
             ),
         }
     }

@@ -1,7 +1,7 @@
 //! Errors of signals that cannot be read or written.
 use core::fmt;
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Action, Diagnose, Diagnosis, ErrorKind, Next, next};
 
 /// Reasons why a signal cannot be read or written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -41,15 +41,21 @@ pub enum SignalError {
 impl Diagnose for SignalError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::NoSignal { board, .. } => {
-                Diagnosis::new(ErrorKind::Usage, "no-edge", format!("`ucom io {board}` lists the names"))
-            }
-            Self::NoApplication { board, valid: true } => {
-                Diagnosis::new(ErrorKind::Refused, "no-application", format!("`ucom start {board}`"))
-            }
-            Self::NoApplication { board, valid: false } => {
-                Diagnosis::new(ErrorKind::Refused, "no-application", format!("`ucom update {board} IMAGE`"))
-            }
+            Self::NoSignal { board, .. } => Diagnosis::new(
+                ErrorKind::Usage,
+                "no-edge",
+                next!("{} lists the names", BoardValues).of_board(*board),
+            ),
+            Self::NoApplication { board, valid: true } => Diagnosis::new(
+                ErrorKind::Refused,
+                "no-application",
+                Next::from(Action::BoardStart).of_board(*board),
+            ),
+            Self::NoApplication { board, valid: false } => Diagnosis::new(
+                ErrorKind::Refused,
+                "no-application",
+                Next::from(Action::BoardUpdate).of_board(*board),
+            ),
             Self::StaleNames { board } => Diagnosis::new(
                 ErrorKind::Refused,
                 "stale-names",

@@ -1,5 +1,5 @@
 //! Errors that occur when a board does not reach a state.
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use ucom::Status;
 
 /// Reasons why a board is not in the requested state.
@@ -61,12 +61,12 @@ impl Diagnose for StatusError {
             Self::NotReached { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "not-reached",
-                format!("`ucom info {board}`, then `ucom reset` and `ucom init`"),
+                next!("{}, then `ucom reset` and {}", BoardInfo, ChainInit).of_board(*board),
             ),
-            Self::AdminRefused { .. } => Diagnosis::new(
+            Self::AdminRefused { board, .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "admin-refused",
-                "outputs need a running control loop: `ucom start`",
+                next!("outputs need a running control loop: {}", BoardStart).of_board(*board),
             ),
         }
     }

@@ -1,7 +1,7 @@
 //! Reasons why a board was not updated, with the facts, the kind of failure and the remedy.
 use crate::master::error::Error;
 use crate::master::reports::update::outcome::UpdateOutcome;
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use ucom::{ErrorCode, Status};
 
 /// Reasons why a board was not updated.
@@ -146,16 +146,20 @@ impl UpdateFailure {
         }
     }
 
-    fn next(&self) -> String {
+    fn next(&self) -> Next {
         match self {
-            Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::NotRunning(e) => e.hint(),
-            Self::StillProgramming(e) => match e.hint() {
-                hint if hint.is_empty() => "`ucom status N --clear PROG` ends it".into(),
-                hint => format!("{hint}; `ucom status N --clear PROG` ends it"),
+            Self::Refused(e) | Self::NoAnswer(e) | Self::Reported(e) | Self::NotRunning(e) => {
+                e.diagnosis().next
+            }
+            Self::StillProgramming(e) => match e.diagnosis().next {
+                next if next.is_empty() => "`ucom status N --clear PROG` ends it".into(),
+                next => next.then("; `ucom status N --clear PROG` ends it"),
             },
-            Self::After(e) => format!("{}; then run the update again to get an application back", e.hint()),
+            Self::After(e) => {
+                e.diagnosis().next.then("; then run the update again to get an application back")
+            }
             Self::MayBeErased(_) => {
-                "run the update again when the board answers (`ucom repair`, `ucom init`)".into()
+                next!("run the update again when the board answers (`ucom repair`, {})", ChainInit)
             }
             Self::NotValid { .. } => {
                 "check that the image is for this board, check `prog.plan` in the profile, then run the \
@@ -164,16 +168,17 @@ impl UpdateFailure {
             }
             Self::Device { code, .. } => code.reaction().into(),
             Self::Timeout { .. } => {
-                "frames are lost, or the board is slower than `prog.ready_timeout` of the profile: `ucom \
-                 doctor`"
-                    .into()
+                next!(
+                    "frames are lost, or the board is slower than `prog.ready_timeout` of the profile: {}",
+                    ChainDoctor
+                )
             }
             Self::NotVerified { .. } => {
                 "the board may compute its Program ID differently (`prog.checksum`): `ucom probe --image \
                  FILE`"
                     .into()
             }
-            Self::Cancelled { left: UpdateOutcome::Running } => "`ucom stop` stops it".into(),
+            Self::Cancelled { left: UpdateOutcome::Running } => next!("{} stops it", BoardStop),
             Self::Cancelled { left: UpdateOutcome::Incomplete } => {
                 "run the update again to get an application back".into()
             }

@@ -24,6 +24,7 @@ mod reset;
 mod run;
 mod settings;
 mod statistics;
+mod teaching;
 mod upload;
 
 use std::collections::VecDeque;

@@ -2,14 +2,16 @@
 
 mod taught_file;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-use cli_kit::{ErrorKind, Failure, Output, OutputFile, Stop};
+use cli_kit::{Failure, Output, OutputFile, Stop};
 use jtc_host::trajectory::Loaded;
-use jtc_host::{LinkError, labels};
-use jtc_wire::{ControllerState, Status};
+use jtc_host::{Error, StateError};
+use jtc_wire::ControllerState;
 use serde_json::json;
 
 use super::job::typed;
@@ -94,49 +96,35 @@ fn record(
     }
     progress.event("teaching", json!({}));
     out.note("teaching: move the arm by hand; Ctrl-C ends the recording");
-    let start = session.now();
     let mut taught = TaughtFile::new(file);
-    let (mut lost, mut failed) = (None, None);
-    while !stop.asked() && duration.is_none_or(|s| (session.now() - start).as_secs_f64() < s) {
-        match session.next_status().map_err(still_teaching).and_then(without_error) {
-            Ok(s) if s.state == ControllerState::Teaching => {
-                match taught.take((session.now() - start).as_secs_f64(), s.positions()) {
-                    Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
-                    // If the file cannot be written, the user does not need to guide the arm any longer. The controller then holds the arm,
-                    // as after Ctrl-C.
-                    Err(e) => {
-                        lost = Some(e);
-                        break;
-                    }
-                }
+    let mut lost = None;
+    let ended = |time: Duration| stop.asked() || duration.is_some_and(|s| time.as_secs_f64() >= s);
+    let recorded = session.record_teaching(ended, |time, positions| {
+        match taught.take(time.as_secs_f64(), positions) {
+            Ok(()) => {
+                begun.store(taught.is_begun(), Ordering::Relaxed);
+                ControlFlow::Continue(())
             }
-            // After a Stop of another program the controller holds the arm, and the user can release it.
-            Ok(s) => {
-                teaching.store(false, Ordering::Relaxed);
-                failed = Some(taught_no_more(&s));
-                break;
-            }
-            Err(failure) => {
-                failed = Some(failure);
-                break;
+            // If the file cannot be written, the user does not need to guide the arm any longer. The controller then holds the arm, as
+            // after Ctrl-C.
+            Err(e) => {
+                lost = Some(e);
+                ControlFlow::Break(())
             }
         }
+    });
+    if let Err(Error::State(StateError::TeachingEnded { .. })) = &recorded {
+        // The controller holds the arm, and the user can release it.
+        teaching.store(false, Ordering::Relaxed);
     }
     // The recording is completed first, even if the link is lost.
     let written = lost.map_or_else(|| finish(taught, thin, out), Err);
-    if failed.is_none() && !was_on {
+    recorded.map_err(still_teaching)?;
+    if !was_on {
         session.teach(false)?;
         teaching.store(false, Ordering::Relaxed);
     }
-    failed.map_or(written, Err)
-}
-
-/// Returns the failure if another program has ended teaching.
-fn taught_no_more(status: &Status) -> Failure {
-    let message =
-        format!("another program ended teaching: state {}; the recording ends at this point", status.state);
-    Failure::new(ErrorKind::Fault, "not-teaching", message)
-        .next("`jtc teach record FILE` starts a new recording")
+    written
 }
 
 /// Handles Ctrl-C and other signals. The first signal requests the end of the command. The second signal ends the command at once and
@@ -163,19 +151,16 @@ fn stop_at_once_with(
     })
 }
 
-fn still_teaching(e: LinkError) -> Failure {
-    let failure = Failure::from(e);
+/// Returns the failure of a recording. If the link was lost, the message says that the controller stays in Teaching.
+fn still_teaching(error: Error) -> Failure {
+    let lost = matches!(error, Error::Link(_));
+    let failure = Failure::from(error);
+    if !lost {
+        return failure;
+    }
     let message =
         format!("{}. The controller stays in teaching: the arm can be moved by hand", failure.message);
     Failure { message, ..failure }
-}
-
-fn without_error(s: Status) -> Result<Status, Failure> {
-    if !s.is_faulty() {
-        return Ok(s);
-    }
-    let failure = Failure::new(ErrorKind::Fault, "run-fault", labels::errors_line(&s));
-    Err(failure.next(labels::next_step(&s)))
 }
 
 fn finish(taught: TaughtFile, thin: Option<f64>, out: &Output) -> Result<(), Failure> {

@@ -51,6 +51,18 @@ pub enum StateError {
         /// Joints with this fault.
         joints: Vec<Joint>,
     },
+    /// The controller reports errors while a guided motion is recorded.
+    #[error("{}", labels::errors_line(status))]
+    TeachingFault {
+        /// Status with the errors.
+        status: Box<Status>,
+    },
+    /// Teaching ended while a guided motion was recorded.
+    #[error("teaching has ended: the controller is in {state}; the recording ends at this point")]
+    TeachingEnded {
+        /// State of the controller.
+        state: Code<ControllerState>,
+    },
     /// The arm moves, but a pose must be saved at rest.
     #[error("{what}, but a pose can be saved only at rest; nothing was saved")]
     Moving {
@@ -112,6 +124,14 @@ impl Diagnose for StateError {
             Self::NotReady { status } => {
                 Diagnosis::new(ErrorKind::Device, "not-ready", labels::next_step(status))
             }
+            Self::TeachingFault { status } => {
+                Diagnosis::new(ErrorKind::Fault, "run-fault", labels::next_step(status))
+            }
+            Self::TeachingEnded { .. } => Diagnosis::new(
+                ErrorKind::Fault,
+                "not-teaching",
+                next!("{} starts a new recording", TeachRecord),
+            ),
             Self::Moving { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "moving",
@@ -149,15 +169,19 @@ impl Diagnose for StateError {
 
     fn facts(&self) -> Facts {
         match self {
-            Self::Device { status } | Self::Timeout { status, .. } | Self::NotReady { status } => {
-                facts::of_status(status)
-            }
+            Self::Device { status }
+            | Self::Timeout { status, .. }
+            | Self::NotReady { status }
+            | Self::TeachingFault { status } => facts::of_status(status),
             Self::HeldStop { status, cause } => facts::of_held_stop(status, cause.as_ref()),
             Self::Absent { joints } | Self::EncoderJumped { joints } => {
                 joints.first().map_or_else(Facts::default, |joint| facts::of_joint(*joint))
             }
             Self::NotMeasured { joint } => facts::of_joint(*joint),
-            Self::Moving { .. } | Self::WouldFall { .. } | Self::MayFall { .. } => Facts::default(),
+            Self::Moving { .. }
+            | Self::TeachingEnded { .. }
+            | Self::WouldFall { .. }
+            | Self::MayFall { .. } => Facts::default(),
         }
     }
 }

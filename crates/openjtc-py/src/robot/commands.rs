@@ -1,12 +1,12 @@
 //! Motion without a trajectory (jogging, teaching), and stopping the arm.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use jtc_core::JOINTS;
-use jtc_host::error::facts_of_status;
 use jtc_host::port::Standstill;
 use jtc_host::port::halt::{End, Halt};
-use jtc_host::{Error, LinkError, Port as _, PortError, StateError, labels};
+use jtc_host::{Error, LinkError, Port as _, PortError, StateError};
 use jtc_wire::{ControllerState, TrajectoryState, fixed};
 
 use super::shared::Asked;
@@ -16,8 +16,6 @@ use crate::threads::lock;
 
 /// Maximum time from a Stop to standstill. The arm needs 0.5 s, or 1 s if it brakes with full torque (J-33).
 const STANDSTILL: Duration = Duration::from_secs(5);
-/// Time after the last recorded sample after which teaching counts as ended.
-const TAUGHT_NO_MORE: Duration = Duration::from_secs(1);
 
 /// Returns the error for a caller whose action was interrupted by a Stop.
 pub(super) fn stopped(what: &str) -> Failure {
@@ -144,28 +142,12 @@ impl WorkerState {
 
     /// Records the joint positions while the arm is guided by hand, for this time or until a Stop.
     pub(crate) fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
-        let start = self.session.now();
-        let mut last = start;
-        while !asked.is_halted() && self.session.now() - start < time {
-            let status = self.session.next_status()?;
-            if status.is_faulty() {
-                let failure =
-                    Failure::fault("run-fault", labels::errors_line(&status), labels::next_step(&status));
-                return Err(failure.with(facts_of_status(&status)));
-            }
-            let now = self.session.now();
-            if status.state == ControllerState::Teaching {
-                last = now;
-                lock(&self.shared.taught).push(((now - start).as_secs_f64(), status.positions()));
-            } else if now - last > TAUGHT_NO_MORE && !asked.is_halted() {
-                let message = format!("teaching has ended: the controller is in {}", status.state);
-                return Err(Failure::fault(
-                    "not-teaching",
-                    message,
-                    "start teaching again with `robot.teach()`",
-                ));
-            }
-        }
+        let shared = &self.shared;
+        let ended = |so_far| asked.is_halted() || so_far >= time;
+        self.session.record_teaching(ended, |time, positions| {
+            lock(&shared.taught).push((time.as_secs_f64(), positions));
+            ControlFlow::Continue(())
+        })?;
         Ok(())
     }
 }

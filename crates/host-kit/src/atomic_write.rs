@@ -3,13 +3,13 @@ use std::fs::{File, OpenOptions, metadata, read_link};
 use std::io::{Result, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a file completely, or leaves the old file unchanged. If the path is a link, the target of the link is
-/// written. The mode of an existing file is not changed. Pipes and terminals are not replaced; the data is written to
-/// them.
+/// Writes a file completely, or leaves the old file unchanged. If the path is a link, the function writes the target of
+/// the link. The permissions of an existing file stay the same. If the path is a pipe or a terminal, the data is
+/// written to it directly.
 ///
 /// # Errors
 ///
-/// The system's error; no temporary file is left.
+/// Returns the error of the operating system. After an error, no temporary file remains.
 pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
     let path = end_of_links(path);
     let before = metadata(&path).ok();
@@ -24,7 +24,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
             beside.as_file().set_permissions(mode)?;
             beside
         }
-        // A new file gets the system's default mode.
+        // A new file gets the default permissions of the system.
         None => builder.make_in(directory, |path| File::options().write(true).create_new(true).open(path))?,
     };
     beside.write_all(content)?;

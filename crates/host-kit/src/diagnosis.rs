@@ -1,23 +1,23 @@
-//! Errors with a kind, a short name, a next step and details for programs.
+//! Errors with a kind, a short name, a next step for the user, and details for programs.
 
 use std::error::Error;
 use std::io;
 
 use crate::{ErrorKind, Facts, Next};
 
-/// Parts of an error that a caller can use without a `match` of its variants.
+/// Description of an error that a caller can use without a `match` on the variants of the error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnosis {
-    /// Kind of failure.
+    /// Kind of the error.
     pub kind: ErrorKind,
-    /// A short name for programs.
+    /// Short name of the error, for programs.
     pub code: &'static str,
     /// Next step for the user; empty if no step helps.
     pub next: Next,
 }
 
 impl Diagnosis {
-    /// Creates a diagnosis from kind, short name and next step.
+    /// Creates a diagnosis from the kind, the short name and the next step of an error.
     pub fn new(kind: ErrorKind, code: &'static str, next: impl Into<Next>) -> Self {
         Self { kind, code, next: next.into() }
     }
@@ -25,31 +25,31 @@ impl Diagnosis {
 
 /// Error with the information that users and programs need to act.
 pub trait Diagnose: Error {
-    /// Returns kind, name and next step.
+    /// Returns the kind, the short name and the next step of this error.
     fn diagnosis(&self) -> Diagnosis;
 
-    /// Returns the board or joint of the error, the value and the limit.
+    /// Returns the board or joint of the error, the value and its limit.
     fn facts(&self) -> Facts {
         Facts::default()
     }
 
-    /// Returns the kind of failure.
+    /// Returns the kind of this error.
     fn kind(&self) -> ErrorKind {
         self.diagnosis().kind
     }
 
-    /// Returns a short name for programs.
+    /// Returns the short name of this error, for programs.
     fn code(&self) -> &'static str {
         self.diagnosis().code
     }
 
-    /// Returns the next step in the words of the command line; empty if no step helps.
+    /// Returns the next step, with the commands of the command line; empty if no step helps.
     fn hint(&self) -> String {
         self.diagnosis().next.to_string()
     }
 }
 
-/// An error of the operating system about a file or a thread.
+/// Error of the operating system about a file or a thread.
 impl Diagnose for io::Error {
     fn diagnosis(&self) -> Diagnosis {
         Diagnosis::new(ErrorKind::Usage, "io", "")

@@ -1,19 +1,19 @@
 //! Details of an error for programs: board, joint or point, with the value and its limit.
 
-/// Details of an error. A field is `None` if it does not apply.
+/// Details of an error. A field is `None` if it does not apply to the error.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
     /// Number of the board.
     pub board: Option<u8>,
     /// Number of the joint, 1 to 6 from the base.
     pub joint: Option<u8>,
-    /// Index of the trajectory point, from 0; during a motion, index of the 1 ms point.
+    /// Index of the trajectory point, from 0. For an error during a motion, index of the 1 ms point.
     pub point: Option<u32>,
-    /// Value that was found, in the unit of the message.
+    /// Value that caused the error, in the unit of the message.
     pub value: Option<f64>,
-    /// Limit of the value.
+    /// Limit of the value, in the same unit as the value.
     pub limit: Option<f64>,
-    /// Usual cause.
+    /// Usual cause of the error.
     pub cause: Option<&'static str>,
     /// Cause of a held stop, if the controller reports the cause.
     pub held_stop: Option<Box<HeldStopFacts>>,
@@ -22,11 +22,11 @@ pub struct Facts {
 /// Cause of a held stop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldStopFacts {
-    /// Name of the cause, with hyphens.
+    /// Name of the cause, with hyphens between the words.
     pub kind: String,
-    /// Unit of value and limit; empty if the cause has no value.
+    /// Unit of the value and of the limit; empty if the cause has no value.
     pub unit: &'static str,
-    /// Sentence without a full stop.
+    /// Sentence that describes the cause, without a full stop.
     pub text: String,
 }
 
@@ -36,12 +36,12 @@ impl Facts {
         Self { value: Some(value), limit: Some(limit), ..Self::default() }
     }
 
-    /// Sets the joint, 1 to 6 from the base.
+    /// Sets the number of the joint, 1 to 6 from the base.
     pub fn at_joint(self, joint: u8) -> Self {
         Self { joint: Some(joint), ..self }
     }
 
-    /// Sets the board.
+    /// Sets the number of the board.
     pub fn at_board(self, board: u8) -> Self {
         Self { board: Some(board), ..self }
     }

@@ -8,9 +8,9 @@ pub struct Failure {
     /// Kind of the failure. The kind determines the exit code of a command, the HTTP status of an agent and the
     /// exception in Python.
     pub kind: ErrorKind,
-    /// Short name for programs.
+    /// Short name of the failure, for programs.
     pub code: &'static str,
-    /// Sentence for the user, with request, board or joint, value and limit.
+    /// Sentence for the user. The sentence names the request, the board or joint, the value and the limit.
     pub message: String,
     /// Next step for the user; empty if no step helps.
     pub next: Next,
@@ -24,23 +24,23 @@ impl Failure {
         Self { kind, code, message: message.to_string(), next: Next::default(), facts: Box::default() }
     }
 
-    /// Creates a failure from all information of a library's error.
+    /// Creates a failure with the kind, short name, message, next step and facts of a library's error.
     pub fn of(error: &impl Diagnose) -> Self {
         let Diagnosis { kind, code, next } = error.diagnosis();
         Self::new(kind, code, error).next(next).with(error.facts())
     }
 
-    /// Creates a failure about wrong usage or unreadable input.
+    /// Creates a failure for wrong usage or unreadable input.
     pub fn usage(message: impl ToString) -> Self {
         Self::new(ErrorKind::Usage, "usage", message)
     }
 
-    /// Sets the next step.
+    /// Sets the next step for the user.
     pub fn next(self, next: impl Into<Next>) -> Self {
         Self { next: next.into(), ..self }
     }
 
-    /// Sets the facts.
+    /// Sets the facts of the failure.
     pub fn with(self, facts: Facts) -> Self {
         Self { facts: Box::new(facts), ..self }
     }
@@ -55,8 +55,8 @@ impl Failure {
         self.code.is_empty()
     }
 
-    /// Adds to the message that the port or the bus was not used. A failure whose reason is already printed stays
-    /// unchanged.
+    /// Adds to the message that nothing was sent on the port or the bus. A failure whose reason is already printed
+    /// stays unchanged.
     pub fn nothing_sent(failure: impl Into<Self>) -> Self {
         let failure = failure.into();
         if failure.is_shown() {

@@ -1,24 +1,24 @@
-//! Findings of a doctor: severity, description, likely cause, and next command.
+//! Findings of a doctor, the command that finds the cause of a problem.
 use std::fmt;
 
 use serde::Serialize;
 
 use crate::Next;
 
-/// Severity of a finding, the worst first.
+/// Severity of a finding. The most severe variant is first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Problem that must be solved before the system can work.
+    /// Problem that prevents any operation of the system.
     Problem,
     /// Deviation that does not prevent operation.
     Warning,
-    /// Correct state.
+    /// Correct state of the system.
     Good,
 }
 
 impl Severity {
-    /// Returns the mark before a line of a list: `✗`, `!` or `✓`.
+    /// Returns the mark that is printed before a finding: `✗`, `!` or `✓`.
     pub const fn mark(self) -> char {
         match self {
             Self::Problem => '✗',
@@ -28,16 +28,16 @@ impl Severity {
     }
 }
 
-/// Finding of a doctor.
+/// Finding of a doctor: severity, description, probable cause and next step.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// Severity of the finding.
     pub severity: Severity,
     /// Description of the finding.
     pub what: String,
-    /// Probable cause; may be empty.
+    /// Probable cause of the finding; may be empty.
     pub why: String,
-    /// Next command or action; empty if no action is needed.
+    /// Next step for the user; empty if no step is needed.
     pub next: Next,
 }
 
@@ -54,7 +54,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Collected findings.
+/// List of findings.
 #[derive(Clone, Debug, Default)]
 pub struct Findings(Vec<Finding>);
 
@@ -70,7 +70,7 @@ impl Findings {
         self.0.push(Finding { severity, what: what.into(), why: why.into(), next: next.into() });
     }
 
-    /// Adds a fault that prevents any operation.
+    /// Adds a problem that prevents any operation.
     pub fn problem(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<Next>) {
         self.add(Severity::Problem, what, why, next);
     }
@@ -80,7 +80,7 @@ impl Findings {
         self.add(Severity::Warning, what, why, next);
     }
 
-    /// Adds a check that found no problem.
+    /// Adds a finding about a correct state.
     pub fn good(&mut self, what: impl Into<String>) {
         self.add(Severity::Good, what, "", "");
     }
@@ -90,7 +90,8 @@ impl Findings {
         self.0.iter().any(|finding| finding.severity == Severity::Problem)
     }
 
-    /// Returns all findings, the worst first. Findings of equal severity stay in the order in which they were added.
+    /// Returns all findings, the most severe first. Findings of equal severity stay in the order in which they were
+    /// added.
     pub fn worst_first(mut self) -> Vec<Finding> {
         self.0.sort_by_key(|finding| finding.severity);
         self.0

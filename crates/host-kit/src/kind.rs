@@ -1,16 +1,16 @@
-//! Kinds of failure, so that a caller can react without knowing each error.
+//! Kinds of failure. A caller can react to the kind without knowing each error.
 
-/// Kind of failure of an error or a report, from the least to the most serious.
+/// Kind of failure of an error or a report, ordered from the least to the most serious.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ErrorKind {
     /// Wrong usage or unreadable input.
     Usage,
-    /// Refused by a check: nothing was sent, moved or changed.
+    /// A check refused the request: nothing was sent, moved or changed.
     Refused,
     /// The controller or a board reported an error.
     Device,
-    /// Port or bus not available, or no answer.
+    /// The port or the bus is not available, or no answer was received.
     NoLink,
-    /// An error or a cancellation during the operation.
+    /// The operation began, but then failed or was cancelled.
     Fault,
 }

@@ -5,24 +5,24 @@ use mcap::McapError;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// Longest record that is read, in bytes. Memory is allocated for the length that a damaged file states, before the
-/// missing bytes are detected.
+/// Longest record that the reader accepts, in bytes. The reader allocates memory for the stated length of a record
+/// before it detects that bytes are missing. A damaged file may state a wrong length, so a limit is needed.
 const MAX_RECORD: usize = 1 << 26;
 
 /// Passes the channels, messages and metadata of a file to `see`, including the messages in chunks. Returns `true` if
-/// the file was completed. Reads the file from beginning to end in small pieces, so that memory contains at most one
-/// record. Attachments and indices are skipped without reading them, because the library panics if they are damaged.
-/// Errors after the data are ignored, because only the index follows.
+/// the file is complete. The function reads the file from beginning to end in small pieces, so the memory contains at
+/// most one record. The function skips attachments and indices without reading them, because the `mcap` library panics
+/// if they are damaged. The function ignores errors after the data, because only the index follows the data.
 ///
 /// # Errors
 ///
-/// The first record that cannot be read, or that `see` refuses. The records before this record were already passed to
-/// `see`. Also an error of `file` itself.
+/// Returns an error at the first record that cannot be read or that `see` refuses, and for an error of `file` itself.
+/// The records before this record were already passed to `see`.
 pub fn each_record<E: From<McapError>>(
     mut file: impl Read,
     mut see: impl FnMut(Record<'_>) -> Result<(), E>,
 ) -> Result<bool, E> {
-    // An incomplete file has no end record.
+    // An incomplete file has no magic bytes at its end.
     let options =
         LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);

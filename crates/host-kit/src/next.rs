@@ -1,4 +1,5 @@
-//! Next steps for the user: sentences that contain actions. Each front end uses its own name for an action.
+//! Next steps for the user. A next step is a sentence that contains actions. Each front end uses its own name for an
+//! action.
 use std::borrow::Cow;
 use std::fmt;
 
@@ -15,7 +16,7 @@ pub enum FrontEnd {
     Python,
 }
 
-/// Defines [`Action`] and its names in each front end.
+/// Defines [`Action`] and the names of each action in the front ends.
 macro_rules! actions {
     ($($(#[$doc:meta])* $action:ident: $command:literal, $agent:literal, $python:literal;)*) => {
         /// Action or option that a next step names.
@@ -25,7 +26,7 @@ macro_rules! actions {
         }
 
         impl Action {
-            /// All actions.
+            /// All actions that a next step can name.
             pub const ALL: &[Self] = &[$(Self::$action),*];
 
             /// Returns the name of the action in a front end: a command, a request with the button of the dashboard, or a Python expression.
@@ -47,7 +48,7 @@ macro_rules! actions {
 actions! {
     /// Upload an arm to the controller.
     ArmPush: "jtc arm push FILE", "PUT /api/arm", "robot.push_arm(arm)";
-    /// Upload an arm to the controller and store it there.
+    /// Upload an arm to the controller and store the arm there.
     ArmStore: "jtc arm push --store", "PUT /api/arm with store: true", "robot.push_arm(arm, store=True)";
     /// Check an arm file.
     ArmCheck: "jtc arm check FILE", "jtc arm check FILE", "openjtc.Arm.load(…).findings()";
@@ -59,9 +60,9 @@ actions! {
     UseDefaults: "jtc params use-defaults", "POST /api/arm/defaults", "robot.use_defaults()";
     /// Upload friction and gains to the controller.
     ParamsPush: "jtc params push FILE", "Recover (POST /api/recover with arm)", "robot.recover(arm=…)";
-    /// List the joints that are set absent.
+    /// List the joints that are marked as absent.
     BenchShow: "jtc bench show", "GET /api/absent", "jtc bench show";
-    /// Set all joints present.
+    /// Mark all joints as present.
     BenchPresent: "jtc bench present", "PUT /api/absent with absent: []", "jtc bench present";
     /// Acknowledge a held stop and clear errors whose cause no longer exists.
     Clear: "jtc clear", "Acknowledge (POST /api/clear)", "robot.recover()";
@@ -73,13 +74,13 @@ actions! {
     DoctorAtRate: "jtc doctor --baud RATE", "jtc serve --baud RATE", "openjtc.connect(…, baud=…)";
     /// Explain states and errors.
     Explain: "jtc explain", "Explain (GET /api/explain)", "jtc explain";
-    /// Explain one code.
+    /// Explain one error code or state.
     ExplainCode: "jtc explain CODE", "Explain (GET /api/explain/{code})", "jtc explain CODE";
     /// Show versions and memory of the controller.
     Info: "jtc info", "GET /api/info", "robot.info";
-    /// Move one joint while the motion is requested.
+    /// Jog: move one joint as long as the motion is requested.
     Jog: "jtc jog", "Jog (POST /api/jog)", "robot.jog(…)";
-    /// Accept that the controller has other limits.
+    /// Accept that the limits in the controller differ from the arm file.
     AcceptDeviceLimits: "--accept-device-limits", "accept_device_limits: true", "accept_device_limits=True";
     /// Specify positions in degrees.
     Degrees: "--deg", "degrees: true", "degrees=True";
@@ -156,7 +157,7 @@ const NUMBER: &str = "{number}";
 /// Part of a next step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Part {
-    /// Words that all front ends show. Commands are enclosed in backticks.
+    /// Words that all front ends show unchanged. Commands in these words are enclosed in backticks.
     Words(Cow<'static, str>),
     /// Action, for which each front end shows its own name.
     Action {
@@ -193,7 +194,7 @@ impl Next {
         count
     }
 
-    /// Replaces the placeholders `{}` of a sentence.
+    /// Replaces each placeholder `{}` of a sentence by an action.
     #[doc(hidden)]
     pub fn filled(sentence: &'static str, actions: &[Action]) -> Self {
         let mut pieces = sentence.split("{}").map(Self::from);
@@ -206,7 +207,8 @@ impl Next {
         self.0.iter().any(|part| matches!(part, Part::Action { action, .. } if *action == wanted))
     }
 
-    /// Sets the command of an action, with all arguments, wherever the sentence contains the action.
+    /// Sets the command of an action, with all arguments. The command applies to every occurrence of the action in the
+    /// sentence.
     #[must_use]
     pub fn with_command(mut self, wanted: Action, command: &str) -> Self {
         for part in &mut self.0 {
@@ -312,8 +314,8 @@ impl From<Cow<'static, str>> for Next {
     }
 }
 
-/// Creates a [`Next`] from a sentence. Each `{}` in it is replaced by one of the [`Action`]s that follow, in their
-/// order.
+/// Creates a [`Next`] from a sentence. The macro replaces each `{}` of the sentence by one of the [`Action`]s that
+/// follow the sentence, in their order.
 #[macro_export]
 macro_rules! next {
     ($sentence:literal $(, $action:ident)* $(,)?) => {{

@@ -1,11 +1,12 @@
-//! Requests to the thread that owns a device, and Stops, which overtake these requests.
+//! Requests and Stops to the thread that owns a device. A Stop overtakes all waiting requests.
 //!
-//! A single thread owns a device: only this thread calls the device's functions. Other threads put requests into the
-//! [`Queue`] of this thread, which takes them one at a time. A request begins when the owner takes it from the queue.
+//! A single thread owns a device: only this owner thread calls the device's functions. Other threads put requests into
+//! the owner's [`Queue`]. The owner takes one request at a time. A request begins when the owner takes the request from
+//! the queue.
 //!
-//! Stops are numbered. A Stop cancels the current request, unless the current request is an update. A command or an
-//! update that was requested before a Stop and has not begun is refused. Therefore no command or update that was
-//! requested before a Stop begins after this Stop.
+//! Each Stop has a number. A Stop cancels the current request, unless the current request is an update. A Stop also
+//! refuses each earlier command or update that has not begun. Therefore no command or update that was requested before
+//! a Stop begins after this Stop.
 //!
 //! A front end stores its own data about a request in a tag, such as the client and the number of a job.
 use std::collections::VecDeque;
@@ -14,13 +15,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Command. A Stop refuses a waiting command, and cancels a command that has begun.
+    /// Command to a device. A Stop refuses a waiting command, and cancels a command that has begun.
     Command,
     /// Update of a device's program. A Stop refuses a waiting update. A Stop does not cancel an update that has begun,
     /// because a device with a half-written program would not work.
     Update,
-    /// Query, which does not change anything. A Stop cancels a query that has begun; a waiting query stays in the
-    /// queue. The owner takes a query after all commands and updates.
+    /// Query, which does not change anything. A Stop cancels a query that has begun. A waiting query stays in the queue
+    /// after a Stop. The owner takes a query after all commands and updates.
     Question,
 }
 
@@ -35,12 +36,12 @@ pub enum Refused {
     Closed,
 }
 
-/// Function of a request, which is called once, with the device `D` or with the reason why the request is not carried
-/// out.
+/// Function of a request. The function is called once, with the device `D` or with the reason why the request is
+/// refused.
 ///
-/// A refusal calls the function in the thread that refuses the request. This is the owner's thread, or a thread that
-/// cancels a request, requests a Stop or adds a request. During the call, no thread may hold a lock that the function
-/// needs.
+/// If the request is refused, the thread that refuses the request calls the function. The refusing thread is the owner,
+/// or a thread that cancels a request, requests a Stop or adds a request. The calling thread must not hold a lock that
+/// the function needs.
 pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 
 /// Value of [`Request::after`] for a request that no Stop refuses.
@@ -50,8 +51,8 @@ pub const NEVER_LATE: u64 = u64::MAX;
 pub struct Request<D, T> {
     /// Kind of the request.
     pub kind: Kind,
-    /// Number of the last Stop before the request: see [`Queue::stops`]. With [`NEVER_LATE`], no Stop refuses the
-    /// request. Queries do not use this number.
+    /// Number of the last Stop before the request was made: see [`Queue::stops`]. With [`NEVER_LATE`], no Stop refuses
+    /// the request. Queries do not use this number.
     pub after: u64,
     /// Data of the front end about the request.
     pub tag: T,
@@ -60,7 +61,7 @@ pub struct Request<D, T> {
 }
 
 impl<D, T> Request<D, T> {
-    /// Returns `true` if a Stop with a number up to `stops` came after the request and refuses it.
+    /// Returns `true` if the request must be refused because it was made before the Stop with the number `stops`.
     fn is_late(&self, stops: u64) -> bool {
         self.kind != Kind::Question && self.after < stops
     }
@@ -94,32 +95,32 @@ impl<D, T> Default for Queue<D, T> {
 
 impl<D, T: Clone> Queue<D, T> {
     fn lock(&self) -> MutexGuard<'_, State<D, T>> {
-        // If another thread panicked, the state may be incomplete, but a Stop must still work.
+        // If another thread panicked while it held the lock, the state may be incomplete. A Stop must still work.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the number of Stops so far, which is also the number of the last Stop.
+    /// Returns the number of Stops that were requested so far, which is also the number of the last Stop.
     pub fn stops(&self) -> u64 {
         self.lock().stops
     }
 
-    /// Requests a Stop. Cancels the current request, unless it is an update or a Stop, and puts `act` before all other
-    /// requests. Returns the number of the Stop. [`Queue::refuse_late`] should follow.
+    /// Requests a Stop. Cancels the current request, unless the current request is an update or a Stop. Puts `act`
+    /// before all waiting requests except earlier Stops. Returns the number of the Stop. The caller should then call
+    /// [`Queue::refuse_late`].
     ///
-    /// The owner must watch [`Queue::stops`] or [`Queue::is_cancelled`] while it carries out a request, because `act`
-    /// begins only when the current request has ended.
+    /// While the owner carries out a request, the owner must poll [`Queue::stops`] or [`Queue::is_cancelled`], because
+    /// `act` begins only after the current request has ended.
     pub fn stop(&self, tag: T, act: Act<D>) -> u64 {
         self.overtake(tag, act, false)
     }
 
-    /// Like [`Queue::stop`], for Stops that all have an equivalent function: `act` is dropped if another Stop already
-    /// waits.
+    /// Like [`Queue::stop`], for Stops whose functions are equivalent: drops `act` if another Stop already waits.
     pub fn stop_alike(&self, tag: T, act: Act<D>) -> u64 {
         self.overtake(tag, act, true)
     }
 
-    /// Like [`Queue::stop`], for a Stop that needs no function, for example because another program has already stopped
-    /// the device. Also refuses the late requests, like [`Queue::refuse_late`].
+    /// Like [`Queue::stop`], for a Stop without a function, for example if another program has already stopped the
+    /// device. Also refuses late requests, like [`Queue::refuse_late`].
     pub fn count_stop(&self) {
         self.lock().count_stop();
         self.refuse_late();
@@ -137,8 +138,8 @@ impl<D, T: Clone> Queue<D, T> {
         number
     }
 
-    /// Refuses all waiting commands and updates from before the last Stop. The owner would also refuse them, but only
-    /// later, when it takes them from the queue.
+    /// Refuses all waiting commands and updates that were requested before the last Stop. Without this call, the owner
+    /// would refuse these requests later, when it takes them from the queue.
     pub fn refuse_late(&self) {
         let late = {
             let state = &mut *self.lock();
@@ -148,18 +149,19 @@ impl<D, T: Clone> Queue<D, T> {
             state.waiting = waiting;
             late
         };
-        // The lock is not held here, because the function of a request may use the queue.
+        // The lock of the queue is already released, because the function of a request may use the queue.
         late.into_iter().for_each(|request| (request.act)(Err(Refused::Stopped)));
     }
 
-    /// Returns the permission to add one request. Returns `None` if the queue is closed.
+    /// Locks the queue and returns the permission to add one request. Returns `None` if the queue is closed.
     ///
-    /// A thread with this permission holds the lock of the queue, so it must not call other functions of the queue.
+    /// While a thread has this permission, the thread must not call other functions of the queue, because the
+    /// permission holds the lock of the queue.
     pub fn place(&self) -> Option<Place<'_, D, T>> {
         Some(Place(self.lock())).filter(|place| !place.0.closed)
     }
 
-    /// Adds a request to the queue; refuses it at once if the queue is closed.
+    /// Adds a request to the queue. If the queue is closed, refuses the request at once.
     pub fn put(&self, request: Request<D, T>) {
         match self.place() {
             Some(place) => place.put(request),
@@ -167,8 +169,8 @@ impl<D, T: Clone> Queue<D, T> {
         }
     }
 
-    /// Takes the next request, which is the current request until [`Queue::done`]. Stops are taken first, then commands
-    /// and updates, then queries.
+    /// Takes the next request from the queue. The taken request is the current request until the owner calls
+    /// [`Queue::done`]. Stops are taken first, then commands and updates, then queries.
     pub fn take(&self) -> Option<Turn<D, T>> {
         let mut state = self.lock();
         let (tag, act, refused, is_cancelled_by_stop) = match state.stopping.pop_front() {
@@ -179,36 +181,36 @@ impl<D, T: Clone> Queue<D, T> {
                 (request.tag, request.act, refused, request.kind != Kind::Update)
             }
         };
-        // A refused request never becomes the current request. When the requester receives the refusal, no work is in
-        // progress for this request.
+        // A refused request never becomes the current request. Therefore no work for this request is in progress when
+        // the requester receives the refusal.
         let current = Current { tag: tag.clone(), is_cancelled_by_stop, cancelled: false };
         state.current = refused.is_none().then_some(current);
         Some(Turn { tag, refused, act })
     }
 
-    /// Marks the current request as completed. The owner calls this function before the requester receives its answer,
-    /// and always after [`Turn::run`].
+    /// Marks the current request as completed. The owner calls this function after [`Turn::run`] and before the
+    /// requester receives its answer.
     pub fn done(&self) {
         self.lock().current = None;
     }
 
-    /// Returns `true` if the current request must end.
+    /// Returns `true` if the current request was cancelled, so it must end.
     pub fn is_cancelled(&self) -> bool {
         self.lock().current.as_ref().is_some_and(|current| current.cancelled)
     }
 
-    /// Returns `true` if a Stop waits that has not begun.
+    /// Returns `true` if a Stop waits in the queue.
     pub fn stop_waits(&self) -> bool {
         !self.lock().stopping.is_empty()
     }
 
-    /// Returns `true` if a request with a matching tag is current or waits.
+    /// Returns `true` if the current request or a waiting request has a matching tag.
     pub fn has(&self, is_it: impl Fn(&T) -> bool) -> bool {
         self.lock().tags().any(is_it)
     }
 
-    /// Cancels the request with a matching tag: a current request must end, a waiting request is refused. Returns
-    /// `false` if no matching request exists.
+    /// Cancels the request with a matching tag. The current request is marked as cancelled, a waiting request is
+    /// refused. Returns `false` if no matching request exists.
     pub fn cancel(&self, is_it: impl Fn(&T) -> bool) -> bool {
         let request = {
             let mut state = self.lock();
@@ -219,12 +221,12 @@ impl<D, T: Clone> Queue<D, T> {
             let at = state.waiting.iter().position(|request| is_it(&request.tag));
             at.and_then(|at| state.waiting.remove(at))
         };
-        // The lock is not held here, because the function of the request may use the queue.
+        // The lock of the queue is already released, because the function of the request may use the queue.
         request.map(|request| (request.act)(Err(Refused::Cancelled))).is_some()
     }
 
-    /// Closes the queue: all waiting and all later requests are refused. Only the owner calls this function, when it
-    /// ends.
+    /// Closes the queue: all waiting and all later requests are refused. Only the owner calls this function, before the
+    /// owner ends.
     pub fn close(&self) {
         let (stopping, waiting) = {
             let mut state = self.lock();
@@ -240,7 +242,8 @@ impl<D, T: Clone> Queue<D, T> {
 }
 
 impl<D, T> State<D, T> {
-    /// Counts a Stop, and cancels the current request. Returns the number of the Stop.
+    /// Counts a Stop, and cancels the current request unless the current request is an update or a Stop. Returns the
+    /// number of the Stop.
     fn count_stop(&mut self) -> u64 {
         self.stops += 1;
         if let Some(current) = &mut self.current {
@@ -255,26 +258,25 @@ impl<D, T> State<D, T> {
     }
 }
 
-/// Permission to add one request to a queue; it holds the lock of the queue.
+/// Permission to add one request to a queue. The permission holds the lock of the queue.
 pub struct Place<'a, D, T>(MutexGuard<'a, State<D, T>>);
 
 impl<D, T> Place<'_, D, T> {
-    /// Returns the tags of the current request and of all waiting requests, except the tags of Stops that have not
-    /// begun.
+    /// Returns the tags of the current request and of all waiting requests. The tags of waiting Stops are not included.
     pub fn tags(&self) -> impl Iterator<Item = &T> {
         self.0.tags()
     }
 
-    /// Returns the number of waiting requests of the kinds in the argument.
+    /// Returns the number of waiting requests with a kind that `is_it` accepts.
     pub fn waiting(&self, is_it: impl Fn(Kind) -> bool) -> usize {
         self.0.waiting.iter().filter(|request| is_it(request.kind)).count()
     }
 
-    /// Adds the request to the queue: a command or an update before all queries. A command or an update from before the
-    /// last Stop is refused.
+    /// Adds a command or an update before all queries, and a query at the end of the queue. Refuses a command or an
+    /// update that was requested before the last Stop.
     pub fn put(mut self, request: Request<D, T>) {
         if request.is_late(self.0.stops) {
-            // The lock is not held here, because the function of the request may use the queue.
+            // The lock of the queue is already released, because the function of the request may use the queue.
             drop(self);
             return (request.act)(Err(Refused::Stopped));
         }
@@ -295,7 +297,7 @@ pub struct Turn<D, T> {
 }
 
 impl<D, T> Turn<D, T> {
-    /// Carries out the request, or refuses it.
+    /// Carries out the request or refuses the request.
     pub fn run(self, device: &mut D) {
         (self.act)(match self.refused {
             Some(refused) => Err(refused),
@@ -310,7 +312,7 @@ mod tests {
 
     use super::*;
 
-    /// Device that stores the tags of the requests that were carried out.
+    /// Simulated device that stores the tags of the requests that were carried out.
     type Done = Vec<u32>;
     type Log = Arc<Mutex<Vec<(u32, Option<Refused>)>>>;
 
@@ -374,7 +376,8 @@ mod tests {
         let stop = |bench: &Bench, tag| bench.queue.stop_alike(tag, bench.act(tag));
         assert_eq!((stop(&bench, 1), stop(&bench, 2)), (1, 2));
         let turn = bench.queue.take().expect("the first waits");
-        // The first request has begun, and may have checked for a Stop before the third request was made.
+        // The first Stop has begun, and may have checked for a Stop before the third Stop was requested. Therefore the
+        // queue keeps the function of the third Stop.
         assert_eq!(stop(&bench, 3), 3);
         turn.run(&mut bench.device);
         bench.serve();
@@ -389,7 +392,7 @@ mod tests {
         bench.request(Kind::Update, before, 2);
         bench.request(Kind::Question, before, 3);
         assert_eq!(bench.stop(6), before + 1);
-        // The request was made before the Stop but was added to the queue after it.
+        // The request was made before the Stop but was added to the queue after the Stop.
         bench.request(Kind::Command, before, 4);
         bench.request(Kind::Command, bench.queue.stops(), 5);
         bench.serve();
@@ -495,7 +498,7 @@ mod tests {
     fn a_closed_queue_refuses_all_requests() {
         let mut bench = Bench::default();
         bench.request(Kind::Command, 0, 1);
-        // The owner drops the request before it is complete.
+        // The owner drops the request before the request is complete.
         drop(bench.queue.take());
         bench.request(Kind::Command, 0, 2);
         bench.stop(3);

@@ -1,12 +1,13 @@
-//! Similarity of names, for “did you mean …?” hints after a typing error.
+//! Similarity of names for “did you mean …?” hints after a typing error.
 
-/// Returns the similarity of two names, 0 to 1, by the Jaro-Winkler method, which gives more weight to the beginning.
+/// Returns the Jaro-Winkler similarity of two names, 0 to 1. The Jaro-Winkler method gives more weight to the beginning
+/// of a name.
 pub fn similarity(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(a, b)
 }
 
-/// Returns the known name that is most similar to `name`, if its similarity is at least `least`, 0 to 1; upper and
-/// lower case count as equal.
+/// Returns the known name that is most similar to `name`. Returns `None` if no known name has a similarity, 0 to 1, of
+/// at least `least`. Upper and lower case count as equal.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, least: f64) -> Option<&'a str> {
     let name = name.to_lowercase();
     let all = known.into_iter().map(|known| (similarity(&known.to_lowercase(), &name), known));

@@ -1,10 +1,10 @@
-//! Folder for the user's files of a program.
+//! Folder in which a program stores the files of the user.
 use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Returns the folder that a variable of the XDG Base Directory Specification names, such as `XDG_CACHE_HOME`. If the
-/// variable is not set, returns `in_home` in the folder of `HOME`. Returns `None` if `HOME` is not set either. An empty
-/// variable is treated as not set.
+/// variable is not set, returns the subfolder `in_home` of the home folder `HOME`. Returns `None` if `HOME` is not set
+/// either. An empty variable is treated as not set.
 pub fn user_folder(variable: &str, in_home: &str) -> Option<PathBuf> {
     folder(|name| std::env::var_os(name), variable, in_home)
 }

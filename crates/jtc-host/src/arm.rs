@@ -52,7 +52,7 @@ mod urdf {
     }
 }
 
-/// File of the default arm, as delivered with the program.
+/// Text of the arm file of the default arm, which is delivered with the program.
 pub const AVENA_TOML: &str = include_str!("../../../arms/avena.toml");
 
 /// Selection of the arm in a robot description with more than six joints.
@@ -60,15 +60,15 @@ pub const AVENA_TOML: &str = include_str!("../../../arms/avena.toml");
 pub struct ArmChoice {
     /// Names of the six moving joints, base to wrist. `None` if the description has exactly six moving joints.
     pub joints: Option<Vec<String>>,
-    /// Name of the last link of the arm: only joints on the path to this link are considered. `None` selects the flange, which is fixed to
-    /// the last joint.
+    /// Name of the last link of the arm. Only joints on the path to this link can belong to the arm. `None` selects the flange, which is
+    /// fixed to the last joint.
     pub tip: Option<String>,
 }
 
-/// Arm from a robot description, with those values of the description for which [`Arm`] has no field.
+/// Arm from a robot description, with the gravity and the friction from this description.
 struct Described {
     arm: Arm,
-    /// Acceleration of gravity in the base frame, m/s². In the robot description, z points upwards.
+    /// Acceleration of gravity in the base frame, m/s². In the frame of the robot description, z points upwards.
     gravity: [f64; 3],
     /// Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint.
     friction: [[f64; 2]; JOINTS],
@@ -85,42 +85,43 @@ pub struct Arm {
     pub link_names: [String; JOINTS + 1],
     /// Name of the fixed joint that carries the flange.
     pub flange_name: String,
-    /// Kinematics and masses.
+    /// Kinematics and masses of the arm.
     pub model: ArmModel,
-    /// Limits and rotor inertia, base to wrist.
+    /// Limits and rotor inertia of each joint, base to wrist.
     pub joints: [JointConfig; JOINTS],
-    /// For each joint, base to wrist: `true` if the file contains the rotor inertia. Otherwise the rotor inertia in `joints` is 0.
+    /// For each joint, base to wrist: `true` if the file contains the rotor inertia of the joint. If the value is `false`, the rotor
+    /// inertia in `joints` is 0.
     pub rotors_given: [bool; JOINTS],
-    /// Acceleration of gravity in the base frame, m/s². `None`: the controller's setting is used.
+    /// Acceleration of gravity in the base frame, m/s². If the value is `None`, the controller's setting is used.
     pub gravity: Option<[f64; 3]>,
     /// Controller settings from the `[settings]` table of the arm file.
     pub others: Vec<SettingValue>,
-    /// Gains.
+    /// Gains of each joint.
     pub pid: Option<[PidGains; JOINTS]>,
-    /// Friction polynomial, coefficients c0 to c5.
+    /// Friction polynomial of each joint, coefficients c0 to c5.
     pub polynomial: Option<[[f64; 6]; JOINTS]>,
-    /// Friction tables.
+    /// Friction table of each joint.
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
     /// Named joint positions, rad. Poses are not sent to a controller and are not part of the hash of an arm.
     pub poses: Poses,
-    /// Warnings about values of the file that the loader ignored or filled in.
+    /// Warnings about values of the file that the loader ignored, changed or filled in.
     pub warnings: Vec<Warning>,
-    /// Source of each number.
+    /// Source of each number: the arm file, a proposal or a default.
     pub sources: Sources,
 }
 
 impl Arm {
-    /// The default arm.
+    /// Returns the default arm.
     pub fn avena() -> Self {
         Self::from_toml(AVENA_TOML).expect("the delivered arm file is good: tests read it")
     }
 
-    /// Loads an arm from a TOML or URDF file; the content of the file determines the format.
+    /// Loads an arm from a TOML or URDF file. The content of the file determines the format.
     ///
     /// # Errors
     ///
-    /// Returns an error with the position in the file if the file cannot be read, its format is unknown, or its numbers do not describe an
-    /// arm that these drives can move.
+    /// Returns an error with the position in the file if the file cannot be read, or if its format is unknown. Also returns an error if the
+    /// arm is physically impossible or its drives cannot move it.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| e.in_file(path))
@@ -130,14 +131,14 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error with the position in the text if the format is unknown, or if the numbers do not describe an arm that these drives
-    /// can move.
+    /// Returns an error with the position in the text if the format is unknown, if the arm is physically impossible, or if its drives
+    /// cannot move it.
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let arm = if is_xml(text) { Self::from_urdf(text)? } else { Self::from_toml(text)? };
         arm.checked()
     }
 
-    /// Reads an arm from the text of a URDF file in which only the six joints of the arm move.
+    /// Reads an arm from the text of a URDF file. In this file, only the six joints of the arm may move.
     ///
     /// # Errors
     ///
@@ -146,7 +147,7 @@ impl Arm {
         Self::from_urdf_with(text, &ArmChoice::default())
     }
 
-    /// Reads an arm from the text of a URDF file; `choice` selects the arm.
+    /// Reads an arm from the text of a URDF file. `choice` selects the joints of the arm.
     ///
     /// # Errors
     ///
@@ -155,22 +156,23 @@ impl Arm {
         urdf::read(text, choice).map(|described| described.arm)
     }
 
-    /// Imports an arm from a URDF file; `choice` selects the arm. The [`RULES`] propose missing values, which are marked in the arm.
+    /// Imports an arm from a URDF file. `choice` selects the joints of the arm. The [`RULES`] propose values that are missing in the file,
+    /// and the arm marks each proposed value.
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read, is not a valid URDF, does not determine the six joints, or does not describe an
-    /// arm that these drives can move.
+    /// Returns an error if the file cannot be read, is not a valid URDF, or does not determine the six joints. Also returns an error if the
+    /// arm is physically impossible or its drives cannot move it.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::import_text(&text, choice).map_err(|e| e.in_file(path))
     }
 
-    /// Like [`import`](Self::import), from the text of the file.
+    /// Like [`import`](Self::import), but reads the text of a URDF file.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`import`](Self::import).
+    /// Returns the same errors as [`import`](Self::import).
     pub fn import_text(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         if !is_xml(text) {
             return Err(FileError::form("is not a robot description: a URDF is XML and begins with <"));
@@ -181,7 +183,7 @@ impl Arm {
         Ok(arm)
     }
 
-    /// Loads an arm from a TOML or URDF file without checking its numbers. [`Arm::check`] reports invalid numbers.
+    /// Loads an arm from a TOML or URDF file without a check of the numbers. [`Arm::check`] reports invalid numbers.
     ///
     /// # Errors
     ///
@@ -192,20 +194,20 @@ impl Arm {
         arm.map_err(|e| e.in_file(path))
     }
 
-    /// Returns the arm, or an error if its numbers do not describe an arm that these drives can move.
+    /// Returns the arm, or an error if the arm is physically impossible or its drives cannot move it.
     fn checked(self) -> Result<Self, FileError> {
         self.is_physical()?;
         Ok(self)
     }
 
-    /// Checks that the numbers describe an arm that these drives can move.
+    /// Checks that the arm is physically possible and that the drives can move the arm.
     ///
     /// # Errors
     ///
     /// Returns an error with the first invalid number of the model or of the limits.
     pub fn is_physical(&self) -> Result<(), FileError> {
         self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
-        // J-35, J-43: rejects limits that the drives cannot respect, or at which the drives stop without a command.
+        // J-35, J-43: rejects joint limits that the drives cannot respect, or at which the drives stop without a command.
         self.config().check().map_err(|e| {
             let name =
                 e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
@@ -213,7 +215,7 @@ impl Arm {
         })
     }
 
-    /// Returns the name, as in the file, of the joint or link with the model error.
+    /// Returns the name of the joint or link that has the model error. The name is the name in the file.
     fn name_of_part(&self, error: &ModelError) -> String {
         let part = if error.is_of_joint() { &self.joint_names[..] } else { &self.link_names[..] };
         let kind = if error.is_of_joint() { "joint" } else { "link" };
@@ -221,31 +223,31 @@ impl Arm {
         format!("arm model, {kind} {name}")
     }
 
-    /// Returns the controller settings for this arm. Values that are missing in the arm are taken from the default arm, but an unknown
+    /// Returns the controller settings for this arm. If the arm does not have a value, the value of the default arm is used, but an unknown
     /// rotor inertia is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
         let mut config =
             Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default };
         for value in &self.others {
-            // The code skips an out-of-range value. The file readers reject out-of-range values.
+            // `apply` skips an out-of-range value, but the file readers have already rejected such values.
             let _ = settings::apply(&mut config, *value);
         }
         config
     }
 
-    /// Returns the friction compensation: the polynomial if the arm has one, otherwise the table.
+    /// Returns the friction compensation: the friction polynomial if the arm has one, otherwise the friction table.
     pub fn friction(&self) -> Option<Friction> {
         let polynomial = self.polynomial.map(Friction::Polynomial);
         polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table(**t)))
     }
 
-    /// Returns the parameters for a controller, with the friction of [`friction`](Self::friction).
+    /// Returns the parameters for a controller. [`friction`](Self::friction) selects the friction compensation.
     pub fn parameter_set(&self) -> ParameterSet {
         ParameterSet { friction: self.friction(), pid: self.pid, model: Some(self.model) }
     }
 
-    /// Returns the controller parameters for this arm. Values that are missing in the arm are taken from the default arm.
+    /// Returns the controller parameters for this arm. If the arm does not have a value, the value of the default arm is used.
     pub fn parameters(&self) -> Parameters {
         let default = Parameters::avena();
         Parameters {
@@ -279,7 +281,7 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a controller setting without its own key in an arm file; the file lists such a setting in `[settings]`.
+/// Returns `true` for a controller setting that does not have its own key in an arm file. An arm file lists such a setting in `[settings]`.
 fn has_no_key(setting: &Setting) -> bool {
     setting.of_arm() && !setting.of_joint() && !setting.name.starts_with("gravity_")
 }

@@ -1,9 +1,9 @@
-//! Check of a trajectory before it is sent. The check covers limits at and between the points, jumps, contradictory values, torque during
-//! the motion, torque at rest, the ability to stop, and the start pose.
+//! Check of a trajectory before it is sent to a controller. The check finds exceeded limits at and between the points, jumps, contradictory
+//! values and a wrong start pose. The check also covers the torque during the motion and at rest, and the ability to stop.
 //!
-//! Between points the check runs the controller's own interpolation once per millisecond, with the rounded numbers of the serial frames. So
-//! the check computes the same values as the controller. The controller's own check (J-36) also uses these values, so the controller
-//! accepts every trajectory that passes this check.
+//! Between the points, the check runs the controller's interpolation once per millisecond, with the rounded numbers of the serial frames.
+//! Therefore the check computes the same values as the controller. The controller's own check (J-36) also uses these values, so the
+//! controller accepts every trajectory that passes the check of the host.
 
 mod cause;
 mod checked;
@@ -33,27 +33,27 @@ pub use verdict::{JointFigures, Suspicion, Verdict};
 use crate::plan::COLD;
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Bearing temperature that a check assumes, °C.
+/// Bearing temperature that a check assumes by default, °C.
 pub const TEMPERATURE: f64 = 30.0;
 
-/// Settings of a check.
+/// Settings of the check of a trajectory.
 #[derive(Clone, Debug)]
 pub struct Checker<'a> {
-    /// Settings with the limits, rotor inertia, gravity, payload and start tolerance.
+    /// Controller settings with the limits, rotor inertias, gravity, payload and start tolerance.
     pub config: &'a Config,
-    /// Arm model for the torque along the path; if `None`, torque is not checked.
+    /// Arm model for the computation of the torque along the path. If the model is `None`, the torque is not checked.
     pub model: Option<&'a ArmModel>,
-    /// Friction compensation that the controller will add to the torque of the model.
+    /// Friction compensation that the controller will add to the torque of the arm model.
     pub friction: Option<&'a Friction>,
     /// Bearing temperature for which the friction is computed, °C.
     pub temperature: f64,
-    /// Measured position of the arm, rad; if `None`, the start pose is not checked.
+    /// Measured position of the arm, rad. If the position is `None`, the start pose is not checked.
     pub start: Option<[f64; JOINTS]>,
-    /// Division into segments for the upload.
+    /// Division of the trajectory into segments for the upload.
     pub upload: UploadOptions,
 }
 
-/// Positions that a path may contain (J-36).
+/// Range of positions that a path may contain (J-36).
 struct Positions {
     ranges: [PathRange; JOINTS],
     /// Positions at the first point of the path.
@@ -84,8 +84,8 @@ impl<'a> Checker<'a> {
     pub fn check(&self, trajectory: &Trajectory) -> Verdict {
         let mut verdict = Verdict::new(trajectory);
         self.counts(trajectory, &mut verdict);
-        // Trajectory points with the values that the controller will receive. A number outside the range of a serial frame is a problem. The
-        // check then continues with the unrounded number.
+        // Trajectory points with the values that the controller will receive. A number outside the range of a serial frame is a problem,
+        // and the check continues with the unrounded number.
         let points: Vec<SetPoint> = trajectory
             .points
             .iter()
@@ -110,7 +110,7 @@ impl<'a> Checker<'a> {
             let stands_there = self.start.is_some();
             holding::holds(self.config, dynamics, trajectory.step_ms, &points, stands_there, &mut verdict);
         }
-        // A path that cannot be executed at all is not checked for the ability to stop.
+        // If the path cannot be executed at all, the ability to stop is not checked.
         if let Some(dynamics) = dynamics.filter(|_| verdict.problems.iter().all(|p| !p.kind.stops_at_once()))
         {
             stopping::stops(self.config, &dynamics, trajectory.step_ms, &points, &mut verdict);
@@ -118,8 +118,8 @@ impl<'a> Checker<'a> {
         verdict.done()
     }
 
-    /// Adds the problems that the controller's own check would find during the upload (J-36). Problems that are already known are
-    /// unchanged.
+    /// Adds the problems that the controller's own check would find during the upload (J-36). A problem that is already in the verdict is
+    /// not added again, unless its occurrences are counted.
     fn controller(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
         let tables = match self.friction {
             Some(Friction::Table(tables)) => Some(tables),
@@ -222,7 +222,7 @@ impl<'a> Checker<'a> {
             self.moment(a, i, 0.0, &places, dynamics, verdict);
             let Some(b) = points.get(i + 1) else { break };
             let senseless = self.step(a, b, i, h, verdict);
-            // A step of 1 ms contains no further millisecond, so the check uses the middle of the step.
+            // A step of 1 ms has no millisecond between its points, so the check uses the middle of the step.
             for k in 1..step_ms.max(2) {
                 let u = f64::from(k) / f64::from(step_ms.max(2));
                 for (figures, speed) in verdict.joints.iter_mut().zip(position_speed(a, b, h, u)) {
@@ -235,14 +235,15 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Finds jumps and contradictory values between two points. Returns `true` if no reasonable motion connects the points.
+    /// Finds jumps and contradictory values between two points. Returns `true` if there is a jump between the points.
     fn step(&self, a: &SetPoint, b: &SetPoint, i: usize, h: f64, verdict: &mut Verdict) -> bool {
         let mut senseless = false;
         for (joint, limit) in Joint::ALL.into_iter().zip(&self.config.joints) {
             let j = joint.index();
             let (moved, v0, v1) = (b.position[j] - a.position[j], a.velocity[j], b.velocity[j]);
             let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
-            // Displacement that follows from the velocities of both points. `slack` is the tolerance for the rounding of these velocities.
+            // `expected` is the displacement that follows from the velocities of both points. `slack` is the tolerance for rounding and for
+            // the change of velocity.
             let expected = 0.5 * h * (v0 + v1);
             let slack = 3.0 * POSITION_BIT
                 + h * (0.5 * (v1 - v0).abs() + 2.0 * VELOCITY_BIT)

@@ -1,4 +1,4 @@
-//! Diagnosis of the link, the bus and the set-up, as text with the next command.
+//! Diagnosis of the serial link, the joint bus and the parameters. Each finding about a fault contains the next step.
 
 use std::time::Duration;
 
@@ -11,43 +11,44 @@ use crate::held_stop::{self, HeldStop};
 use crate::port::Port;
 use crate::{Error, Session, labels};
 
-/// Bit rates that are tried if the received bytes do not contain a valid frame.
+/// Bit rates that the doctor tries if the received bytes do not contain a valid frame.
 pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
 
-/// Interval at which an examination checks if the caller wants to end it.
+/// Interval at which an examination checks if the caller has ended it.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Observed facts about the link.
+/// Facts that were observed on the link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
-    /// Bit rate of the port, Bd.
+    /// Bit rate of the serial port, Bd.
     pub baud: Option<u32>,
     /// Duration of the examination, s.
     pub time_s: f64,
-    /// Number of bytes received.
+    /// Number of bytes received during the examination.
     pub bytes: u64,
-    /// Number of bytes that are not part of a status.
+    /// Number of received bytes that are not part of a status frame.
     pub bad_bytes: u64,
-    /// Number of status frames received.
+    /// Number of status frames received during the examination.
     pub statuses: u64,
-    /// Last status.
+    /// Last status that was received.
     pub status: Option<Status>,
-    /// `true` if a request was confirmed; `None` if no request was sent.
+    /// `true` if the controller confirmed a request; `None` if no request was sent.
     pub confirmed: Option<bool>,
     /// Another bit rate at which status frames were received.
     pub other_baud: Option<u32>,
     /// Joints that the user has marked as absent (J-53).
     pub absent: Vec<Joint>,
-    /// Report of the controller about a held stop and the encoders (J-69); `None` if it was not requested or is not supported.
+    /// Report of the controller about a held stop and the encoders (J-69); `None` if the report was not requested or is not supported.
     pub reactions: Option<Reactions>,
 }
 
 impl<P: Port> Session<P> {
-    /// Listens for `time`. Silence is an observation, not an error.
+    /// Receives from the port for the duration `time` and returns the observed facts. A port without received bytes is an observation, not
+    /// an error.
     ///
     /// # Errors
     ///
-    /// Returns an error if the port is lost. Silence is an observation, not an error.
+    /// Returns an error if the port is lost.
     pub fn examine(&mut self, time: Duration) -> Result<Observation, Error> {
         self.examine_until(time, || false)
     }
@@ -56,7 +57,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::examine`].
+    /// Returns the same errors as [`Session::examine`].
     pub fn examine_until(&mut self, time: Duration, ended: impl Fn() -> bool) -> Result<Observation, Error> {
         let (start, before) = (self.now(), self.statistics());
         let end = start + time;
@@ -84,7 +85,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the findings of a diagnosis, worst first.
+/// Returns the findings of a diagnosis, the worst first.
 pub fn findings(seen: &Observation) -> Vec<Finding> {
     let mut all = Findings::default();
     link(seen, &mut all);
@@ -129,7 +130,7 @@ fn link(seen: &Observation, all: &mut Findings) {
         return;
     }
     let bad = seen.bad_bytes as f64 / seen.bytes as f64;
-    // The first status may be incomplete, because the observation can begin in the middle of a status.
+    // The observation can begin in the middle of a status, so the bytes of one incomplete status are not a fault.
     if seen.bad_bytes > 175 && bad > 0.001 {
         all.add(
             Warning,
@@ -159,7 +160,8 @@ fn link(seen: &Observation, all: &mut Findings) {
     }
 }
 
-/// Finds drives that answer although the user has marked their joint as absent. The status has no error bit for this fault (J-53).
+/// Finds drives that answer although the user has marked their joint as absent. The status frame does not have an error bit for this fault
+/// (J-53).
 fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     for joint in joints {
         let state = s.joints[joint.index()].state;
@@ -192,7 +194,7 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
             held_stop::next_step(s, Some(cause)),
         );
     }
-    // The finding about the cause already contains this joint.
+    // The finding about the cause of the held stop already contains the joint `said`.
     let said = cause.filter(|(cause, _)| cause.kind == StopKind::EncoderJump);
     let said = said.and_then(|(cause, _)| held_stop::joint(cause));
     let jumped = held_stop::joints(reactions.map_or(0, |reactions| reactions.jumped));
@@ -206,14 +208,14 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
     }
 }
 
-/// Returns the cause of the current held stop and the age of that cause in ms.
+/// Returns the cause of the current held stop and the age of this cause, ms.
 fn cause<'a>(s: &Status, reactions: Option<&'a Reactions>) -> Option<(&'a StopCause, u32)> {
     let (cause, ago_ms) = reactions?.stop.as_ref()?;
     s.is_held_stop().then_some((cause, *ago_ms))
 }
 
-/// Finds errors in the status. If `told` is `true`, a finding about the cause of a held stop already exists and is more precise than the
-/// errors of the joints.
+/// Finds errors in the status. If `told` is `true`, a finding about the cause of a held stop already exists. This finding is more precise
+/// than the errors of the joints, so these joint errors are not added.
 fn errors(s: &Status, told: bool, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & error::EMERGENCY_INPUT != 0 {
@@ -316,12 +318,12 @@ fn set_up(s: &Status, all: &mut Findings) {
     }
 }
 
-/// Bearing temperature above which friction and service life deteriorate, °C.
+/// Bearing temperature above which a warning is added, °C. Above this temperature, the friction and the service life become worse.
 const HOT: u8 = 70;
 
 fn temperatures(s: &Status, all: &mut Findings) {
     for (j, joint) in s.joints.iter().enumerate() {
-        // A byte of 200 or more is a negative temperature.
+        // A temperature byte of 200 or more is a negative temperature.
         if (HOT..200).contains(&joint.temperature) {
             let what = format!("{}: bearing at {} °C", labels::node(j), joint.temperature);
             all.add(

@@ -1,5 +1,5 @@
-//! Errors of this library, each with the facts, the kind of failure and the next command. Each operation has its own error enum, and
-//! [`Error`] covers all of them.
+//! Errors of this library. Each error has facts, a kind of failure and a next command. Each operation has its own error enum, and [`Error`]
+//! contains all these enums.
 
 mod check;
 mod extension;
@@ -27,38 +27,38 @@ use crate::arm::ParameterError;
 use crate::file::FileError;
 use crate::port::PortError;
 
-/// Any error of this library, for operations that can return errors of several enums.
+/// Any error of this library. Operations that can return errors of several enums use this type.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// Error in the communication with the controller.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// Error while the library waited for a state.
+    /// Error while the library waited for a state of the controller.
     #[error(transparent)]
     State(#[from] StateError),
-    /// Error in an upload.
+    /// Error during the upload of a trajectory.
     #[error(transparent)]
     Upload(#[from] UploadError),
     /// Error before or during the execution of a motion.
     #[error(transparent)]
     Motion(#[from] MotionError),
-    /// Error while parameters were sent.
+    /// Error while parameters were sent to the controller.
     #[error(transparent)]
     Parameters(#[from] ParametersError),
     /// Error from the check of a trajectory.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// Error while a whole arm was read, sent or stored.
+    /// Error while all values of an arm were read, sent or stored.
     #[error(transparent)]
     Extension(#[from] ExtensionError),
-    /// A file cannot be read or understood.
+    /// A file cannot be read or its content is not valid.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A number or a count is out of range for its frame.
+    /// A number or a count is out of range for its serial frame.
     #[error(transparent)]
     Frame(#[from] jtc_wire::EncodeError),
-    /// The caller's callback cancelled the operation.
+    /// The callback function of the caller cancelled the operation.
     #[error("cancelled")]
     Cancelled,
 }

@@ -1,4 +1,4 @@
-//! Example files, and the page about file formats.
+//! Example files, and the documentation page about file formats.
 //!
 //! The trajectories begin and end at the zero pose, in which `jtc sim` starts.
 
@@ -17,10 +17,10 @@ pub use demo::demo_motion;
 /// Page about the file formats, with an example of each format.
 pub const FORMS: &str = include_str!("example/forms.md");
 
-/// Faults for a simulated arm.
+/// Example file with faults for a simulated arm.
 const FAULTS: &str = include_str!("example/faults.toml");
 
-/// Waypoints of a cycle.
+/// Waypoints of a cyclic motion, which ends at its first waypoint.
 const CYCLE: &str = include_str!("example/cycle.csv");
 
 /// Waypoints between which the flange moves along lines and an arc.
@@ -28,10 +28,10 @@ const LINES: &str = include_str!("example/lines.csv");
 
 /// Largest deflection of each joint in the examples, rad.
 const BEND: [f64; JOINTS] = [0.8, 0.45, -0.7, 0.9, 0.6, -1.2];
-/// Duration of the example motion (s), followed by the time between its points (ms).
+/// Duration of the example motion, s. `STEP_MS` is the time between its points, ms.
 const DURATION_S: f64 = 6.0;
 const STEP_MS: u16 = 10;
-/// Times of the waypoints, s.
+/// Times of the waypoints of the example motion, s.
 const WAYPOINTS_S: [f64; 9] = [0.0, 0.75, 1.5, 2.25, 3.0, 3.75, 4.5, 5.25, 6.0];
 
 /// Example file.
@@ -43,13 +43,13 @@ pub struct Example {
     pub file: &'static str,
     /// Description of the example.
     pub what: &'static str,
-    /// Command that uses the example; `{}` is replaced by the file name.
+    /// Command that uses the example. `{}` in this text stands for the file name.
     pub next: &'static str,
     text: fn() -> String,
 }
 
 impl Example {
-    /// Returns the content of the file.
+    /// Returns the content of the example file.
     pub fn text(&self) -> String {
         (self.text)()
     }
@@ -127,9 +127,10 @@ pub const EXAMPLES: [Example; 9] = [
     },
 ];
 
-/// Returns the point at `t` of a motion along a `sin⁴` curve over the whole duration. Velocity and acceleration are 0 at both ends.
+/// Returns the point of the example motion at the time `t`. The motion follows a `sin⁴` curve over the whole duration. The velocity and the
+/// acceleration are 0 at the start and at the end of the motion.
 fn point(t: f64) -> Point {
-    // sin⁴x = (3 − 4 cos 2x + cos 4x) / 8
+    // The formula follows from sin⁴x = (3 − 4 cos 2x + cos 4x) / 8.
     let (x, w) = (PI * t / DURATION_S, PI / DURATION_S);
     let shape = (3.0 - 4.0 * (2.0 * x).cos() + (4.0 * x).cos()) / 8.0;
     let rate = w * ((2.0 * x).sin() - 0.5 * (4.0 * x).sin());
@@ -155,7 +156,7 @@ fn waypoints() -> impl Iterator<Item = (f64, [f64; JOINTS])> {
 fn row(values: [f64; JOINTS], digits: usize) -> String {
     values
         .map(|v| {
-            // Adding zero changes −0 to 0.
+            // The addition of 0.0 changes −0 to 0.
             let scale = 10f64.powi(digits as i32);
             format!("{:.digits$}", (v * scale).round() / scale + 0.0)
         })
@@ -196,7 +197,7 @@ mod tests {
     use crate::waypoints::WaypointFile;
     use jtc_core::Config;
 
-    /// Each trajectory passes the check for the built-in arm from the start pose of `jtc sim`.
+    /// Each example trajectory passes the check for the built-in arm from the start pose of `jtc sim`.
     #[test]
     fn the_trajectories_pass_the_check_from_the_zero_pose() {
         let arm = Arm::avena();
@@ -219,7 +220,7 @@ mod tests {
         }
     }
 
-    /// The waypoints can be planned without changes, and a cycle ends at its first waypoint.
+    /// The example waypoints can be planned without changes. A cyclic motion ends at its first waypoint.
     #[test]
     fn the_waypoints_of_a_cycle_can_be_planned() {
         let arm = Arm::avena();
@@ -253,7 +254,7 @@ mod tests {
         }
     }
 
-    /// Each code block of the page is a file that the library can read.
+    /// Each code block of the page about file formats is a file that the library can read.
     #[test]
     fn the_page_shows_files_that_can_be_read() {
         let arm = Arm::avena();

@@ -1,5 +1,5 @@
-//! Pages for the codes that a controller, a drive or this library reports. Each page has meaning, cause, remedy and next
-//! command.
+//! Pages about the codes that a controller, a drive or this library reports. Each page contains the meaning of a code, its usual cause, the
+//! remedy and the next command.
 
 mod check;
 mod controller;
@@ -12,7 +12,8 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, StopKi
 use crate::check::ProblemKind;
 use crate::labels;
 
-/// Declares the families of numbers, each with meaning, name, title and the key before the colon (as in `can:0x100`).
+/// Declares the families of numbers. Each family has a meaning, a name, a title and a key, which is the text before the colon in
+/// `can:0x100`.
 macro_rules! families {
     ($($(#[$meaning:meta])* $name:ident $key:literal, $title:literal;)+) => {
         /// Family of the number that a page explains.
@@ -23,10 +24,10 @@ macro_rules! families {
         }
 
         impl Family {
-            /// All families, in the order in which the search looks for a number without a family.
+            /// All families. A search for a number without a family uses this order.
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
 
-            /// Returns the key before the colon, as in `can:0x100`.
+            /// Returns the key of the family, which is the text before the colon in `can:0x100`.
             pub fn key(self) -> &'static str {
                 match self {
                     $(Self::$name => $key,)+
@@ -48,7 +49,7 @@ families! {
     Jtc "jtc", "controller error word";
     /// Bits of a joint's internal error word.
     Joint "joint", "internal error word of a joint";
-    /// CAN flags.
+    /// CAN flags: a transmit timeout on the joint bus, and nodes that do not answer.
     Can "can", "CAN flags";
     /// Bits of a node's error byte.
     Node "node", "error byte of a node";
@@ -95,27 +96,27 @@ impl Family {
 pub struct Page {
     /// Family of the code.
     pub family: Family,
-    /// Bit number or code.
+    /// Number of the bit, or the code.
     pub code: u32,
-    /// Unique name.
+    /// Unique name of the page.
     pub name: &'static str,
     /// Meaning of the code.
     pub meaning: &'static str,
-    /// Usual cause.
+    /// Usual cause of the code.
     pub cause: &'static str,
-    /// Remedy.
+    /// Remedy for the usual cause.
     pub remedy: &'static str,
-    /// Next command.
+    /// Next command for the user.
     pub command: &'static str,
 }
 
 impl Page {
-    /// Returns the number as it appears in the error word or the code. For a bit, the result is a mask.
+    /// Returns the code of the page. If the page is about a bit, returns the mask of this bit.
     pub fn number(&self) -> u32 {
         if self.family.is_bits() { 1 << self.code } else { self.code }
     }
 
-    /// Returns the text that is displayed for the code. If no text is displayed for the code, returns the name of the page.
+    /// Returns the text that commands print for the code. If commands do not print a text for the code, returns the name of the page.
     pub fn title(&self) -> String {
         own_words(self).unwrap_or_else(|| self.name.replace('-', " "))
     }
@@ -136,7 +137,7 @@ impl std::fmt::Display for Page {
     }
 }
 
-/// Declares the pages of each family: number, name, meaning, usual cause, remedy and next command.
+/// Declares the pages of a family. Each page has a number, name, meaning, usual cause, remedy and next command.
 macro_rules! entries {
     ($($family:ident { $($code:literal $name:literal: $($text:literal),+;)+ })+) => {
         pub(super) const PAGES: &[super::Page] =
@@ -167,9 +168,9 @@ pub fn names(family: Family, word: u32) -> Vec<&'static str> {
     own.map(|page| page.name).collect()
 }
 
-/// Returns the texts that commands print for this code.
+/// Returns the texts that commands print for the code of a page.
 fn shown(page: &Page) -> Vec<String> {
-    // A decoded frame contains the node numbers of the protocol.
+    // The text of a decoded frame contains the node numbers of the protocol instead of the joint numbers.
     let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
     own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
 }
@@ -196,21 +197,23 @@ fn own_words(page: &Page) -> Option<String> {
     }
 }
 
-/// Converts a text to lower case and keeps only letters and digits. So a comparison ignores case, spaces and punctuation.
+/// Converts a text to lower case and keeps only letters and digits. A comparison of two converted texts ignores case, spaces and
+/// punctuation.
 fn letters(text: &str) -> String {
     text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
-/// Finds pages for a query. The query is a name (`joint-position-error`), a displayed text (`HoldPos`, `over-current`), a number of one
-/// family (`can:0x100`, `data:7`), a number without a family, or some words of a name. Returns an empty list if no page matches.
+/// Finds pages for a query. A query can be a name (`joint-position-error`), some words of a name, or a printed text (`HoldPos`,
+/// `over-current`). A query can also be a number with a family (`can:0x100`, `data:7`) or without a family. Returns an empty list if no
+/// page matches the query.
 pub fn find(query: &str) -> Vec<&'static Page> {
-    // In a displayed list of errors, each error begins with its joint.
+    // In a printed list of errors, each error begins with the name of its joint. The search ignores this name.
     let query = match query.split_once(": ") {
         Some((node, rest)) if node.starts_with("joint ") || node == "gripper" => rest,
         _ => query,
     };
     let query = query.strip_suffix(" not given").unwrap_or(query);
-    // The query is the key of a whole family. The key has priority over a displayed text that equals the key.
+    // If the query is the key of a family, the key has priority over a printed text that equals the key.
     if query.strip_suffix(':').is_some_and(|key| Family::ALL.into_iter().any(|family| family.key() == key)) {
         return by_name_or_number(query);
     }
@@ -223,7 +226,7 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         return exact;
     }
     let by_name = by_name_or_number(query);
-    // The query is a part of a displayed text, such as "does not answer".
+    // The query may be a part of a printed text, such as "does not answer".
     if by_name.is_empty() && as_shown.len() > 3 {
         on_screen(|text, asked| text.contains(asked))
     } else {
@@ -260,7 +263,7 @@ fn by_name_or_number(query: &str) -> Vec<&'static Page> {
     pages().filter(in_family).filter(|p| text.split('-').all(|word| p.name.contains(word))).collect()
 }
 
-/// Returns `true` if a page exists for each set bit of `number`. Otherwise the number belongs to another family.
+/// Returns `true` if the family has a page for each set bit of `number`. Otherwise the number does not belong to this family.
 fn known_bits(family: Family, number: u32) -> bool {
     let known = pages().filter(|p| p.family == family).fold(0, |m, p| m | p.number());
     number & !known == 0
@@ -296,7 +299,7 @@ mod tests {
         assert!(find("no-such-thing").is_empty() && find("").is_empty() && find("bogus:1").is_empty());
     }
 
-    /// A search for each displayed text finds the page of its code.
+    /// For each text that commands print, a search finds the page of its code.
     #[test]
     fn every_word_on_a_screen_finds_its_page() {
         use jtc_wire::words as w;
@@ -323,7 +326,7 @@ mod tests {
         }
         for kind in ProblemKind::ALL {
             has(kind.words(), Family::Check, kind as usize);
-            // Name of the kind in JSON.
+            // `key` is the name of the kind in JSON.
             let key = serde_json::to_value(kind).unwrap().as_str().unwrap().to_owned();
             has(&key, Family::Check, kind as usize);
         }
@@ -349,7 +352,8 @@ mod tests {
         assert_eq!(find("HoldPos").len(), 1);
     }
 
-    /// Each set bit of a word has one name, in the order of the displayed texts. A search for a name finds only the page with that name.
+    /// Each set bit of a word has one name. The names have the same order as the printed texts. A search for a name finds only the page
+    /// with this name.
     #[test]
     fn the_bits_of_a_word_have_the_names_of_their_pages() {
         for (family, word, words) in [
@@ -379,7 +383,7 @@ mod tests {
         assert_eq!(count(Family::Tes), TrajectoryState::ALL.len());
         assert_eq!(count(Family::Missing), w::JTC_INIT.len());
         assert_eq!(count(Family::Check), ProblemKind::ALL.len());
-        // There is also a page about the held stop itself.
+        // The family of held stops has one more page, which is about held stops in general.
         assert_eq!(count(Family::Stop), 1 + StopKind::ALL.len());
         assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));
         for (i, p) in pages().enumerate() {
@@ -388,7 +392,7 @@ mod tests {
                 "{}",
                 p.name
             );
-            // A page of another family may have the same displayed text.
+            // A page of another family may have the same printed text.
             let found = find(p.name);
             assert!(
                 found.contains(&p) && found.iter().all(|q| q.family != p.family || q == &p),

@@ -1,12 +1,12 @@
-//! Functions that read text files with numbers. Each error contains the file, line, column and value.
+//! Functions that read text files with numbers. Each error contains the file and, if known, the line, column and value.
 
 use std::path::{Path, PathBuf};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Size limit for files, bytes; a larger file is not read.
+/// Size limit for files, bytes. Larger files are not read.
 pub const FILE_MAX: u64 = 64 << 20;
-/// Reason why `--deg` is not allowed for a file that states its units.
+/// Message that explains why `--deg` is not allowed for a file that contains its units.
 pub(crate) const UNITS_KNOWN: &str =
     "the file states its units, so its numbers cannot be degrees; omit --deg";
 
@@ -14,38 +14,38 @@ pub(crate) const UNITS_KNOWN: &str =
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The operating system refused access.
+    /// The operating system could not read or write the file.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file is larger than any valid file.
+    /// The file is larger than the size limit for files.
     #[error("{}: {bytes} bytes, more than {FILE_MAX}", path.display())]
     TooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Size of the file, bytes.
         bytes: u64,
     },
-    /// The text has an error at one place.
+    /// The text of the file has an error at a known line, column or name.
     #[error("{}{place}: {problem}", path.display())]
     At {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Line, column, field or key.
+        /// Line, column or name at which the error was found.
         place: Place,
-        /// Description of the problem, with the value.
+        /// Text that describes the problem, with the value.
         problem: String,
     },
     /// The robot description has more than six joints, so the caller must select the six joints of the arm.
     #[error("{}: {problem}", path.display())]
     Joints {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Joints that move.
+        /// Text that names the joints that move.
         problem: String,
         /// Six joints that could be the arm, separated by commas.
         six: String,
@@ -53,56 +53,56 @@ pub enum FileError {
     /// The joints or the flange that the caller selected do not form an arm.
     #[error("{}{place}: {problem}", path.display())]
     Choice {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Name of the joint, if the problem is about one joint.
+        /// Name of the joint; empty if the problem is not about one joint.
         place: Place,
-        /// Description of the problem with the selection.
+        /// Text that describes the problem with the selection.
         problem: String,
     },
-    /// The robot description has no chain of six rotary joints. No option can make the description usable for this controller.
+    /// The robot description has no chain of six rotary joints, so this controller cannot use the description with any option.
     #[error("{}: {problem}", path.display())]
     FewJoints {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Description of the joints that were found.
+        /// Text that describes the joints of the robot description.
         problem: String,
     },
     /// The file is not in one of the known formats.
     #[error("{}: {problem}", path.display())]
     Form {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Description of the content, and the known formats.
+        /// Text that describes the content of the file and the known formats.
         problem: String,
     },
 }
 
-/// Place in a file.
+/// Position in a file: line, column and name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    /// Line, from 1.
+    /// Line number, from 1.
     pub line: Option<usize>,
-    /// Column of a table, from 1.
+    /// Column number of a table, from 1.
     pub column: Option<usize>,
     /// Name of a column, key or element.
     pub name: Option<String>,
 }
 
 impl Place {
-    /// Creates a place from a line number.
+    /// Creates a position from a line number.
     pub fn line(line: usize) -> Self {
         Self { line: Some(line), ..Self::default() }
     }
-    /// Creates a place from the line and column of a table cell.
+    /// Creates a position from the line and column of a table cell.
     pub fn cell(line: usize, column: usize) -> Self {
         Self { line: Some(line), column: Some(column), name: None }
     }
-    /// Creates a place from the name of a key or element.
+    /// Creates a position from the name of a key or element.
     pub fn name(name: impl Into<String>) -> Self {
         Self { name: Some(name.into()), ..Self::default() }
     }
-    /// Adds a name to this place.
+    /// Adds a name to this position.
     pub fn named(self, name: impl Into<String>) -> Self {
         Self { name: Some(name.into()), ..self }
     }
@@ -151,7 +151,7 @@ impl Diagnose for FileError {
 }
 
 impl FileError {
-    /// Adds the path `file` to this error.
+    /// Adds the path of the file to this error.
     pub fn in_file(mut self, file: &Path) -> Self {
         let (FileError::Io { path, .. }
         | FileError::TooLarge { path, .. }
@@ -190,7 +190,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
         .map_err(|_| FileError::form("not a text file (its bytes are not valid UTF-8)").in_file(path))
 }
 
-/// Parses a number in the notations that occur in these files (`20.`, `-9.e-6`, ` 1`). NaN and infinity are not accepted.
+/// Parses a number in the notations that occur in these files (`20.`, `-9.e-6`, ` 1`). The function rejects NaN and infinity.
 pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileError> {
     match text.trim().parse::<f64>() {
         Ok(v) if v.is_finite() => Ok(v),
@@ -226,14 +226,14 @@ pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
 }
 
 fn cells(line: &str) -> Vec<&str> {
-    // If semicolons separate the cells, a comma is part of a number and makes this number invalid.
+    // If semicolons separate the cells, a comma counts as part of a number. A number with a comma is not valid.
     match [';', ','].into_iter().find(|c| line.contains(*c)) {
         Some(c) => line.split(c).map(str::trim).collect(),
         None => line.split_whitespace().collect(),
     }
 }
 
-/// Returns rows of numbers.
+/// Returns the rows of a table of numbers, each with its line number.
 pub(crate) fn number_rows(text: &str) -> Result<Vec<(usize, Vec<f64>)>, FileError> {
     rows(text)
         .map(|(line, cells)| {

@@ -1,4 +1,5 @@
-//! Frames from the host to the controller, each in its own buffer. The crate `jtc-wire` defines the layout of the frames.
+//! Functions that create the frames from the host to the controller. Each frame has its own buffer. The crate `jtc-wire` defines the layout
+//! of the frames.
 
 use jtc_core::{Friction, JOINTS, PidGains};
 use jtc_dynamics::{ArmModel, Origin};

@@ -1,5 +1,5 @@
-//! Functions that the fuzz targets call. Each function passes arbitrary bytes to the readers of one file type. A panic or a failed check is
-//! a finding of the fuzz test.
+//! Functions that the fuzz targets call. Each function passes arbitrary bytes to the readers of one file type. The fuzz test fails if a
+//! reader panics or a check of its result fails.
 
 use jtc_core::recorder::{Log, sealed_block};
 
@@ -14,15 +14,15 @@ fn text(data: &[u8]) -> Option<&str> {
     std::str::from_utf8(data).ok()
 }
 
-/// Checks a trajectory that was read from a file. All values must be finite, the step time must not be 0, and writing as CSV or JSON must
-/// not change the trajectory.
+/// Checks a trajectory that was read from a file. All values must be finite, and the step time must not be 0. A trajectory that is written
+/// as CSV or JSON and read again must be the same.
 fn sound(read: Result<Loaded, FileError>) {
     let Ok(loaded) = read else { return };
     let t = &loaded.trajectory;
     assert!(t.step_ms > 0 && !t.points.is_empty());
     let finite = |v: &[f64; 6]| v.iter().all(|v| v.is_finite());
-    // A spline through very large numbers may overflow. In this case the check rejects the trajectory, because its numbers are out of
-    // range.
+    // A spline through very large numbers may overflow. After an overflow, the conversion to frames rejects the trajectory, because its
+    // numbers are out of range.
     if !t.points.iter().all(|p| finite(&p.position) && finite(&p.velocity) && finite(&p.acceleration)) {
         assert!(t.raw().is_err());
         return;
@@ -44,7 +44,7 @@ fn waypoints(text: &str) {
     }
 }
 
-/// Reads a CSV file with a header.
+/// Reads the data as a trajectory file in CSV format with a header.
 pub fn trajectory_csv(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("t,q1,q2,q3,q4,q5,q6\n{text}"), None));
@@ -53,8 +53,8 @@ pub fn trajectory_csv(data: &[u8]) {
     waypoints(text);
 }
 
-/// Reads a file of 19 columns without a header. Then builds a file of this format from `data`, with integers or with decimals, and reads
-/// it.
+/// Reads the data as a trajectory file with 19 columns and without a header. Then builds a file of this format from the data, with integers
+/// or with decimals, and reads this file.
 pub fn trajectory_table(data: &[u8]) {
     if let Some(text) = text(data) {
         sound(Loaded::parse(text, None));
@@ -74,7 +74,7 @@ pub fn trajectory_table(data: &[u8]) {
     sound(Loaded::parse(&table, None));
 }
 
-/// Reads both JSON formats.
+/// Reads the data as a trajectory file in each of the two JSON formats.
 pub fn trajectory_json(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("{{{text}"), None));
@@ -82,15 +82,15 @@ pub fn trajectory_json(data: &[u8]) {
     waypoints(&format!("{{{text}"));
 }
 
-/// Reads the YAML format.
+/// Reads the data as a trajectory file in YAML format.
 pub fn trajectory_yaml(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("joint_names: [a1, a2, a3, a4, a5, a6]\n{text}"), None));
     sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
 }
 
-/// Checks an arm that was read from a file. Its model must be physically possible, and its parameters must fit into their serial frames unless
-/// the parameter check rejects them.
+/// Checks an arm that was read from a file. The arm model must be physically possible. The parameters must fit into their serial frames
+/// unless the parameter check rejects them.
 fn sound_arm(read: Result<Arm, FileError>) {
     let Ok(arm) = read else { return };
     assert!(arm.model.check().is_ok());
@@ -103,20 +103,20 @@ fn sound_arm(read: Result<Arm, FileError>) {
     }
 }
 
-/// Reads arm files.
+/// Reads the data as an arm file.
 pub fn arm_toml(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound_arm(Arm::from_toml(text).and_then(|_| Arm::parse(text)));
 }
 
-/// Reads robot descriptions.
+/// Reads the data as a robot description.
 pub fn arm_urdf(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound_arm(Arm::parse(text));
     let _ = Arm::from_urdf(text);
 }
 
-/// Reads friction tables, friction polynomials, gains and arm models.
+/// Reads the data as a table of friction, gains or an arm model.
 pub fn parameter_table(data: &[u8]) {
     let Some(text) = text(data) else { return };
     if let Ok(file) = ParameterFile::parse_table(text) {
@@ -124,12 +124,12 @@ pub fn parameter_table(data: &[u8]) {
     }
 }
 
-/// Reads raw captures.
+/// Reads the data as a raw capture of the serial line.
 pub fn capture(data: &[u8]) {
     let _ = read_capture(data);
 }
 
-/// Reads logs of flight recorders. The input is used as a log file, and as arbitrary bits in valid blocks.
+/// Reads the data as the log of a flight recorder. The data is used twice: as a log file, and as arbitrary bits in valid blocks.
 pub fn flight_log(data: &[u8]) {
     if let Some(log) = FlightLog::from_bytes(data) {
         assert_eq!(FlightLog::from_bytes(&log.to_bytes()).as_ref(), Some(&log));

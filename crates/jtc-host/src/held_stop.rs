@@ -1,4 +1,4 @@
-//! Held stop (J-69) as all front ends show it, with cause, values and remedy.
+//! Description of a held stop (J-69) for all front ends, with its cause, value, limit and remedy.
 
 use host_kit::{Next, next};
 use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopKind};
@@ -21,19 +21,19 @@ pub fn after_encoder_jump() -> Next {
 /// Last held stop of a controller.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HeldStop {
-    /// Name of the kind of cause, with hyphens between words.
+    /// Name of this kind of cause, with hyphens between words.
     pub kind: String,
-    /// Number of the kind of cause in the protocol.
+    /// Number that the protocol uses for this kind of cause.
     pub number: u8,
-    /// Name of the explain page, for `jtc explain CODE`.
+    /// Name of the explain page about this cause, for `jtc explain CODE`.
     pub code: &'static str,
-    /// First joint with the cause, from 1; `None` if the cause is not in a joint.
+    /// Number of the first joint with the cause, from 1; `None` if no joint has the cause.
     pub joint: Option<u8>,
-    /// Measured value; `None` if the kind has no value.
+    /// Measured value that caused the held stop; `None` if this kind of cause has no value.
     pub value: Option<f32>,
-    /// Limit for the value; `None` if the kind has no limit.
+    /// Limit for the value; `None` if this kind of cause has no limit.
     pub limit: Option<f32>,
-    /// Unit of value and limit; empty if they have no unit.
+    /// Unit of the value and of the limit; empty if they have no unit.
     pub unit: &'static str,
     /// Description of the cause as a sentence without a full stop.
     pub text: String,
@@ -66,7 +66,7 @@ impl HeldStop {
         reactions.stop.as_ref().map(|(cause, ago_ms)| Self::new(cause, *ago_ms))
     }
 
-    /// Returns the cause and its age in one line: `joint 2 was pushed: …; 12 s ago`.
+    /// Returns the cause and its age in one line, for example `joint 2 was pushed: …; 12 s ago`.
     pub fn line(&self) -> String {
         format!("{}; {} ago", self.text, age(self.ago_s))
     }
@@ -75,16 +75,15 @@ impl HeldStop {
 /// Reactions of a controller to faults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reacting {
-    /// Last held stop; `None` if the arm was not in a held stop since the start or since the occurred errors were
-    /// cleared.
+    /// Last held stop; `None` if the controller has not had a held stop since its start or since its occurred errors were cleared.
     pub last_held_stop: Option<HeldStop>,
-    /// Joints, from 1, that yield to a push or lower their loads.
+    /// Numbers, from 1, of the joints that yield to a push or lower their loads.
     pub yields: Vec<u8>,
-    /// Joints, from 1, whose encoder has jumped after the last configuration of their drives.
+    /// Numbers, from 1, of the joints whose encoder has jumped after the last configuration of their drives.
     pub encoder_jumped: Vec<u8>,
     /// Rate of the path time (seconds of path time per second); 0 if no trajectory is executed.
     pub path_rate: f32,
-    /// Total time for which the current execution was slowed down because a torque was at its limit, s.
+    /// Time for which the controller slowed down the current motion because a torque was at its limit, s.
     pub held_back_s: f64,
 }
 
@@ -108,17 +107,17 @@ impl Reacting {
     }
 }
 
-/// Returns the joints whose bits are set in `mask`, which has one bit for each joint.
+/// Returns the joints whose bits are set in `mask`. The mask has one bit for each joint.
 pub fn joints(mask: u8) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| mask & 1 << joint.index() != 0).collect()
 }
 
-/// Returns the first joint with the cause.
+/// Returns the first joint that has the cause of a held stop.
 pub fn joint(cause: &StopCause) -> Option<Joint> {
     Joint::from_number(cause.joint.into())
 }
 
-/// Returns the value and the limit of a cause, if causes of this kind have them.
+/// Returns the value and the limit of a cause. The value or the limit is `None` if this kind of cause does not have one.
 pub fn figures(cause: &StopCause) -> (Option<f32>, Option<f32>) {
     let known = match cause.kind {
         StopKind::Approach | StopKind::Gains => (false, false),
@@ -151,7 +150,7 @@ pub fn usual_cause(kind: StopKind) -> String {
     page(kind).map_or_else(String::new, |page| clause(page.cause))
 }
 
-/// Changes a sentence into a form that can be a part of another sentence.
+/// Changes a sentence into a clause that can be part of another sentence.
 fn clause(sentence: &str) -> String {
     let mut letters = sentence.trim_end_matches('.').chars();
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
@@ -168,7 +167,7 @@ pub fn next_step(status: &Status, cause: Option<&StopCause>) -> Next {
     }
 }
 
-/// Formats a time in a suitable unit.
+/// Formats a time (s) in a suitable unit.
 pub fn age(s: f64) -> String {
     match s.max(0.0) as u64 {
         s @ 0..120 => format!("{s} s"),

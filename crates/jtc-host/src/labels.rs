@@ -1,4 +1,4 @@
-//! Texts for the codes and bits of the controller.
+//! Texts that describe the codes and error bits of the controller.
 
 use host_kit::{Action, Next, next};
 pub use jtc_bus::GRIPPER;
@@ -7,7 +7,7 @@ use jtc_wire::{
     ControllerState, DataStatus, FrameStatus, FrameType, Joint, Status, StopCause, can_flag, error,
 };
 
-/// Velocity range of a joint at rest, rad/s (J-36).
+/// Velocities at which a joint counts as at rest, rad/s (J-36).
 const AT_REST_RAD_S: std::ops::RangeInclusive<f64> = -0.02..=0.02;
 
 /// Returns the name of a node on the joint bus.
@@ -108,7 +108,7 @@ pub fn can_flags(word: u32) -> Vec<String> {
     all
 }
 
-/// Returns `true` if a node does not answer; joints are nodes 0..5, the gripper is node 6.
+/// Returns `true` if a node does not answer. Joints are nodes 0 to 5, and the gripper is node 6.
 pub fn is_silent(s: &Status, node: usize) -> bool {
     s.can_current & can_flag::no_answer(node) != 0
 }
@@ -118,12 +118,13 @@ pub fn has_torque(s: &Status) -> bool {
     s.state.is_in(&[ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching])
 }
 
-/// Returns `true` if joint `j` (from 0) is marked as absent. While torque is on, only an absent joint is in Start (J-20, J-53).
+/// Returns `true` if joint `j` (from 0) is marked as absent. While the torque is on, only an absent joint is in the state Start (J-20,
+/// J-53).
 pub fn is_absent(s: &Status, j: usize) -> bool {
     has_torque(s) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
 }
 
-/// Returns the joints that are marked as absent, if torque is on.
+/// Returns the joints that are marked as absent. The result is empty while the torque is off.
 pub fn absent(s: &Status) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| is_absent(s, joint.index())).collect()
 }
@@ -133,24 +134,24 @@ pub fn joints(joints: &[Joint]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Returns `true` if the drives of all joints that are not absent are enabled.
+/// Returns `true` if the drive of each joint is enabled. Absent joints are ignored.
 pub fn is_held(s: &Status) -> bool {
     let enabled = |joint: &Joint| s.joints[joint.index()].state == NodeState::ENABLED;
     Joint::ALL.iter().all(|joint| enabled(joint) || is_absent(s, joint.index()))
 }
 
-/// Returns the fastest joint and its velocity (rad/s) if it moves faster than the limit for an arm at rest.
+/// Returns the fastest joint and its velocity (rad/s). Returns `None` if the arm is at rest.
 pub fn moving_joint(s: &Status) -> Option<(Joint, f64)> {
     let fastest = Joint::ALL.into_iter().map(|joint| (joint, f64::from(s.joints[joint.index()].velocity)));
     fastest.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).filter(|(_, speed)| !AT_REST_RAD_S.contains(speed))
 }
 
-/// Returns `true` if the controller still waits for a node to be ready.
+/// Returns `true` if the controller waits until a node is ready.
 pub fn is_awaited(s: &Status, node: usize) -> bool {
     nodes_in(s.node_init).any(|n| n == node)
 }
 
-/// Returns the parameters for which the controller waits in Init: friction, PID gains, arm model.
+/// Returns the names of the parameters for which the controller waits in Init: friction, PID gains, arm model.
 pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
     list(u32::from(jtc_init), &jtc_wire::words::JTC_INIT)
 }
@@ -165,14 +166,14 @@ pub fn node_names(mask: u8) -> Vec<String> {
     nodes_in(mask).map(node).collect()
 }
 
-/// Returns all current errors of a status, most specific first: nodes that do not answer, the safety input, and the errors of each joint
-/// and the gripper. The other error bits of the controller are consequences of these errors.
+/// Returns all current errors of a status, the most specific first. The list begins with nodes that do not answer, the safety input, and
+/// the errors of each joint and the gripper. The other error bits of the controller are consequences of these errors and are listed last.
 pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
     all.extend(errors(s.errors & error::EMERGENCY_INPUT).into_iter().map(String::from));
     for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
-        // An active safety line switches the torque of a drive off. An unconfigured drive also sets this bit, so the function ignores the
-        // bit until the drive is configured.
+        // An active safety line switches off the torque of a drive. An unconfigured drive also sets the bit of the safety line, so this bit
+        // is ignored until the drive is configured.
         let line_active = joint.warnings & warning::SAFETY_LINE != 0 && !is_awaited(s, number.index());
         let words = joint_errors(joint.internal)
             .into_iter()
@@ -185,7 +186,7 @@ pub fn causes(s: &Status) -> Vec<String> {
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
-    // During a held stop, this bit does not add information to the errors of the joints.
+    // During a held stop, the error word of the controller adds no information to the errors of the joints.
     let own = if s.is_held_stop() { 0 } else { s.errors & !error::EMERGENCY_INPUT };
     all.extend(errors(own).into_iter().map(String::from));
     all
@@ -196,12 +197,12 @@ pub fn held_stop(s: &Status) -> String {
     causes(s).join(", ")
 }
 
-/// Returns the reason why the arm is held. This is the cause that the device reported, or, without such a report, the errors in the status.
+/// Returns the reason for a held stop. If the device did not report the cause, returns the errors in the status.
 pub fn why_held(s: &Status, cause: Option<&StopCause>) -> String {
     cause.map_or_else(|| held_stop(s), ToString::to_string)
 }
 
-/// Returns the warnings of nodes that are not errors.
+/// Returns the warnings of the nodes. The safety line of a joint is not included, because [`causes`] treats it as an error.
 pub fn warnings(s: &Status) -> Vec<String> {
     let joints = s.joints.iter().map(|joint| joint.warnings).chain(s.gripper.map(|g| g.warnings)).enumerate();
     let words = joints.flat_map(|(n, byte)| {
@@ -247,7 +248,7 @@ pub fn waiting_for(s: &Status) -> String {
     if missing.is_empty() { head } else { format!("{head}; {}", missing.join(", ")) }
 }
 
-/// Returns the next step after a held stop, beginning with the action `cause` that removes its cause.
+/// Returns the next step after a held stop. The text begins with the action `cause`, which removes the cause of the held stop.
 pub(crate) fn after_removing(cause: &str) -> Next {
     let then = next!(
         ", wait until the arm is at rest, then {}; until then the controller holds the arm and executes no motion",
@@ -256,14 +257,14 @@ pub(crate) fn after_removing(cause: &str) -> Next {
     Next::from(cause.to_owned()).then(then)
 }
 
-/// Returns the next step in this state.
+/// Returns the next step for a controller with this status.
 pub fn next_step(s: &Status) -> Next {
     if s.is_held_stop() && s.state == ControllerState::Teaching {
         next!("{}, then {}", TeachOff, Clear)
     } else if s.is_held_stop() {
         after_removing("remove the cause")
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
-        // The short form of the command follows the long form.
+        // The short option `--defaults` follows the long form of the command.
         next!("{}, or ", RecoverWithArm)
             .then(Next::typed(Action::RecoverWithDefaults, "--defaults"))
             .then(" for the arm that is built into the controller")
@@ -294,7 +295,7 @@ pub fn next_step(s: &Status) -> Next {
 mod tests {
     use super::*;
 
-    /// The cause is listed before its consequences, and the safety line of an unconfigured drive is ignored.
+    /// A cause is listed before its consequences. The safety line of an unconfigured drive is ignored.
     #[test]
     fn the_most_particular_cause_stands_first() {
         let mut s = Status {

@@ -1,8 +1,9 @@
-//! Log of the flight recorder. The modules fetch the log from a device, store it in a file, and replay it through the controller (J-56).
+//! Log of the flight recorder. These modules fetch the log from a device, store the log in a file, and replay the log through the
+//! controller (J-56).
 //!
 //! [`FlightLog`] contains the data from a device: the blocks of its log, the active arm, and the trajectory points that the log needs.
-//! [`FlightLog::replay`] returns every tick with all values that the controller computed, and marks the ticks that are known to equal the
-//! original tick bit for bit. [`Timeline`] lists the events in order, with the first error at the top.
+//! [`FlightLog::replay`] returns every tick with all values that the controller computed. The replay marks each tick that equals the
+//! original tick bit for bit. [`Timeline`] lists the events of the log in order, with the first error at the top.
 
 mod container;
 mod replay;
@@ -17,30 +18,30 @@ pub use timeline::{Event, Timeline};
 use jtc_core::recorder::{BLOCK_WORDS, Block, Log, Record};
 use jtc_wire::{LogState, RawPoint};
 
-/// Maximum distance between two snapshots, in ticks.
+/// Maximum time between two snapshots, in ticks of 1 ms.
 const SPAN_MS: f64 = 1_100.0;
 
-/// Flight recorder data that a device returned.
+/// Data of the flight recorder that a device returned.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlightLog {
     /// Reason why the log ends.
     pub state: LogState,
-    /// Blocks, oldest first.
+    /// Blocks of the log, the oldest first.
     pub blocks: Vec<Block>,
-    /// Active arm when the log was fetched, as a [`jtc_wire::ArmImage`].
+    /// Image of the arm that was active when the log was fetched, as a [`jtc_wire::ArmImage`].
     pub arm: Vec<u8>,
-    /// Index in the trajectory of the first point in `points`.
+    /// Trajectory index of the first point in `points`.
     pub first_point: usize,
     /// Points of the trajectory that the log needs.
     pub points: Vec<RawPoint>,
-    /// Hash of all points in the memory of the device.
+    /// Hash of all trajectory points in the memory of the device.
     pub points_hash: u32,
     /// Description of the device and its firmware.
     pub device: String,
 }
 
 impl FlightLog {
-    /// Returns the blocks in the form of a log.
+    /// Returns a reader of the records in the blocks.
     pub fn log(&self) -> Log<'_> {
         Log::new(&self.blocks)
     }
@@ -50,8 +51,8 @@ impl FlightLog {
         self.log().next().is_none()
     }
 
-    /// Returns the points that the log needs from the trajectory with this hash, as the index of the first point and the number of points.
-    /// Returns `None` if the log contains no motion along this trajectory.
+    /// Returns which points of the trajectory with this hash the log needs. The result is the index of the first point and the number of
+    /// points. Returns `None` if the log contains no motion along this trajectory.
     pub fn needed_points(&self, hash: u32, total: usize) -> Option<(usize, usize)> {
         let mut needed: Option<(f64, f64)> = None;
         let mut need = |from: f64, to: f64| {
@@ -82,13 +83,13 @@ impl FlightLog {
         }
         let (low, high) = needed?;
         let first = (low.max(0.0) as usize).saturating_sub(1).min(total);
-        // For times after the end of the trajectory, the last point is used.
+        // After the end of the trajectory, the replay uses the last point.
         let end = ((high as usize).saturating_add(3)).min(total);
         (end > first).then_some((first, end - first))
     }
 }
 
-/// Splits the bytes of log pages into blocks. An incomplete block at the end is ignored.
+/// Splits the bytes of log pages into blocks. The function ignores an incomplete block at the end of the bytes.
 pub(crate) fn blocks_of(bytes: &[u8]) -> Vec<Block> {
     let words = bytes.as_chunks::<4>().0;
     words.as_chunks::<BLOCK_WORDS>().0.iter().map(|block| block.map(u32::from_le_bytes)).collect()

@@ -1,9 +1,9 @@
-//! Planner for moves to a goal, motions through waypoints, and trajectories at another speed.
+//! Planner for moves to a goal and motions through waypoints. This module also changes the speed of trajectories.
 //!
 //! The crate `jtc-plan` computes the motions. These motions are as fast as the limits of velocity, acceleration, jerk and torque allow.
-//! This module converts a motion into a trajectory with points at a fixed time step, as the host sends it. Before the planner returns a
-//! trajectory, it must pass the [check](crate::check) that trajectory files must also pass. If rounding, a Pause on the path (J-33) or
-//! friction would exceed a limit, the planner slows down the motion and reports this in [`Planned::notes`].
+//! This module converts a motion into a trajectory with points at a fixed time step. The planner returns a trajectory only if the
+//! trajectory passes the [check](crate::check), which is the same check as for trajectory files. If rounding, a Pause on the path (J-33) or
+//! friction would exceed a limit, the planner slows down the motion and adds a note to [`Planned::notes`].
 //!
 //! ```
 //! use jtc_host::{Arm, plan::Planner};
@@ -54,36 +54,37 @@ use sampled::{least_s, sampled, step_ms};
 
 /// Time step between the points of planned moves, ms.
 const STEP_MS: u16 = 10;
-/// Duration of a change of the acceleration if the jerk is not limited, s. With a duration below two steps, the acceleration between the
-/// points (J-32) would be higher than at the points.
+/// Duration of a change of the acceleration if the jerk is not limited, s. If the duration were shorter than two steps, the acceleration
+/// between the points (J-32) would be higher than at the points.
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
-/// Share of the velocity and acceleration limits that a plan uses. The remaining 2 % are reserved for the rounding in serial frames.
+/// Maximum share of the velocity and acceleration limits that a plan uses. The remaining 2 % are reserved for the rounding in serial
+/// frames.
 const SHARE: f64 = 0.98;
-/// Time (s) in which the remainder of a trajectory reaches its speed, followed by longer times that are tried if the check rejects the
-/// remainder.
+/// Time in which the remainder of a trajectory reaches its speed, s. If the check rejects the remainder, the planner tries the longer times
+/// `RAMPS_S`.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Bearing temperature that a plan assumes, °C; this is the temperature of a cold factory hall. At this temperature friction is higher than
-/// at the usual temperature.
+/// Lowest bearing temperature that a plan assumes by default, °C. The default is the temperature of a cold factory hall. At this
+/// temperature, the friction is higher than at the usual temperature.
 pub const COLD: f64 = 20.0;
-/// Maximum factor by which the planner slows down a motion. A motion that needs a larger factor is rejected.
+/// Largest slow-down factor of a motion. A motion that needs a larger factor is rejected.
 const SLOWEST: f64 = 50.0;
-/// Minimum and maximum factor by which the planner slows down a motion in one iteration.
+/// Smallest and largest slow-down factor in one iteration of the planner.
 const SLOWER: (f64, f64) = (1.01, 2.0);
-/// Minimum factor by which the planner slows down a motion in one iteration to keep the torque margin. The factor is small, because
-/// rounding exceeds the margin only slightly.
+/// Smallest slow-down factor in one iteration of the planner if a motion exceeds the torque margin. This factor is small, because the
+/// rounding of a trajectory increases the torque only slightly.
 const SLOWER_FOR_MARGIN: f64 = 1.002;
-/// Slow-down factor above which a note reports that a motion was slowed down for the torque margin.
+/// Slow-down factor above which a note reports that the torque margin has slowed down a motion.
 const NOTED: f64 = 1.01;
 
-/// Planner that plans motions for an arm and checks them.
+/// Planner for the motions of an arm. The planner checks each planned motion.
 #[derive(Clone, Debug)]
 pub struct Planner<'a> {
-    /// Settings with the limits, rotor inertia, gravity and payload.
+    /// Controller settings with the limits, rotor inertias, gravity and payload.
     pub config: &'a Config,
-    /// Arm model for the torques. If `None`, torque is neither planned nor checked.
+    /// Arm model for the torques. If the model is `None`, the planner ignores torques.
     pub model: Option<&'a ArmModel>,
-    /// Friction compensation that the controller adds to the torque of the model.
+    /// Friction compensation that the controller adds to the torque of the arm model.
     pub friction: Option<&'a Friction>,
     /// Lowest bearing temperature for which the plan includes friction, °C.
     pub temperature: f64,
@@ -92,22 +93,22 @@ pub struct Planner<'a> {
     /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. If the blend is 0, the arm stops at each
     /// waypoint.
     pub blend: f64,
-    /// `true` if the jerk is limited. Otherwise the acceleration changes within two steps.
+    /// `true` if the jerk is limited. If the value is `false`, the acceleration changes within two steps.
     pub jerk: bool,
-    /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each limit, for masses and friction that the model does not contain.
+    /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each torque limit, for masses and friction that the model does not contain.
     pub margin_pct: f64,
-    /// Division into segments for the upload.
+    /// Division of the trajectory into segments for the upload.
     pub upload: UploadOptions,
 }
 
-/// Limit that determines the speed of a motion in an interval of time.
+/// Limit that determines the speed of a motion during a time interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
     /// Time from the start of the motion to the start of the interval, s.
     pub from_s: f64,
     /// Time from the start of the motion to the end of the interval, s.
     pub to_s: f64,
-    /// Joint concerned.
+    /// Joint whose limit determines the speed.
     pub joint: Joint,
     /// Name of the limit: "velocity", "acceleration", "jerk", "torque", "stop" (ability to stop in time), "friction" (range of the friction
     /// table) or "given time".
@@ -117,15 +118,16 @@ pub struct Bound {
 /// Planned motion that passed the check.
 #[derive(Clone, Debug)]
 pub struct Planned {
-    /// Trajectory to run.
+    /// Trajectory that the controller can execute.
     pub trajectory: Trajectory,
     /// Result of the check, with the values of each joint and the warnings.
     pub verdict: Verdict,
-    /// Limits that determine the speed, ordered by time.
+    /// Limits that determine the speed of the motion, ordered by time.
     pub binding: Vec<Bound>,
     /// Times at which the motion is nearest to each waypoint, s.
     pub waypoint_times: Vec<f64>,
-    /// Notes as text about changes that were necessary to pass the check, and about waypoints that the rounded corners miss.
+    /// Notes for the user about changes that were necessary to pass the check, and about waypoints that the motion misses because of
+    /// rounded corners.
     pub notes: Vec<String>,
 }
 
@@ -149,13 +151,14 @@ impl<'a> Planner<'a> {
 
     /// Plans a motion that starts and ends at rest between two positions (rad, base to wrist). The motion is straight in joint space,
     /// unless a curved motion is faster. If a joint is outside its limits by at most the start tolerance, the motion begins at the nearest
-    /// position inside the limits (J-58). If the goal is outside the limits by at most the rounding of a serial frame, it is moved to the
-    /// limit (J-36).
+    /// position inside the limits (J-58). If the goal is outside the limits by at most the rounding of a serial frame, the goal is moved to
+    /// the limit (J-36).
     ///
     /// # Errors
     ///
-    /// [`PlanError::Speed`], [`PlanError::Margin`]; [`PlanError::Plan`] if a position is outside the limits or its gravity
-    /// torque is too high; [`PlanError::Refused`] if the check finds a problem that a lower speed does not solve.
+    /// Returns [`PlanError::Speed`] or [`PlanError::Margin`] if this setting of the planner is out of range. Returns [`PlanError::Plan`] if
+    /// a position is outside the limits or its gravity torque is too high. Returns [`PlanError::Refused`] if the check finds a problem that
+    /// a lower speed does not solve.
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
         let arm = self.dynamics();
         let first = self.nearest_inside(from);
@@ -164,8 +167,8 @@ impl<'a> Planner<'a> {
         self.checked(&motion, &first, Some(*from), false)
     }
 
-    /// Returns the position inside the limits that is nearest to `place` and from which the controller can start a motion. Joints that are
-    /// outside the limits by more than the start tolerance keep their position.
+    /// Returns the position inside the limits that is nearest to the position `place` and from which the controller can start a motion. A
+    /// joint that is outside its limits by more than the start tolerance keeps its position.
     fn nearest_inside(&self, place: &[f64; JOINTS]) -> [f64; JOINTS] {
         std::array::from_fn(|j| {
             let inside = PathRange::of(self.config, j, 0).nearest_inside(place[j]);
@@ -174,12 +177,12 @@ impl<'a> Planner<'a> {
     }
 
     /// Plans a motion through waypoints that starts and ends at rest. The segments between waypoints are straight in joint space, and the
-    /// corners are rounded within the blend. If waypoints have times, the motion passes the waypoints at these times.
+    /// corners are rounded within the blend. If a waypoint has a time, the motion passes the waypoint at this time.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Planner::to`], with the number of the waypoint; [`PlanError::Nowhere`],
-    /// [`PlanError::Blend`], [`PlanError::TooLong`].
+    /// Returns the errors of [`Planner::to`], with the number of the waypoint. Returns [`PlanError::Nowhere`] if all waypoints are equal,
+    /// [`PlanError::Blend`] if the blend is too large, and [`PlanError::TooLong`] if the motion takes too long.
     pub fn through(&self, waypoints: &[Waypoint]) -> Result<Planned, PlanError> {
         let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
         if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
@@ -197,13 +200,14 @@ impl<'a> Planner<'a> {
         Ok(planned)
     }
 
-    /// Plans the remainder of a trajectory on the same path, beginning at the time `from_ms` of the path, with the arm at `start`. After a
-    /// ramp the motion follows the original timing of the trajectory. The planner uses the shortest ramp with which the remainder passes
-    /// the check.
+    /// Plans the remainder of a trajectory on the same path. The remainder begins at the path time `from_ms`, with the arm at the position
+    /// `start`. After a ramp, the motion follows the original timing of the trajectory. The planner uses the shortest ramp for which the
+    /// remainder passes the check.
     ///
     /// # Errors
     ///
-    /// [`PlanError::Refused`] if the check rejects the remainder with every ramp; [`PlanError::TooLong`].
+    /// Returns [`PlanError::Refused`] if the check rejects the remainder with every ramp, and [`PlanError::TooLong`] if the remainder is
+    /// too long for the controller.
     pub fn rest(
         &self,
         trajectory: &Trajectory,
@@ -224,8 +228,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Rejects a motion before planning if it takes too long even at the highest speed. Positions outside the limits and invalid blends are
-    /// accepted here, because the planner rejects them later.
+    /// Rejects a motion before planning if the motion takes too long even at the highest speed. This function does not reject positions
+    /// outside the limits and invalid blends, because the planner rejects them later.
     fn fits_time(&self, positions: &[[f64; JOINTS]]) -> Result<(), PlanError> {
         let limits = self.limits()?;
         let is_inside = |q: &[f64; JOINTS]| {
@@ -244,14 +248,14 @@ impl<'a> Planner<'a> {
             .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperatures(temperatures))
     }
 
-    /// Returns the checker for a motion of an arm that is at `start`.
+    /// Returns the checker for a motion of an arm that is at the position `start`.
     fn checker(&self, start: Option<[f64; JOINTS]>) -> Checker<'a> {
         let Self { model, friction, upload, .. } = *self;
         Checker { model, friction, start, upload, ..Checker::new(self.config) }
     }
 
-    /// Plans a motion within the limits. If the margin of a joint leaves no torque for the motion, the function plans without the margin of
-    /// this joint.
+    /// Plans a motion within the limits. If the torque margin of a joint leaves no torque for the motion, the function plans without the
+    /// margin of this joint.
     fn within(
         &self,
         plan: impl Fn(&Limits) -> Result<Motion, jtc_plan::PlanError>,
@@ -287,8 +291,8 @@ impl<'a> Planner<'a> {
         Ok(Limits { jerk: limits.acceleration.map(|a| a / JUMP_S), ..limits })
     }
 
-    /// Converts the motion into a trajectory that passes the check, and slows down the motion as far as necessary. If `timed` is set, the
-    /// motion is not slowed down.
+    /// Converts the motion into a trajectory that passes the check, and slows down the motion as far as necessary. If `timed` is `true`,
+    /// the motion is not slowed down.
     fn checked(
         &self,
         within: &Within,
@@ -303,13 +307,14 @@ impl<'a> Planner<'a> {
         loop {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
-            // The planner checks with cold bearings first, then with the bearing temperature during operation. If friction helps to brake,
-            // the torque is higher with less friction.
+            // The planner checks with cold bearings first, then with the bearing temperature during operation. The warm check is also
+            // needed because friction helps to brake: with less friction, the braking torque is higher.
             let cold =
                 Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
             let verdict =
                 if cold.is_ok() { checker.check(&sampled.trajectory).or_less(cold.margin) } else { cold };
-            // The distance between corners is shorter than a step. A longer trajectory would not help, because its steps would be longer.
+            // A warning with a long step shows that the distance between corners is shorter than a step. A slower motion would not help,
+            // because its steps would be longer.
             if step > STEP_MS && verdict.warnings().next().is_some() {
                 return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
@@ -323,7 +328,8 @@ impl<'a> Planner<'a> {
                 slowed = Some(worst);
                 continue;
             }
-            // The torque can exceed the margin because of the rounding in serial frames, and between the samples of the plan.
+            // The torque can exceed the limit that the margin allows, because of the rounding in serial frames, and between the samples of
+            // the plan.
             let excess = arm.as_ref().filter(|_| !timed);
             let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
             if let Some(excess) = excess {
@@ -361,7 +367,8 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Returns `place`, in which each joint is moved to its limit if it is outside by at most the rounding of a serial frame (J-36).
+/// Returns the position `place`. If a joint is outside its limit by at most the rounding of a serial frame, the joint is moved to this
+/// limit (J-36).
 fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     std::array::from_fn(|j| {
         let range = PathRange::of(config, j, 0);
@@ -369,14 +376,14 @@ fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     })
 }
 
-/// Motion with the limits that it respects.
+/// Planned motion and the limits within which it was planned.
 struct Within {
     motion: Motion,
     limits: Limits,
 }
 
-/// Returns the factor by which the motion must be slowed down to solve the problems. Returns `None` if a slower motion does not solve the
-/// problems.
+/// Returns the slow-down factor for the next iteration, estimated from the problems in the verdict. Returns `None` if a slower motion does
+/// not solve these problems.
 fn slower(verdict: &Verdict) -> Option<f64> {
     use ProblemKind::{Acceleration, FrictionVelocity, NoStop, PositionSpeed, Torque, Velocity};
     let factors = verdict.refusals().map(|p| {
@@ -384,7 +391,7 @@ fn slower(verdict: &Verdict) -> Option<f64> {
         match p.kind {
             Velocity | PositionSpeed | FrictionVelocity => Some(over),
             Acceleration => Some(over.sqrt()),
-            // A part of the torque is gravity, which does not depend on the speed.
+            // A part of the torque is the gravity torque, which does not depend on the speed.
             Torque | NoStop => Some(over.max(1.03)),
             _ => None,
         }
@@ -403,8 +410,8 @@ fn limit_name(kind: ProblemKind) -> &'static str {
     }
 }
 
-/// Returns the limits that determine the speed. If the motion was slowed down, returns the problem that required this instead of the limits
-/// of the plan.
+/// Returns the limits that determine the speed of a motion. If the motion was slowed down because of a problem, returns the limit of this
+/// problem for the whole motion.
 fn binding(motion: &Motion, scale: f64, slowed: Option<&Problem>) -> Vec<Bound> {
     if let Some(problem) = slowed {
         let (joint, limit) = (problem.joint.unwrap_or(Joint::ALL[0]), limit_name(problem.kind));
@@ -427,7 +434,7 @@ fn slowed_words(problem: &Problem, stretch: f64) -> String {
 ///
 /// # Errors
 ///
-/// Returns the errors of [`Planner::to`].
+/// Returns the same errors as [`Planner::to`].
 pub fn joint_move(
     from: &[f64; JOINTS],
     to: &[f64; JOINTS],

@@ -1,5 +1,5 @@
-//! Check that an arm is physically possible and complete, that its drives can hold it, and that all values are within the range of the
-//! controller. The check lists all findings.
+//! Check of an arm. The check lists all values that are physically impossible, missing, or out of the range of the controller. The check
+//! also lists the joints that the drives cannot hold.
 
 mod borne;
 mod limits;
@@ -23,18 +23,18 @@ pub struct ArmFinding {
     /// Subject of the finding: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
     /// `unit`, `pose` or `proposed`.
     pub code: &'static str,
-    /// Severity, description, cause and advice. The controller refuses an arm with a finding of the severity problem.
+    /// Severity, description, cause and advice. The controller refuses an arm with a finding of the severity `Problem`.
     #[serde(flatten)]
     pub finding: Finding,
-    /// Joint, if the finding is about one joint.
+    /// Joint of the finding; `None` if the finding is not about one joint.
     pub joint: Option<Joint>,
-    /// Key in the arm file, if the finding is about one key.
+    /// Key in the arm file; `None` if the finding is not about one key.
     pub name: Option<&'static str>,
     /// Value that was checked, in `unit`.
     pub value: Option<f64>,
-    /// Limit for the value, in `unit`.
+    /// Limit for the checked value, in `unit`.
     pub limit: Option<f64>,
-    /// Unit of value and limit.
+    /// Unit of the value and of the limit.
     pub unit: Option<&'static str>,
     /// Pose to which the finding applies, rad.
     pub pose_rad: Option<[f64; JOINTS]>,
@@ -68,16 +68,16 @@ impl ArmFinding {
     }
 }
 
-/// Gravity torque of a joint in its worst pose.
+/// Greatest gravity torque of a joint, with the pose in which this torque occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Holding {
-    /// The joint.
+    /// Joint that must hold this torque.
     pub joint: Joint,
     /// Greatest magnitude of the gravity torque over all positions, N·m.
     pub torque_nm: f64,
     /// Torque limit of the joint, N·m.
     pub limit_nm: f64,
-    /// Pose with this gravity torque, rad.
+    /// Pose in which the gravity torque is greatest, rad.
     pub pose_rad: [f64; JOINTS],
 }
 
@@ -88,19 +88,19 @@ pub struct Checked {
     pub findings: Vec<ArmFinding>,
     /// Gravity torque of each joint; empty if the numbers of the arm do not allow the computation.
     pub holding: Vec<Holding>,
-    /// Tolerated factors of the rotor inertias, relative to the file; `None` if the gains are unstable or missing.
+    /// Allowed ratios of the rotor inertias to the values in the file; `None` if the gains are unstable or missing.
     pub rotor_margins: Option<RotorMargins>,
 }
 
 impl Checked {
-    /// Returns `true` if a controller would refuse this arm.
+    /// Returns `true` if a finding is a problem, so a controller would refuse this arm.
     pub fn is_refused(&self) -> bool {
         self.findings.iter().any(|f| f.finding.severity == Severity::Problem)
     }
 }
 
 impl Arm {
-    /// Checks the arm and returns all findings that an operator must know before the parameters are sent to a controller.
+    /// Checks the arm and returns all findings. An operator must know these findings before the parameters are sent to a controller.
     pub fn check(&self) -> Checked {
         let mut findings = Vec::new();
         self.find_limits(&mut findings);
@@ -122,7 +122,7 @@ impl Arm {
         Checked { findings, holding, rotor_margins }
     }
 
-    /// Returns `joint 2 (shoulder)`, or only the number if the joint is named by its number.
+    /// Returns a text such as `joint 2 (shoulder)`. The text contains only the number if the name of the joint is its number.
     fn titled(&self, joint: Joint) -> String {
         let name = &self.joint_names[joint.index()];
         if name.replace('_', " ") == joint.to_string() {
@@ -142,8 +142,8 @@ impl Arm {
     }
 
     fn find_model(&self, findings: &mut Vec<ArmFinding>) {
-        // The check of a model ends at the first fault. So the code checks each joint and link separately, with valid values for all other
-        // parts.
+        // The check of a model ends at the first fault. Therefore each joint and each link is checked in a model that is valid except for
+        // this joint or link.
         let good = Arm::avena().model;
         for index in 0..=JOINTS {
             let mut joint = ArmModel { links: good.links, ..good };
@@ -173,7 +173,7 @@ impl Arm {
             ModelError::NotFinite { value, .. } => ("a typing error", value, None),
             _ => ("a typing error", f64::NAN, None),
         };
-        // The error text contains the number of the part; the finding contains the name of the part.
+        // The text of the error begins with the number of the joint or link. The finding contains the name of the joint or link instead.
         let text = error.to_string();
         let problem = text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem);
         let what = format!("{}: {problem}", self.name_of_part(error).trim_start_matches("arm model, "));
@@ -218,7 +218,7 @@ impl Arm {
         }
     }
 
-    /// Finds limits outside the valid range of the controller setting (J-53).
+    /// Finds joint limits outside the range that the controller accepts for its setting (J-53).
     fn find_settings(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let config = self.config();
         for joint in Joint::ALL.into_iter().filter(|joint| !faulty.contains(joint)) {
@@ -241,8 +241,8 @@ impl Arm {
         }
     }
 
-    /// Finds gains, friction and masses that are out of bounds. Skips the joints in `faulty`, because the friction of these joints would be
-    /// compared with invalid limits.
+    /// Finds gains, friction and masses that are out of bounds. Skips the joints in `faulty`, because the limits of these joints are
+    /// invalid and the friction cannot be compared with them.
     fn find_bounds(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let (set, bounds) = (self.parameter_set(), self.config().parameter_bounds);
         let beyond = |joint: Option<Joint>, name, e: OutOfBounds| {
@@ -280,7 +280,7 @@ impl Arm {
             }));
         }
         let only_numbers = super::ParameterSet { model: None, ..set };
-        // Gains that already have a finding are not reported twice.
+        // If the gains already have a finding, the check does not report them again.
         if let Err(error) = only_numbers.check()
             && !findings.iter().any(|f| f.code == "bounds")
         {

@@ -1,4 +1,4 @@
-//! Loader for parameter files of all formats, and for directories of parameter files.
+//! Loader for parameter files in all formats and for directories of parameter files.
 
 use std::path::{Path, PathBuf};
 
@@ -10,32 +10,32 @@ use super::csv::{self, Table};
 use super::{Arm, Change, ParameterSet, Warning, is_xml};
 use crate::file::{FileError, read_text};
 
-/// Selection of the friction compensation if a file has a table and a polynomial.
+/// Friction compensation that is used if a file has a friction table and a friction polynomial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrictionChoice {
-    /// The polynomial.
+    /// The friction polynomial is used.
     #[default]
     Polynomial,
-    /// The table.
+    /// The friction table is used.
     Table,
 }
 
-/// Parameters from files and directories.
+/// Parameters that were read from files and directories.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterFile {
-    /// Complete arm, if one of the files describes an arm.
+    /// Complete arm; `None` if no file describes an arm.
     pub arm: Option<Arm>,
-    /// Friction polynomial, coefficients c0 to c5.
+    /// Friction polynomial of each joint, coefficients c0 to c5.
     pub polynomial: Option<[[f64; 6]; JOINTS]>,
-    /// Friction tables.
+    /// Friction table of each joint.
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
-    /// Gains.
+    /// Gains of each joint.
     pub pid: Option<[PidGains; JOINTS]>,
-    /// Kinematics and masses.
+    /// Kinematics and masses of the arm.
     pub model: Option<ArmModel>,
-    /// Files that were read, each with the parameter that was read from it.
+    /// Files that were read, each with the name of the parameter that the file contains.
     pub sources: Vec<(PathBuf, &'static str)>,
-    /// Warnings about values that the loader ignored or filled in.
+    /// Warnings about values that the loader ignored, changed or filled in.
     pub warnings: Vec<Warning>,
 }
 
@@ -50,13 +50,13 @@ impl ParameterFile {
     }
 
     /// Reads several files and directories into one set of parameters. If two files contain the same parameter, the value of the later file
-    /// is used. A parameter with one file for each joint is used only if `paths` lists all six files or their directory. This rule ensures
-    /// that no joint receives the values of another joint, and that only files intended by the user are read.
+    /// is used. If a parameter has one file for each joint, the parameter is used only if `paths` lists all six files or their directory.
+    /// Therefore no joint receives the values of another joint, and the loader reads only files that the user has listed.
     ///
     /// # Errors
     ///
-    /// Returns an error for the first file that cannot be read or parsed, for missing tables of some joints, or for numbers that
-    /// cannot be sent ([`ParameterSet::check`]).
+    /// Returns an error for the first file that cannot be read or parsed, and if the tables of some joints are missing. Also returns an
+    /// error if a number cannot be sent ([`ParameterSet::check`]).
     pub fn load_all(paths: &[PathBuf]) -> Result<Self, FileError> {
         let mut all = Self::default();
         let mut joints = JointTables::default();
@@ -72,8 +72,8 @@ impl ParameterFile {
         Ok(all)
     }
 
-    /// Parses the text of one parameter table. The table of a single joint is copied to all six joints, so that the check covers its
-    /// values.
+    /// Parses the text of one parameter table. The table of a single joint is copied to all six joints, because the check requires a table
+    /// of each joint.
     #[cfg(any(test, feature = "fuzzing"))]
     pub(crate) fn parse_table(text: &str) -> Result<Self, FileError> {
         let mut all = Self::default();
@@ -210,12 +210,12 @@ impl ParameterFile {
     }
 }
 
-/// Returns `true` for TOML or XML, `false` for a table of numbers.
+/// Returns `true` if the text is TOML or XML, and `false` if the text is a table of numbers.
 fn is_arm(text: &str) -> bool {
     is_xml(text) || text.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
-/// Collection of single-joint tables until all six joints have a table.
+/// Tables of single joints, collected until each of the six joints has a table.
 #[derive(Default)]
 struct JointTables {
     friction: PerJoint<TableOf<f32>>,
@@ -228,10 +228,10 @@ impl JointTables {
     }
 }
 
-/// Tables of all six joints, and their files.
+/// Tables of all six joints, and the files of these tables.
 type Complete<T> = ([T; JOINTS], Vec<PathBuf>);
 
-/// Tables of one kind, with the file of each joint.
+/// Tables of one parameter, with the file of each joint.
 struct PerJoint<T> {
     found: [Option<(PathBuf, T)>; JOINTS],
 }
@@ -247,7 +247,7 @@ impl<T> PerJoint<T> {
         self.found.iter().flatten().count()
     }
 
-    /// Adds the table of a joint; the file name gives the joint number.
+    /// Adds the table of a joint. The file name contains the joint number.
     fn add(&mut self, path: &Path, table: T) -> Result<(), FileError> {
         let Some((_, joint, _)) = split_name(path) else {
             let problem = "has the numbers of one joint, but its name has no joint number, expected ...Joint0.csv (joint 1) to ...Joint5.csv (joint \
@@ -262,8 +262,8 @@ impl<T> PerJoint<T> {
         Ok(())
     }
 
-    /// Returns the tables of all six joints, or `None` if no file contains a table of this kind. If some joints have no table, returns an
-    /// error that lists their files.
+    /// Returns the tables of all six joints, or `None` if no file contains a table of this parameter. If only some joints have a table,
+    /// returns an error that lists the missing files.
     fn complete(self) -> Result<Option<Complete<T>>, FileError> {
         let Some((first, _)) = self.found.iter().flatten().next() else { return Ok(None) };
         let first = first.clone();

@@ -6,7 +6,7 @@ use jtc_wire::Joint;
 
 use crate::file::{FileError, Place, number, number_rows, rows};
 
-/// Parameter from a table of numbers.
+/// Parameter that a table of numbers contains.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Table {
     /// Friction table of one joint.
@@ -19,11 +19,11 @@ pub(super) enum Table {
     Pid(PidGains),
     /// Gains of all joints.
     PidAll([PidGains; JOINTS]),
-    /// Kinematics and masses.
+    /// Kinematics and masses of the arm.
     Model(Box<ArmModel>),
 }
 
-/// Recognises the parameter by the shape of the table.
+/// Parses a table of numbers. The number of rows and columns, or a header with `vel_index`, determines the parameter.
 pub(super) fn read(text: &str) -> Result<Table, FileError> {
     let first = rows(text).next();
     if first.as_ref().is_some_and(|(_, cells)| cells.contains(&"vel_index")) {
@@ -124,8 +124,8 @@ fn long_table(text: &str) -> Result<Table, FileError> {
     Ok(Table::FrictionAll(tables))
 }
 
-/// Returns `true` if the Coulomb and viscous coefficients are positive, the temperature coefficient is small, and the
-/// reference temperature is between −20 and 100 °C.
+/// Returns `true` if the friction coefficients are plausible. Plausible Coulomb and viscous coefficients are positive, the temperature
+/// coefficient is small, and the reference temperature is between −20 and 100 °C.
 fn plausible(c: &[f64]) -> bool {
     let viscous = c[0] > 0.0 && c[1] > 0.0;
     match c {
@@ -138,7 +138,7 @@ fn polynomial(all: &[(usize, Vec<f64>)]) -> Result<Table, FileError> {
     let reversed = |c: &Vec<f64>| c.iter().rev().copied().collect::<Vec<f64>>();
     let wrong: Vec<usize> = (0..all.len()).filter(|i| !plausible(&all[*i].1)).collect();
     let turned = wrong.iter().filter(|i| plausible(&reversed(&all[**i].1))).count();
-    // Most rows are plausible only if their coefficients are read from right to left.
+    // If most rows are plausible only when read from right to left, the columns of the file are in the wrong order.
     if turned * 2 > all.len() {
         let (line, row) = (all[wrong[0]].0, &all[wrong[0]].1);
         let problem = format!(

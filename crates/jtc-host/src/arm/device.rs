@@ -1,7 +1,7 @@
-//! Differences between an arm file and the settings of a controller. A host can send friction, gains and the arm model to a controller.
-//! Limits, gravity and rotor inertia are settings of the controller.
+//! Differences between an arm file and the settings of a controller. A host can send the friction, the gains and the arm model to a
+//! controller. The limits, the gravity and the rotor inertias are settings of the controller.
 //!
-//! If a controller has other limits or another gravity than the arm file, the motion check with the file does not apply to the real arm
+//! If the limits or the gravity of a controller differ from the arm file, a motion check with this file is not valid for the real arm
 //! (J-55). A controller without extensions is assumed to use the settings of the built-in arm, [`Config::avena`].
 
 use jtc_core::settings::{Setting, TABLE};
@@ -10,21 +10,22 @@ use jtc_wire::Joint;
 
 use super::Arm;
 
-/// Relative difference up to which two values are considered equal, because the same number can be written in two notations.
+/// Relative difference up to which two values count as equal. The tolerance is needed because the same number can be written in two
+/// notations.
 const SAME: f64 = 1e-9;
 
-/// A value of the arm file that the controller does not use.
+/// Value in the arm file that differs from the value in the controller.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Difference {
-    /// Key in an arm file.
+    /// Key of the value in an arm file.
     pub name: String,
-    /// Joint; `None` if the value concerns the whole arm.
+    /// Joint to which the value belongs; `None` if the value belongs to the whole arm.
     pub joint: Option<Joint>,
     /// Value in the arm file.
     pub file: f64,
     /// Value in the controller.
     pub device: f64,
-    /// Unit of both values.
+    /// Unit of `file` and `device`.
     pub unit: &'static str,
 }
 
@@ -40,7 +41,7 @@ impl std::fmt::Display for Difference {
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
-/// Description, for messages, of the settings that are not sent with friction, gains and arm model.
+/// Text for messages that names the settings that are not sent with the friction, the gains and the arm model.
 pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
@@ -59,8 +60,8 @@ impl Arm {
         setting.of_joint() && setting.of_arm() && self.gives(setting, Some(joint))
     }
 
-    /// Returns the settings in which this arm differs from the controller settings `device`; gravity is first, followed by the settings of
-    /// each joint. The list is empty if all settings are equal.
+    /// Returns the settings in which this arm differs from the controller settings `device`. The list begins with gravity, then lists the
+    /// settings of each joint. The list is empty if all settings are equal.
     pub fn device_differences(&self, device: &Config) -> Vec<Difference> {
         let own = self.config();
         let mut all = Vec::new();
@@ -85,16 +86,17 @@ impl Arm {
         all
     }
 
-    /// Returns the settings that are not sent with friction, gains and arm model, and that are missing in the file. For these settings the
-    /// controller uses its own values, so they are not compared.
+    /// Returns the names of settings that are missing in the arm file: `gravity`, `rotor inertia`, or none. The controller uses its own
+    /// value of a missing setting.
     pub fn settings_not_given(&self) -> Vec<&'static str> {
         let rotors = self.rotors_given.contains(&false);
         let parts = [(self.gravity.is_none(), "gravity"), (rotors, "rotor inertia")];
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the settings with which a motion is checked for a controller that uses the settings `device`. The result contains the
-    /// stricter of the two limits, and the gravity, payload and rotor inertia of the controller.
+    /// Returns the settings for the check of a motion on a controller that uses the settings `device`. Each limit in the result is the
+    /// stricter of the limits of the arm and the controller. The gravity, payload and rotor inertias in the result are the values of the
+    /// controller.
     pub fn config_on_device(&self, device: &Config) -> Config {
         let mut config = self.config();
         config.gravity = device.gravity;
@@ -146,14 +148,14 @@ mod tests {
         );
     }
 
-    /// If the arm file does not contain gravity, the gravity of the controller is used.
+    /// An arm file without gravity does not differ from a controller that has the default gravity.
     #[test]
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
         assert!(arm.device_differences(&Config::avena()).is_empty());
     }
 
-    /// A URDF file cannot contain a rotor inertia. For such a file, the rotor inertia is unknown instead of 0, so it is not reported as a
+    /// A URDF file cannot contain a rotor inertia. The rotor inertia of a URDF arm is unknown and not 0, so it is not reported as a
     /// difference.
     #[test]
     fn j55_a_rotor_inertia_that_no_file_gives_is_no_difference() {
@@ -167,8 +169,8 @@ mod tests {
             urdf.config_on_device(&Config::avena()).joints[3].rotor_inertia,
             Config::avena().joints[3].rotor_inertia
         );
-        // An arm file created from the URDF file also does not contain the rotor inertia. If an arm file contains the value 0, the rotor
-        // inertia is known.
+        // An arm file created from the URDF file also does not contain the rotor inertia. If an arm file contains the rotor inertia 0, the
+        // rotor inertia is known.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);

@@ -11,7 +11,7 @@ use super::toml_form::FORMAT;
 use super::{Arm, RULES, Rule};
 
 fn list(values: &[f64]) -> String {
-    // `{:?}` keeps the decimal point, so that a TOML parser reads a float.
+    // `{:?}` keeps the decimal point, because a TOML parser would read a number without a decimal point as an integer.
     let cells: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();
     format!("[{}]", cells.join(", "))
 }
@@ -20,7 +20,7 @@ fn narrow(values: &[f32]) -> String {
     list(&values.iter().map(|v| f64::from(*v)).collect::<Vec<_>>())
 }
 
-/// Formats a TOML string.
+/// Formats a text as a TOML string.
 fn quoted(text: &str) -> String {
     serde_json::to_string(text).expect("a string is JSON, and TOML has the same escapes")
 }
@@ -29,13 +29,14 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Returns the name of a frame of the robot description: 0 is the base, 1 to 6 are the links that joints 1 to 6 carry, 7 is the flange.
+/// Returns the name of a frame of the robot description. Frame 0 is the base, frames 1 to 6 are the links that joints 1 to 6 carry, and
+/// frame 7 is the flange.
 pub(crate) fn frame_name(i: usize) -> String {
     if i > JOINTS { "flange".into() } else { format!("link_{i}") }
 }
 
 impl Arm {
-    /// Writes the list of the proposed numbers, for a joint or for the whole arm.
+    /// Writes the names of the proposed numbers of a joint or of the whole arm.
     fn write_marks(&self, out: &mut String, joint: Option<Joint>) {
         let marked = self.sources.marked(joint);
         if !marked.is_empty() {
@@ -44,7 +45,7 @@ impl Arm {
         }
     }
 
-    /// Writes the arm as an arm file.
+    /// Returns the text of an arm file for this arm.
     pub fn to_toml(&self) -> String {
         let mut out = format!("format = {FORMAT}\nname = {}\n", quoted(&self.name));
         if let Some(g) = &self.gravity {
@@ -130,7 +131,7 @@ impl Arm {
         out
     }
 
-    /// Writes the arm as a robot description, which can contain only kinematics, masses and limits.
+    /// Returns the text of a robot description for this arm. A robot description can contain only kinematics, masses and limits.
     pub fn to_urdf(&self) -> String {
         let three = |v: &[f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
         let placed = |o: &Origin| format!("<origin xyz=\"{}\" rpy=\"{}\"/>", three(&o.xyz), three(&o.rpy));

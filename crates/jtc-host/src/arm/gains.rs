@@ -1,11 +1,13 @@
-//! Range of inertias in which the gains of an arm are stable in the control loop (J-41, J-71).
+//! Range of inertias for which the control loop of an arm is stable with its gains (J-41, J-71).
 //!
-//! In the loop of one joint, the controller reads a position. The resulting torque takes effect `delay_ticks` later and lasts for one tick.
-//! The controller computes the derivative over five ticks. This control loop is stable between a lower and an upper inertia. Below the
-//! lower inertia the delay of the derivative is too long; above the upper inertia the integral gain is too high.
+//! In the control loop of one joint, the controller reads a position and computes a torque. The computed torque takes effect `delay_ticks`
+//! later and lasts for one tick. The controller computes the derivative over five ticks. The control loop of one joint is stable between a
+//! lower and an upper inertia. Below the lower inertia, the delay of the derivative is too long. Above the upper inertia, the integral gain
+//! is too high.
 //!
-//! For coupled joints, D and U are the lower and upper inertias of the joints, and M is the mass matrix with rotors. The arm is stable if
-//! M − D and U − M are positive definite. This condition is exact if the gains of all joints have the same ratios.
+//! For coupled joints, D and U are the diagonal matrices of the lower and upper inertias of the joints. M is the mass matrix with rotors.
+//! The arm is stable if M − D and U − M are positive definite. The stability condition is exact if the ratios of Kp, Ki and Kd are the same
+//! for all joints.
 
 use std::f64::consts::PI;
 
@@ -14,18 +16,18 @@ use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 
 use super::statics::{POSES, Ranges, pose};
 
-/// Tick of the controller, s.
+/// Duration of one tick of the controller, s.
 const DT: f64 = 1e-3;
 /// Number of ticks over which the controller computes the derivative (J-41).
 const WINDOW: f64 = 5.0;
-/// Steps of the frequency search, from [`SLOWEST`] to half of the tick rate.
+/// Number of steps of the frequency search, from [`SLOWEST`] to half of the tick rate.
 const STEPS: i32 = 400;
-/// Lowest frequency of the search, rad per tick.
+/// Lowest frequency of the frequency search, rad per tick.
 const SLOWEST: f64 = 1e-6;
-/// Factors of a proposed rotor inertia for which the gains must be stable until the rotor inertia is measured. Rotor inertias within one
-/// family of drives differ by these factors.
+/// Possible ratios of a real rotor inertia to the proposed rotor inertia. The gains must be stable for this range until the rotor inertia
+/// is measured. Rotor inertias within one family of drives differ by such ratios.
 pub(super) const PROPOSED_RANGE: RotorMargin = RotorMargin { down: 0.2, up: 3.0 };
-/// Smallest and largest factor of the rotor inertia in the search.
+/// Smallest and largest factor of the rotor inertia in the search for the stable range.
 const FACTORS: (f64, f64) = (0.0, 1000.0);
 
 type Matrix = [[f64; JOINTS]; JOINTS];
@@ -33,27 +35,30 @@ type Matrix = [[f64; JOINTS]; JOINTS];
 /// Range of inertias (kg·m²) in which a joint is stable with its gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StableInertia {
-    /// Lower limit; below this inertia the delay of the derivative is too long.
+    /// Lowest stable inertia. Below this inertia, the delay of the derivative is too long.
     pub least: f64,
-    /// Upper limit; above this inertia the integral gain is too high. The limit is infinite if the integral gain is 0.
+    /// Highest stable inertia. Above this inertia, the integral gain is too high. The highest stable inertia is infinite if the integral
+    /// gain is 0.
     pub most: f64,
 }
 
-/// Range of factors of the rotor inertias in the file in which the arm is stable.
+/// Range of factors for the rotor inertias in the file. Within this range the arm is stable.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RotorMargin {
-    /// Lowest factor; 0 if the arm is stable even without a rotor.
+    /// Lowest factor for which the arm is stable; 0 if the arm is stable even without a rotor.
     pub down: f64,
-    /// Highest factor; 1000 if the arm is stable up to 1000 or more.
+    /// Highest factor for which the arm is stable, up to 1000.
     pub up: f64,
 }
 
 impl StableInertia {
-    /// Returns the stable range. Returns `None` if the gains are not stable with any inertia, or are not finite.
+    /// Returns the range of inertias for which the gains are stable. Returns `None` if the gains are not stable with any inertia, or are
+    /// not finite.
     ///
-    /// In the formulas, θ is the frequency in rad per tick. The loop transfer function is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), and H is the
-    /// control law with its delay and the half tick during which a torque stays constant. At a stability limit, H is real and the loop
-    /// transfer function is −1. This equation determines the inertia J.
+    /// In the formulas, θ is the frequency in rad per tick. The loop transfer function is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ). H is the
+    /// control law with its delay, and with an additional delay of half a tick because each torque stays constant for one tick. At a
+    /// stability limit, H is real and the loop transfer function is −1. The condition that the loop transfer function is −1 determines the
+    /// inertia J.
     pub(super) fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
         let turned = |theta: f64| {
             let half = 0.5 * gains.ki * DT;
@@ -94,7 +99,7 @@ impl StableInertia {
     }
 }
 
-/// Returns the stable range of inertias of each joint; `None` if a joint has no stable range.
+/// Returns the stable range of inertias of each joint. Returns `None` if one of the joints has no stable range.
 pub(super) fn all_stable(gains: &[PidGains; JOINTS], delay_ticks: u8) -> Option<[StableInertia; JOINTS]> {
     let each: Vec<StableInertia> = gains.iter().filter_map(|g| StableInertia::of(g, delay_ticks)).collect();
     each.try_into().ok()
@@ -106,13 +111,13 @@ pub(super) fn mass_matrices(model: &ArmModel, ranges: &Ranges) -> Vec<Matrix> {
     (0..POSES).map(|n| dynamics.mass_matrix(&pose(n, ranges))).collect()
 }
 
-/// Returns `true` if a symmetric matrix is positive definite (Cholesky).
+/// Returns `true` if a symmetric matrix is positive definite, by Cholesky decomposition.
 fn is_positive(mut a: Matrix) -> bool {
     for k in 0..JOINTS {
         if a[k][k].is_nan() || a[k][k] <= 0.0 {
             return false;
         }
-        // Copy of the column below the pivot before the update.
+        // Copy of the column below the pivot before this column is changed.
         let column: JointVec = std::array::from_fn(|i| a[i][k]);
         for (i, row) in a.iter_mut().enumerate().skip(k + 1) {
             let factor = column[i] / column[k];
@@ -146,8 +151,8 @@ pub(super) fn is_light_enough(
     is_positive(a)
 }
 
-/// Returns the smallest and largest factor for the rotor inertias of the joints `of`; `None` if the arm is not stable with
-/// `rotor`.
+/// Returns the smallest and largest factor for the rotor inertias of the joints `of`. Returns `None` if the arm is not stable with the
+/// rotor inertias `rotor`.
 pub(super) fn rotor_margin(
     matrices: &[Matrix],
     rotor: &JointVec,
@@ -168,7 +173,7 @@ pub(super) fn rotor_margin(
     Some(margin)
 }
 
-/// Searches for the factor nearest to `far` for which `holds` returns `true`; `holds(1)` must be `true`.
+/// Searches between 1 and `far` for the factor nearest to `far` for which `holds` returns `true`. `holds(1)` must be `true`.
 fn end(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(far) {
         return far;

@@ -1,4 +1,4 @@
-//! Compares the computed stability limits with a simulation of the loop, tick by tick.
+//! Tests that compare the computed stability limits with a tick-by-tick simulation of the control loop.
 
 use super::*;
 use crate::arm::Arm;
@@ -49,7 +49,7 @@ fn j41_j71_a_joint_is_stable_between_two_inertias_and_nowhere_else() {
             assert_eq!(most, f64::INFINITY);
             continue;
         }
-        // Near the upper limit the oscillation grows slowly, so the test simulates some hundred oscillations.
+        // Near the upper stability limit the oscillation grows slowly, so the test simulates some hundred oscillations.
         let slow = |inertia: f64| {
             let swing = std::f64::consts::TAU * (inertia / gains.kp).sqrt() / DT;
             growth(&gains, delay, inertia, ((300.0 * swing) as usize).clamp(6_000, 20_000_000))
@@ -78,7 +78,7 @@ fn j41_gains_that_hold_no_inertia_are_known() {
     }
 }
 
-/// The mass matrix is zero, so the margin follows from the rotor inertia alone.
+/// The mass matrix in this test is zero, so only the rotor inertia determines the margin.
 #[test]
 fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     let arm = Arm::avena();
@@ -97,8 +97,8 @@ fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     assert_eq!(rotor_margin(&[both], &[0.01; JOINTS], &stable, [true; JOINTS]), None);
 }
 
-/// For every delay, the inertia that a controller requires is 1.1 to 1.7 times the stability limit of the control loop. For delays below
-/// two ticks and a strong Kp the required inertia may be as low as 0.85 times the stability limit.
+/// For every delay, the inertia that a controller requires is 1.1 to 1.7 times the stability limit of the control loop. Exception: if the
+/// delay is below two ticks and Kp is high, the required inertia may be as low as 0.85 times the stability limit.
 #[test]
 fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     for delay in 0..=7u8 {
@@ -114,8 +114,8 @@ fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     }
 }
 
-/// A controller accepts the gain sets of existing arms for those arms in 300 poses, with and without a load. The controller refuses three
-/// and five times the gains of the built-in arm.
+/// A controller accepts the gains of existing arms for these arms in 300 poses, with and without a load. The controller refuses the gains
+/// of the built-in arm if the gains are multiplied by three or five.
 #[test]
 fn j71_the_gains_in_use_are_taken_in_all_poses_with_all_loads() {
     let plain = include_str!("../../tests/sessions/plain.urdf");

@@ -1,5 +1,4 @@
-//! Image of an arm in a controller with extensions (J-54), hash of this image (J-52), and differences between the image and an arm file
-//! (J-55).
+//! Image of an arm in a controller with extensions (J-54), with the hash of this image (J-52) and its differences from an arm file (J-55).
 
 use jtc_core::settings::{self, SettingError};
 use jtc_core::{Config, Friction, JOINTS, PidGains, TableOf};
@@ -23,13 +22,13 @@ pub enum ImageError {
 }
 
 impl Arm {
-    /// Returns the values of all settings of a controller with this arm, in the order of the settings table. Values that are missing in the
-    /// arm are taken from the built-in arm.
+    /// Returns the values of all settings of a controller with this arm, in the order of the settings table. If the arm does not have a
+    /// value, the value of the built-in arm is used.
     pub fn settings(&self) -> Vec<SettingValue> {
         settings::values(&self.config(), 0, true).collect()
     }
 
-    /// Returns the image that a controller with this arm has; `None` if gains or friction are missing.
+    /// Returns the image that a controller stores for this arm. Returns `None` if the gains or the friction are missing.
     ///
     /// # Errors
     ///
@@ -53,11 +52,11 @@ impl Arm {
         Ok(Some(bytes))
     }
 
-    /// Returns the hash that a controller with this arm has; `None` if gains or friction are missing.
+    /// Returns the hash that a controller reports for this arm. Returns `None` if the gains or the friction are missing.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Arm::image`].
+    /// Returns the same errors as [`Arm::image`].
     pub fn hash(&self) -> Result<Option<u64>, EncodeError> {
         Ok(self.image()?.map(|image| Hash::of_image(&image)))
     }
@@ -89,8 +88,8 @@ impl Arm {
         })
     }
 
-    /// Returns the differences between this arm and the arm of a controller for each value. Values that are missing in the arm file are
-    /// skipped.
+    /// Compares each value of this arm with the arm of a controller and returns all differences. The comparison skips values that are
+    /// missing in the arm file.
     pub fn differences(&self, device: &Self) -> Vec<Difference> {
         let mut all = Vec::new();
         let mut compare = |name: String, joint, file: f64, device: f64, unit| {
@@ -127,7 +126,7 @@ impl Arm {
         compare: &mut impl FnMut(String, Option<Joint>, f64, f64, &'static str),
     ) {
         let has = device.friction();
-        // A file may contain a friction table and a friction polynomial; the comparison uses the form that the controller uses.
+        // A file may contain a friction table and a friction polynomial. The comparison uses the one that the controller also uses.
         let own = match has {
             Some(Friction::Table(_)) => self.table.as_ref().map(|t| Friction::Table(**t)).or(self.friction()),
             _ => self.friction(),
@@ -155,7 +154,7 @@ impl Arm {
                     }
                 }
             }
-            // The file has a polynomial and the controller has a table, or the reverse.
+            // The file has a friction polynomial and the controller has a friction table, or the reverse.
             (Some(own), Some(has)) => {
                 let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
                 compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");
@@ -218,7 +217,7 @@ fn tables(floats: &Floats<'_>) -> [TableOf<f32>; JOINTS] {
     })
 }
 
-/// Returns every number of two models, with its name.
+/// Returns each number of two arm models: the name of the number and its two values.
 fn model_numbers(own: &ArmModel, has: &ArmModel) -> Vec<(String, f64, f64)> {
     let (own, has) = (model_rows(own), model_rows(has));
     let mut all = Vec::new();
@@ -250,7 +249,7 @@ mod tests {
         assert!(arm.differences(&again).is_empty(), "{:?}", arm.differences(&again));
         assert_eq!(again.image().unwrap().as_deref(), Some(&image[..]));
         assert_eq!(again.name, "avena");
-        // The image is also unchanged after the arm is written to a file and read again.
+        // The image stays the same after the arm is written to a file and read again.
         let file = Arm::from_toml(&again.to_toml()).unwrap();
         assert_eq!(file.image().unwrap().as_deref(), Some(&image[..]));
         let table = Arm { polynomial: None, ..arm.clone() };
@@ -259,7 +258,7 @@ mod tests {
         assert_eq!(Arm { pid: None, ..arm }.image(), Ok(None));
     }
 
-    /// Controller settings without a key in the joint tables are written to the `[settings]` table of the arm file.
+    /// Controller settings that do not have a key in the joint tables are written to the `[settings]` table of the arm file.
     #[test]
     fn j53_settings_of_the_controller_travel_with_the_file() {
         let text =
@@ -307,7 +306,7 @@ mod tests {
             ("friction_polynomial.c2", Some(2)),
         ];
         assert_eq!(names, expected.map(|(name, joint)| (name.to_owned(), joint)));
-        // Values that are missing in a file are not reported as differences.
+        // If a value is missing in a file, no difference is reported for this value.
         let open = Arm { gravity: None, pid: None, polynomial: None, table: None, ..arm.clone() };
         other.joints[2] = arm.joints[2];
         other.model = arm.model;

@@ -1,4 +1,4 @@
-//! Parameters for a controller, and the checks before they are sent.
+//! Parameters for a controller, and the checks of these parameters before they are sent.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
@@ -10,44 +10,44 @@ use jtc_wire::Joint;
 pub struct ParameterSet {
     /// Friction compensation.
     pub friction: Option<Friction>,
-    /// Gains.
+    /// Gains of each joint.
     pub pid: Option<[PidGains; JOINTS]>,
-    /// Kinematics and masses.
+    /// Kinematics and masses of the arm.
     pub model: Option<ArmModel>,
 }
 
-/// Reason why parameters cannot be sent.
+/// Reason why parameters cannot be sent to a controller.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParameterError {
-    /// A number is out of range for its serial frame.
+    /// A number cannot be represented in its serial frame.
     #[error("{what} of {joint}: {value} does not fit into a 32-bit float")]
     NotFinite {
         /// Name of the number.
         what: &'static str,
-        /// Joint with this number.
+        /// Joint to which the number belongs.
         joint: Joint,
-        /// The value.
+        /// Value of the number.
         value: f64,
     },
-    /// The lower integral bound is above the upper one.
+    /// The lower bound of the integral is above the upper bound.
     #[error("integral of {joint}: lower bound {min} is above upper bound {max}")]
     IntegralBounds {
-        /// Joint with these bounds.
+        /// Joint to which the bounds belong.
         joint: Joint,
-        /// Lower bound, rad·s.
+        /// Lower bound of the integral, rad·s.
         min: f64,
-        /// Upper bound, rad·s.
+        /// Upper bound of the integral, rad·s.
         max: f64,
     },
-    /// A table axis does not increase.
+    /// The values of a table axis do not increase.
     #[error("friction table of {joint}: {axis} {after} at place {place} is not greater than {before}")]
     Axis {
-        /// Joint with this table.
+        /// Joint to which the table belongs.
         joint: Joint,
-        /// "velocity" or "temperature".
+        /// Name of the axis: "velocity" or "temperature".
         axis: &'static str,
-        /// Position, counted from 1, of the value that is not larger than the value before it.
+        /// Position on the axis, counted from 1, of the value that is not larger than the value before it.
         place: usize,
         /// Value before position `place`.
         before: f32,
@@ -59,12 +59,12 @@ pub enum ParameterError {
     Model(jtc_dynamics::ModelError),
 }
 
-/// A parameter that is out of the bounds of a controller (J-06).
+/// Parameter that is out of the bounds of a controller (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beyond {
-    /// Joint; `None` for a parameter of the arm model.
+    /// Joint of the parameter; `None` for a parameter of the arm model.
     pub joint: Option<Joint>,
-    /// Parameter that is out of bounds, with its value and bounds.
+    /// Name, value and bounds of the parameter.
     pub bounds: OutOfBounds,
 }
 
@@ -95,7 +95,7 @@ impl ParameterSet {
         self.friction.is_none() && self.pid.is_none() && self.model.is_none()
     }
 
-    /// Returns the missing parameters that a controller needs before it enables an arm.
+    /// Returns the names of the missing parameters. A controller needs all parameters before it enables an arm.
     pub fn missing(&self) -> Vec<&'static str> {
         let parts = [
             (self.friction.is_none(), "friction"),
@@ -105,8 +105,8 @@ impl ParameterSet {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the first parameter that is out of the bounds of a controller with these settings (J-06). The result is used for the error
-    /// message after a controller refused the parameters.
+    /// Returns the first parameter that is out of the bounds of a controller with these settings (J-06). The error message uses this
+    /// parameter after a controller has refused the parameters.
     pub fn beyond(&self, config: &Config) -> Option<Beyond> {
         let bounds = &config.parameter_bounds;
         let joints = Joint::ALL.into_iter().zip(&config.joints);
@@ -130,8 +130,8 @@ impl ParameterSet {
         friction.or_else(gains).or_else(masses)
     }
 
-    /// Checks the parameters before they are sent. Finds many of the values that the controller would refuse with
-    /// "incorrect value" (J-06).
+    /// Checks the parameters before they are sent. The check finds many of the values that the controller would refuse with "incorrect
+    /// value" (J-06).
     ///
     /// # Errors
     ///

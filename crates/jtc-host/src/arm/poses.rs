@@ -1,7 +1,7 @@
-//! Named joint positions of an arm, in the `[poses]` table of its file.
+//! Poses: named joint positions of an arm, in the `[poses]` table of the arm file.
 //!
 //! A pose consists of a name and six joint positions (rad, base to wrist). Poses are not sent to a controller and are not part of the arm's
-//! hash. [`save_pose`] and [`remove_pose`] change only this table; all other text of the file, including comments, stays the same.
+//! hash. [`save_pose`] and [`remove_pose`] change only the `[poses]` table. The other text of the file, including comments, stays the same.
 
 mod error;
 
@@ -21,12 +21,12 @@ use crate::file::{FileError, Place, read_text, short};
 /// Named joint positions, rad.
 pub type Poses = BTreeMap<String, [f64; JOINTS]>;
 
-/// Maximum length of a pose's name, characters.
+/// Maximum length of a pose's name, in characters.
 const NAME_MAX: usize = 64;
-/// Similarity at which a name is suggested instead of a misspelled name.
+/// Least similarity, 0 to 1, at which a known name is suggested instead of a misspelled name.
 const ALIKE: f64 = 0.7;
-/// Decimal factor for saved positions: the resolution is 1e-6 rad, which is one micrometre at the end of an arm of one metre. The
-/// resolution of the encoders is not finer.
+/// Number of steps per radian in saved positions. A step of 1e-6 rad moves the end of an arm of one metre by one micrometre. The resolution
+/// of the encoders is not finer.
 const DECIMALS: f64 = 1e6;
 
 impl Arm {
@@ -49,7 +49,7 @@ impl Arm {
         self.at_pose(name, position).map(|()| *position)
     }
 
-    /// Checks that a position (rad) is within the arm's limits. The error contains `name`.
+    /// Checks that a position (rad) is within the arm's limits. The error of this check contains `name`.
     ///
     /// # Errors
     ///
@@ -63,7 +63,7 @@ impl Arm {
         }
     }
 
-    /// Returns the first joint that is outside its position range, with the range (rad).
+    /// Returns the first joint that is outside its position range, with the lower and upper limit of this range (rad).
     pub(crate) fn outside(&self, position: &[f64; JOINTS]) -> Option<(Joint, f64, f64)> {
         let config = self.config();
         Joint::ALL.into_iter().find_map(|joint| {
@@ -100,7 +100,7 @@ pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileErro
     given.iter().map(pose).collect()
 }
 
-/// Formats a table key for a TOML file.
+/// Formats a name as a table key for a TOML file.
 pub(super) fn key(name: &str) -> String {
     toml_edit::Key::new(name).display_repr().into_owned()
 }
@@ -109,8 +109,8 @@ pub(super) fn key(name: &str) -> String {
 ///
 /// # Errors
 ///
-/// Returns an error if the name is invalid, if the pose exists and `force` is not set, if the file is a robot description or not
-/// an arm file, or if the file cannot be written. After an error the file is unchanged.
+/// Returns an error if the name is invalid, or if the pose exists and `force` is `false`. Also returns an error if the file is not a TOML
+/// arm file or cannot be written. After an error the file is unchanged.
 pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool) -> Result<(), PoseError> {
     if !is_pose_name(name) {
         return Err(PoseError::Name { name: short(name) });
@@ -121,7 +121,7 @@ pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool)
             return Err(PoseError::Exists { path: path.to_owned(), name: name.into() });
         }
         match table.get_mut(name).and_then(Item::as_value_mut) {
-            // The text before and after the value stays the same.
+            // The spaces and comments before and after the value stay the same.
             Some(value) => {
                 let around = value.decor().clone();
                 *value = Value::Array(Array::from_iter(rounded));
@@ -138,12 +138,12 @@ pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool)
 ///
 /// # Errors
 ///
-/// Returns an error if the pose does not exist, if the file is a robot description or not an arm file, or if the file cannot be
-/// written. After an error the file is unchanged.
+/// Returns an error if the pose does not exist, if the file is not a TOML arm file, or if the file cannot be written. After an error the
+/// file is unchanged.
 pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
     edit(path, |table, arm| {
         if arm.poses.remove(name).is_none() {
-            // This error lists the existing names.
+            // The error for an unknown pose lists the names of the existing poses.
             return arm.pose(name).map(drop);
         }
         table.remove(name);
@@ -151,8 +151,8 @@ pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
     })
 }
 
-/// Applies one change to the `[poses]` table of a file and to the arm read from that file. After the change, the table and the arm must
-/// have the same poses.
+/// Applies one change to the `[poses]` table of a file and to the arm read from that file. After the change, the `[poses]` table and the
+/// arm must contain the same poses.
 fn edit(
     path: &Path,
     change: impl FnOnce(&mut dyn toml_edit::TableLike, &mut Arm) -> Result<(), PoseError>,
@@ -179,8 +179,8 @@ fn edit(
     Ok(())
 }
 
-/// Restores the byte order mark and the line endings of the old text in the changed text, because the TOML library does not keep them.
-/// Lines before and after the changed part keep their line endings. Changed lines receive the line ending of the first line of the file.
+/// Restores the byte order mark and the line endings of the old text, because the TOML library does not keep them. Lines before and after
+/// the changed part keep their line endings. The lines of the changed part get the line ending of the first line of the file.
 fn as_it_was(changed: &str, before: &str) -> String {
     const MARK: char = '\u{feff}';
     let (lines, old): (Vec<&str>, Vec<&str>) = (
@@ -198,7 +198,7 @@ fn as_it_was(changed: &str, before: &str) -> String {
         _ => (*line).to_owned(),
     };
     let mark = before.starts_with(MARK).then(|| MARK.to_string());
-    // The old last line may not have had a line ending.
+    // The last line of the old text may not have had a line ending.
     let kept = |(new, old): (&&str, &&str)| if old.ends_with('\n') { (*old).to_owned() } else { fresh(new) };
     let (first, last) = (lines.iter().zip(&old).take(head).map(kept), old.len() - tail);
     let between = lines[head..lines.len() - tail].iter().map(fresh);
@@ -225,7 +225,8 @@ mod tests {
         (dir, path)
     }
 
-    /// The first pose creates the table, each later change affects one line, and removing all poses restores the arm.
+    /// The first saved pose creates the `[poses]` table. Each later change affects one line of the file. After all poses are removed, the
+    /// arm is the same as before.
     #[test]
     fn the_rest_of_the_file_stays_as_it_is() {
         let (_dir, path) = file(AVENA_TOML);
@@ -251,8 +252,8 @@ mod tests {
         assert_eq!(Arm::load(&path).unwrap(), Arm::avena());
     }
 
-    /// The byte order mark and the line endings stay the same, even if the file contains mixed line endings. After the pose is removed, the
-    /// file has its original bytes.
+    /// The byte order mark and the line endings stay the same, even if the file contains mixed line endings. After the saved pose is
+    /// removed, the file has its original bytes.
     #[test]
     fn every_byte_of_the_rest_stays() {
         let with_home = format!("{AVENA_TOML}\n[poses]\nhome = [0, 0, 0, 0, 0, 0]\n# the end\n");
@@ -287,7 +288,7 @@ mod tests {
         let with = Arm { poses: Poses::from([("home".into(), HOME)]), ..Arm::avena() };
         assert_eq!(with.hash().unwrap(), plain.hash().unwrap());
         assert!(with.differences(&plain).is_empty());
-        // The poses are unchanged when the file is written and read again.
+        // The poses stay the same after the arm is written to a file and read again.
         assert_eq!(Arm::parse(&with.to_toml()).unwrap().poses, with.poses);
     }
 
@@ -331,7 +332,7 @@ mod tests {
             let error = Arm::parse(&format!("{AVENA_TOML}\n[poses]\n{line}\n")).unwrap_err().to_string();
             assert!(error.contains(problem), "{line}: {error}");
         }
-        // The check reports a pose outside the limits, and the pose cannot be used.
+        // The check reports a pose outside the limits, and this pose cannot be used.
         let arm = Arm::parse(&format!("{AVENA_TOML}\n[poses]\nfar = [0, 2, 0, 0, 0, 0]\n")).unwrap();
         assert_eq!(
             arm.pose("far").unwrap_err().to_string(),

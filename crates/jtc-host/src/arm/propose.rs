@@ -1,7 +1,7 @@
-//! Starting values for values that are missing in a robot description. A documented rule computes each starting value.
+//! Starting values for the numbers that are missing in a robot description. A documented rule computes each starting value.
 //!
-//! With these values an arm can be simulated, and can be commissioned at low speed. The starting values are not measured. An arm file marks
-//! these values, and `jtc arm check` lists them until the operator has replaced them.
+//! With starting values an arm can be simulated, and can be commissioned at low speed. The starting values are not measured. An arm file
+//! marks the starting values, and `jtc arm check` lists them until the operator has replaced them.
 
 use jtc_core::settings::TOOL_SPEED;
 use jtc_core::{JOINTS, PidGains};
@@ -16,13 +16,13 @@ use super::{Arm, Change, Source, Warning};
 /// Rule that proposes a value for one key.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Rule {
-    /// Key in an arm file.
+    /// Key in an arm file whose value the rule proposes.
     pub name: &'static str,
-    /// Rule in words.
+    /// Text that describes the rule.
     pub rule: &'static str,
 }
 
-/// Rules for all values that can be proposed.
+/// Rules for all starting values that can be proposed.
 pub const RULES: [Rule; 11] = [
     Rule { name: "gravity_m_s2", rule: "9.81 m/s² downwards; z of the robot description points up" },
     Rule { name: "position_min_rad", rule: "the drives' working area" },
@@ -67,11 +67,12 @@ pub const RULES: [Rule; 11] = [
 
 /// Highest rate at which the damping in Teaching reduces a speed, 1/s (J-25).
 const TEACH_DAMPING_RATE: f64 = 100.0;
-/// Tool speed limit of an imported arm, m/s. The value is the limit for setting up a robot next to people (ISO 10218).
+/// Tool speed limit of an imported arm, m/s. ISO 10218 requires this limit while a person near the robot sets it up.
 const TOOL_SPEED_MAX: f64 = 0.25;
-/// Damping of the proposed gains: Kd · (age of the derivative) / (least inertia) (J-71).
+/// Damping of the proposed gains: Kd multiplied by the age of the derivative, divided by the least inertia (J-71).
 const DAMPING: f64 = 0.7;
-/// Age of the derivative, s: half of its time window, plus half a tick, the average delay of a torque that stays constant for one tick.
+/// Age of the derivative, s: half of the time window of the derivative, plus half a tick. A torque stays constant for one tick, so its
+/// average delay is half a tick.
 const DERIVATIVE_AGE: f64 = 3e-3;
 /// Kp divided by Kd, 1/s.
 const STIFFNESS_RATE: f64 = 20.0;
@@ -79,19 +80,19 @@ const STIFFNESS_RATE: f64 = 20.0;
 const INTEGRAL_RATE: f64 = 2.0;
 /// Proposed Ki as a share of the greatest Ki that is stable without friction.
 const INTEGRAL_PART: f64 = 1.0 / 3.0;
-/// The gains must be stable beyond both ends of the range of rotor inertias by this factor.
+/// Safety factor for the gains: the gains must be stable up to this factor beyond both ends of the range of rotor inertias.
 const RESERVE: f64 = 1.5;
-/// Steps of the search for gains with the reserve [`RESERVE`].
+/// Maximum number of steps in the search for gains with the safety factor [`RESERVE`].
 const REDUCTIONS: usize = 60;
 /// Acceleration limit (rad/s²) for which a proposed torque limit is sufficient.
 const ENOUGH_ACCELERATION: f64 = 3.0;
-/// Share of the remaining torque (torque limit minus gravity torque) that the acceleration limit uses.
+/// Share of the available torque that the proposed acceleration uses. The available torque is the torque limit minus the gravity torque.
 const ACCELERATION_PART: f64 = 1.0 / 3.0;
 /// Maximum tracking error with the heaviest assumed rotor, as a share of the position error limit.
 const ERROR_PART: f64 = 0.2;
-/// Acceleration of a drive without a load at full torque, rad/s². The proposed rotor inertia follows from this value.
+/// Acceleration of a drive without a load at full torque, rad/s². The proposed rotor inertia is computed from this acceleration.
 const ROTOR_ACCELERATION: f64 = 200.0;
-/// Smallest proposed acceleration limit, rad/s². The value is also used if gravity requires the whole torque limit.
+/// Smallest proposed acceleration limit, rad/s², which is also used if gravity requires the whole torque limit.
 const LEAST_ACCELERATION: f64 = 0.5;
 
 /// Rounds `value` down to `digits` significant digits. More digits would look like a measured value, and rounding up could exceed a limit.
@@ -100,7 +101,7 @@ fn rounded(value: f64, digits: i32) -> f64 {
         return value;
     }
     let places = digits - 1 - value.abs().log10().floor() as i32;
-    // The conversion through text gives the f64 that is nearest to the decimal number.
+    // The conversion to text and back returns the f64 that is nearest to the decimal number.
     let scale = 10f64.powi(places);
     let down = (value * scale * (1.0 + 1e-12)).floor() / scale;
     format!("{down:.*}", places.max(0) as usize).parse().unwrap_or(down)
@@ -113,8 +114,8 @@ impl Arm {
         self.joints.map(|j| (j.position_min.clamp(-TAU, TAU), j.position_max.clamp(-TAU, TAU)))
     }
 
-    /// Fills in the numbers that are missing in the description, and marks them as proposed. `gravity` is in the base frame, m/s²;
-    /// `friction` is the Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint, if the description contains these values.
+    /// Fills in the numbers that are missing in the description, and marks them as proposed. `gravity` is in the base frame, m/s².
+    /// `friction` is the Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint, or 0 if the description does not contain it.
     pub(super) fn propose(&mut self, gravity: [f64; 3], friction: &[[f64; 2]; JOINTS]) {
         if self.gravity.is_none() {
             self.gravity = Some(gravity);
@@ -145,8 +146,8 @@ impl Arm {
             if self.sources.of((Some(joint), "acceleration_max_rad_s2")) == Source::Default {
                 let j = joint.index();
                 let left = (to.torque_max - worst[j]) * ACCELERATION_PART / most[j];
-                // The model contains only the proposed rotor inertia. The torque for the additional inertia of the heaviest assumed rotor
-                // must come from a position error.
+                // The arm model contains only the proposed rotor inertia. If the real rotor is heavier, a position error causes the torque
+                // for the additional inertia.
                 let unknown = (PROPOSED_RANGE.up - 1.0) * to.rotor_inertia;
                 let kp = self.pid.map_or(f64::INFINITY, |pid| pid[j].kp);
                 let lag = ERROR_PART * to.position_error_max * kp / unknown;
@@ -166,7 +167,7 @@ impl Arm {
         }
     }
 
-    /// Returns gains that are stable with the lightest and with the heaviest rotors of the assumed range of rotor inertias.
+    /// Returns gains that are stable for the whole assumed range of rotor inertias, from the lightest to the heaviest rotor.
     fn proposed_gains(&self, ranges: &Ranges) -> [PidGains; JOINTS] {
         let (delay, bounds) = (self.config().delay_ticks, self.config().parameter_bounds);
         let rotor = |factor: f64| self.joints.map(|j| factor * j.rotor_inertia);
@@ -199,7 +200,8 @@ impl Arm {
         of(damping, integral)
     }
 
-    /// Proposes the missing torque limits from the values of this arm, because limits of another arm would not fit.
+    /// Proposes the missing torque limits. The limits are computed from the values of this arm, because the limits of another arm would be
+    /// wrong.
     fn propose_torques(&mut self, worst: &[f64; JOINTS], ranges: &Ranges) {
         let open = |joint: Joint| self.sources.of((Some(joint), "torque_max_nm")) == Source::Default;
         let open: Vec<usize> = Joint::ALL.into_iter().filter(|j| open(*j)).map(Joint::index).collect();
@@ -267,7 +269,7 @@ mod tests {
         }
     }
 
-    /// The documentation page about arms contains the same text of the rules.
+    /// The documentation page about arms contains the text of each rule.
     #[test]
     fn the_rules_are_those_of_the_page() {
         let page = include_str!("../../../../docs/arm.md");

@@ -1,4 +1,4 @@
-//! Source of each number of an arm: the arm file, a proposal of `jtc arm import`, a default, or no source for a missing number.
+//! Source of each number of an arm: the arm file, a proposal of `jtc arm import`, or a default. A missing number has no source.
 
 use std::collections::BTreeSet;
 
@@ -50,7 +50,7 @@ pub(super) const JOINT_KEYS: [&str; 10] = [
     "friction_polynomial",
 ];
 
-/// Keys whose values are proposals or defaults.
+/// Keys of an arm whose values are proposals or defaults.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sources {
     proposed: BTreeSet<Key>,
@@ -63,7 +63,7 @@ impl Sources {
         self.proposed.iter().copied()
     }
 
-    /// Returns the source of a key that has a value.
+    /// Returns the source of the value of `key`. The arm must have a value for this key.
     pub fn of(&self, key: Key) -> Source {
         if self.proposed.contains(&key) {
             Source::Proposed
@@ -80,7 +80,7 @@ impl Sources {
         self.proposed.insert(key);
     }
 
-    /// Marks the value of `key` as a default, because this key is missing in the file.
+    /// Marks the value of `key` as a default, because the key is missing in the file.
     pub(super) fn fill_in(&mut self, key: Key) {
         self.defaults.insert(key);
     }

@@ -7,9 +7,9 @@ use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 /// Lowest and highest position of each joint, rad.
 pub(super) type Ranges = [(f64, f64); JOINTS];
 
-/// Number of start poses of the search for the greatest torque.
+/// Number of start poses in the search for the greatest gravity torque.
 const STARTS: usize = 24;
-/// Maximum number of rounds over all joints in one search. A search usually ends after three rounds.
+/// Maximum number of rounds over all joints in one search for the greatest gravity torque. A search usually ends after three rounds.
 const ROUNDS: usize = 12;
 /// Number of poses for which the inertia is computed.
 pub(super) const POSES: usize = 512;
@@ -26,9 +26,9 @@ pub(super) struct Worst {
 /// Least and greatest inertia (kg·m²) that a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Inertia {
-    /// Inertia while the other joints can move freely. The drive feels this inertia at the start of a motion.
+    /// Inertia while the other joints can move freely. The drive must accelerate this inertia at the start of a motion.
     pub least: f64,
-    /// Inertia while the other joints are held.
+    /// Inertia while the other joints are held in position.
     pub most: f64,
 }
 
@@ -46,8 +46,8 @@ pub(super) fn pose(n: usize, ranges: &Ranges) -> JointVec {
     })
 }
 
-/// Returns the angle x in a range at which the function a + b·cos x + c·sin x is greatest. `values` are the function values at `at` and at
-/// a third of a turn in each direction.
+/// Returns the angle x in a range at which the function a + b·cos x + c·sin x is greatest. `values` are the values of this function at the
+/// angle `at` and at a third of a turn in each direction.
 fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
     let third = std::f64::consts::TAU / 3.0;
     let angles = [at, at + third, at - third];
@@ -63,8 +63,8 @@ fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
 
 /// Returns the greatest gravity torque of each joint over the position ranges.
 ///
-/// As a function of one joint position, each torque is a sine with an offset, so a formula gives its maximum. Each search optimises one
-/// joint after the other until no change of a position increases the torque. The searches start from many poses.
+/// If only one joint position changes, each gravity torque is a sine with an offset, so a formula determines its maximum. The search
+/// optimises one joint position after the other until no change increases the torque. The search is repeated from many start poses.
 pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges) -> [Worst; JOINTS] {
     let dynamics = Dynamics::new(model, gravity);
     let third = std::f64::consts::TAU / 3.0;
@@ -90,7 +90,7 @@ pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges
                     break;
                 }
             }
-            // Ignores rounding errors.
+            // A difference within the rounding errors does not count.
             if height > best.torque * (1.0 + GAIN) + 1e-9 {
                 best = Worst { torque: height, pose: plain(&q, sign, height, ranges, &torque) };
             }

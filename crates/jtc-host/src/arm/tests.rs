@@ -9,7 +9,7 @@ use test_kit::existing;
 use super::*;
 use host_kit::Diagnose;
 
-/// The arm file, as the host reads it, equals the built-in defaults of the controller.
+/// The values that the host reads from the delivered arm file equal the built-in defaults of the controller.
 #[test]
 fn the_delivered_arm_is_the_controller_s_default() {
     let arm = Arm::avena();
@@ -35,10 +35,10 @@ fn a_file_of_another_kind_is_called_no_arm_file() {
 fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
     let whole = Arm::avena();
     assert!(AVENA_TOML.contains("\nformat = 2\n") && whole.to_toml().starts_with("format = 2\n"));
-    // Older files have no format key. These older files are read in the same way.
+    // Older arm files do not have a `format` key. The reader reads these files in the same way.
     assert_eq!(Arm::parse(&AVENA_TOML.replace("\nformat = 2\n", "\n")).unwrap(), whole);
     for other in ["3", "1", "\"two\""] {
-        // The format error is reported before errors about unknown keys.
+        // The reader reports the error about the format before errors about unknown keys.
         let text = AVENA_TOML.replace("\nformat = 2\n", &format!("\nformat = {other}\nnew_key = 1\n"));
         let message = Arm::parse(&text).unwrap_err().to_string();
         assert!(message.contains(&format!("format = {other} is not supported")), "{message}");
@@ -88,7 +88,8 @@ fn a_plain_urdf_is_carried_over_exactly() {
     assert!(arm.warnings.is_empty(), "{:?}", arm.warnings);
 }
 
-/// An axis of −z inverts the direction of each joint. The torques must equal the torques of the mirrored motion with opposite sign.
+/// If all axes are −z, each joint turns in the opposite direction. The torques must equal the torques of the mirrored motion with opposite
+/// sign.
 #[test]
 fn joints_about_minus_z_keep_positions_and_torques() {
     let (plain, turned) = (Arm::avena(), Arm::parse(&urdf("0 0 -1", "revolute")).unwrap());
@@ -104,7 +105,8 @@ fn joints_about_minus_z_keep_positions_and_torques() {
     }
 }
 
-/// A tool on the last link and a plate between two joints result in the same arm as links with the combined masses.
+/// A tool on the last link and a plate between two joints become parts of links. The imported arm equals an arm whose links have the
+/// combined masses.
 #[test]
 fn fixed_bodies_become_part_of_their_link() {
     let tool = "<link name=\"tool\"><inertial><origin xyz=\"0 0 0.1\"/><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" \
@@ -115,7 +117,7 @@ fn fixed_bodies_become_part_of_their_link() {
     assert!((link.mass - 1.082).abs() < 1e-12);
     assert!((link.origin.xyz[0] - 0.2 / 1.082).abs() < 1e-12);
     assert!((link.origin.xyz[2] - (0.0181 + 0.1) / 1.082).abs() < 1e-12);
-    // The parallel-axis theorem about z adds the reduced mass times the squared distance.
+    // By the parallel-axis theorem, the inertia about z increases by the reduced mass times the squared distance.
     let izz = 8e-5 + 0.01 + 0.082 / 1.082 * 0.04;
     assert!((link.inertia[5] - izz).abs() < 1e-12, "{} {izz}", link.inertia[5]);
     assert!(arm.warnings.iter().any(|w| w.place == "link tool"));
@@ -126,7 +128,7 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let error_of = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
     assert!(error_of(&urdf("0 0 0", "revolute")).contains("no direction"));
     assert!(error_of("<robot name=\"x\"></robot>").contains("0 rotary joints"));
-    // The hint does not suggest other file formats or options, because no other format or option helps in this case.
+    // The hint does not suggest other file formats or options, because they do not help if the description has too few joints.
     let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
     assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
     assert!(error_of(&"<a>".repeat(100_000)).contains("nested"));
@@ -168,7 +170,8 @@ fn a_continuous_joint_has_the_working_area_of_its_drive() {
     assert!(arm.warnings.iter().any(|w| w.place == "joint j2" && w.problem.contains("no position limits")));
 }
 
-/// For a Z1, a UR with a gripper and a redundant arm, the error lists the surplus joints and the command that selects six joints.
+/// The descriptions of a Z1, a UR with a gripper and a redundant arm have more than six joints. The error lists the additional joints and
+/// the command that selects six joints.
 #[test]
 fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     let plain = urdf("0 0 1", "revolute");
@@ -202,12 +205,12 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
         let held = |w: &Warning| w.place == format!("joint {body}") && w.problem.contains("held at 0");
         assert!(arm.warnings.iter().any(held), "{:?}", arm.warnings);
     }
-    // Only joints on the path to the tip belong to the arm.
+    // If a tip link is selected, only joints on the path to this link belong to the arm.
     let arm = import(&seven, None, Some("flange")).unwrap();
     assert_eq!((arm.joint_names[5].as_str(), arm.model.joints[6]), ("j6", Arm::avena().model.joints[6]));
     let arm = import(&branch, None, Some("l6")).unwrap();
     assert_eq!(arm.model.joints[6], Origin::default(), "the flange is the tip");
-    // The tip is a link after a gripper, and the joint of the gripper is held at zero.
+    // The selected tip is a link after a gripper. The joint of the gripper is fixed at zero.
     let arm = import(&seven, names("j1,j2,j3,j4,j5,j6"), Some("of_gripper")).unwrap();
     assert_eq!(arm.model.joints[6], Arm::avena().model.joints[6]);
 
@@ -237,7 +240,7 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     );
 }
 
-/// A seventh joint in the middle of the chain is held at zero. The result equals the arm without this joint.
+/// A seventh joint in the middle of the chain is fixed at zero. The imported arm equals the arm without this seventh joint.
 #[test]
 fn a_joint_that_is_held_keeps_its_place() {
     let plain = urdf("0 0 1", "revolute");
@@ -339,7 +342,7 @@ fn the_existing_parameter_files_are_read() {
     }
     if let Some(file) = load("model_default.txt") {
         let model = file.model.unwrap();
-        // Only this number has another sign in the old default arm.
+        // In the old default arm, only the z offset of joint 4 has another sign.
         assert_eq!((model.joints[3].xyz[2], model.links), (0.005, arm.model.links));
     }
     if let Some(file) = load("avena_arm_id.urdf") {
@@ -382,7 +385,8 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert_eq!(kp(ParameterFile::load_all(&backwards).unwrap()), expected);
     assert_eq!(kp(ParameterFile::load(dir.path()).unwrap()), expected);
 
-    // Only one of the six files is passed, although all exist. The loader does not read the other files without a request.
+    // The test passes only one of the six files to the loader, although all six files exist. The loader does not read files that were not
+    // passed to it.
     let error_of = |paths: &[PathBuf]| ParameterFile::load_all(paths).unwrap_err().to_string();
     let text = error_of(&all[2..3]);
     assert!(
@@ -394,7 +398,7 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert!(text.contains("missing: ") && text.contains("PidParamJoint3.csv (joint 4). "), "{text}");
     assert!(error_of(&[&all[..], &all[..1]].concat()).contains("joint 1"));
 
-    // One of the six files is missing in the directory.
+    // In this case, the file of one joint is missing in the directory.
     std::fs::remove_file(&all[3]).unwrap();
     let text = ParameterFile::load(dir.path()).unwrap_err().to_string();
     assert!(text.contains("PidParamJoint3.csv (joint 4)") && !text.contains("(joint 5)"), "{text}");

@@ -21,10 +21,10 @@ use super::source::{ARM_KEYS, JOINT_KEYS};
 use super::{Arm, Change, Source, Sources, Warning};
 use crate::file::{FileError, Place, short};
 
-/// Format number of the arm files that this program reads. Older files do not contain a format number and are read in the same way.
+/// Format number of the arm files that this program reads. The program reads older files without a format number in the same way.
 pub(super) const FORMAT: i64 = 2;
 
-/// Keys that determine how the other keys of the file are read.
+/// Keys that determine the format of the other keys of the file.
 #[derive(Deserialize)]
 struct Head {
     format: Option<toml::Value>,
@@ -72,11 +72,11 @@ struct TableForm {
 }
 
 impl Arm {
-    /// Reads an arm from TOML. Returns an error for numbers that the controller would refuse.
+    /// Reads an arm from the text of a TOML file. Returns an error for numbers that the controller would refuse.
     ///
     /// # Errors
     ///
-    /// Returns an error with the first key or number that is missing, unknown or of the wrong form, with its line.
+    /// Returns an error with the line or name of the first key or number that is missing, unknown or not valid.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let arm = read(text)?;
         match arm.limit_faults().into_iter().next() {
@@ -89,7 +89,7 @@ impl Arm {
     }
 }
 
-/// Reads the arm from a text without checking its numbers.
+/// Reads an arm from the text of a TOML file without a check of the numbers.
 pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     let wrong = |e: toml::de::Error| {
         let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());
@@ -101,7 +101,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
             format!("not an arm file: neither TOML nor URDF (the file begins with \"{}\")", short(first));
         return Err(FileError::form(problem));
     }
-    // The format is checked before the keys, because another format may have other keys.
+    // The format number is checked before the keys, because another format may have other keys.
     if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
         && format.as_integer() != Some(FORMAT)
     {
@@ -179,7 +179,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     })
 }
 
-/// Reads an array of exactly `N` numbers. The array type of serde would ignore surplus numbers.
+/// Reads an array of exactly `N` numbers. The array type of serde would ignore additional numbers.
 fn exactly<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[f64; N], D::Error> {
     let numbers = Vec::<f64>::deserialize(from)?;
     let count = numbers.len();
@@ -193,7 +193,7 @@ fn exactly_or_none<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result
     exactly(from).map(Some)
 }
 
-/// Reads the controller settings of a file.
+/// Reads the controller settings from the `[settings]` table of an arm file.
 fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, FileError> {
     let mut all = Vec::new();
     for (name, value) in given {
@@ -222,7 +222,7 @@ fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, Fi
     Ok(all)
 }
 
-/// Returns a parameter of all six joints, `None` if no joint has it, or an error if only some joints have it.
+/// Returns a parameter of all six joints. Returns `None` if no joint has the parameter, or an error if only some joints have it.
 fn all_or_none<T>(
     joints: &[JointForm],
     key: &str,
@@ -246,7 +246,7 @@ fn all_or_none<T>(
     }
 }
 
-/// Stores the list of proposed numbers, for the whole arm or for a joint.
+/// Stores the names of the proposed numbers of the whole arm or of a joint.
 fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]) -> Result<(), FileError> {
     let number = of.map(|(number, _)| number);
     let keys: &[&'static str] = if of.is_some() { &JOINT_KEYS } else { &ARM_KEYS };
@@ -292,7 +292,8 @@ fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, Fi
             )));
         }
     };
-    // The friction tables are checked even if the arm uses polynomials. If an operator selects the tables later, they must be valid.
+    // The friction tables are checked even if the arm uses polynomials. The friction tables must be valid if an operator selects them
+    // later.
     for (joint, table) in Joint::ALL.into_iter().zip(all.iter()) {
         check_table(joint, table).map_err(|e| FileError::at(Place::name("friction_table"), e.to_string()))?;
     }

@@ -1,8 +1,8 @@
 //! Arms from URDF: six rotary joints in a chain and a fixed flange. The reader reports properties that the arm model of the
 //! controller cannot represent.
 //!
-//! If the axis of a joint is not +z, the reader rotates the frame of its link. This rotation does not change positions or torques. Bodies
-//! that are attached by fixed joints, or by joints that are not among the six, become part of the link to which they are attached.
+//! If the axis of a joint is not +z, the reader rotates the frame of its link. The rotation of the frame does not change positions or
+//! torques. A body becomes part of the link to which it is attached if its joint is fixed, or is not one of the six joints of the arm.
 
 mod choice;
 mod frames;
@@ -33,10 +33,10 @@ struct Chain<'a> {
     without_ranges: Vec<String>,
 }
 
-/// Standard gravity as in arm files, m/s², pointing downwards in a description in which z points upwards.
+/// Standard gravity in the frame of the description, m/s². The gravity points downwards, because z of the description points upwards.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// Reads the arm of a description; `choice` selects its joints.
+/// Reads the arm of a description. `choice` selects the six joints of the arm.
 pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileError> {
     text::check_depth(text)?;
     let text = text::with_velocities(text);
@@ -62,14 +62,14 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
         joints,
         warnings: chain.warnings,
         sources: chain.sources,
-        // A URDF file does not contain values for the other fields.
+        // A URDF file does not contain values for the other fields of the arm.
         ..Arm::nameless()
     };
     Ok(Described { arm, gravity, friction })
 }
 
-/// Checks that joint names and link names are unique and that no link has two parents. If a name occurs twice, the reader does not guess
-/// which joint or link is meant.
+/// Checks that joint names and link names are unique and that no link has two parents. If a name occurs twice, the reader returns an error,
+/// because it cannot know which joint or link is meant.
 fn only_once(robot: &Robot) -> Result<(), FileError> {
     fn twice(mut names: Vec<&str>) -> Option<&str> {
         names.sort_unstable();
@@ -113,7 +113,7 @@ impl<'a> Chain<'a> {
         Ok(chain)
     }
 
-    /// Returns `true` if the joint does not move: its child link is rigidly attached to its parent link.
+    /// Returns `true` if the joint is not one of the six joints of the arm. The importer treats such a joint as fixed.
     fn rigid(&self, joint: &Joint) -> bool {
         !self.rotary.iter().any(|r| r.name == joint.name)
     }
@@ -140,12 +140,12 @@ impl<'a> Chain<'a> {
             frame = Frame::of(&origin(&joint.origin)).then(&frame);
             at = &joint.parent.link;
         }
-        // Removes the rounding error of a rotation by 90°, so that it is not treated as a tilt.
+        // The rounding error of a rotation by 90° is set to zero, because it would look like a tilt.
         frame.inverse().direction(&GRAVITY).map(|v| if v.abs() < 1e-9 { 0.0 } else { v })
     }
 
-    /// Finds the joints from the last link to the flange. These joints form the path to `tip`; without `tip`, the result is one fixed joint
-    /// on the last link. If the last link has several fixed joints, the joint with a usual flange name is used, otherwise the first joint.
+    /// Finds the joints from the last link to the flange. If `tip` is set, these joints form the path to `tip`. Without `tip`, the result
+    /// is one fixed joint on the last link: the joint with a usual flange name, or else the first fixed joint.
     fn find_flange(&mut self, tip: Option<&str>) {
         let last = &self.rotary[JOINTS - 1].child.link;
         if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
@@ -178,7 +178,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Returns the joints on the path from link `from` to link `to`, first to last. Returns `None` if one of these joints moves.
+    /// Returns the joints on the path from link `from` to link `to`, first to last. Returns `None` if one of the six joints of the arm is
+    /// on this path, or if no path exists.
     fn rigid_path(&self, from: &str, to: &str) -> Option<Vec<&'a Joint>> {
         let mut path = Vec::new();
         let mut at = to;
@@ -198,7 +199,7 @@ impl<'a> Chain<'a> {
         let mut model = ArmModel::default();
         let base = self.rotary[0].parent.link.clone();
         self.look_below(&base);
-        // Rotation from the link's frame in URDF to its frame in the model.
+        // Rotation from the frame of the link in URDF to the frame of the link in the arm model.
         let mut turn = Frame::IDENTITY;
         model.links[0] = self.link(&base, &turn)?;
         for (i, joint) in self.rotary.into_iter().enumerate() {
@@ -242,7 +243,8 @@ impl<'a> Chain<'a> {
         Ok(model)
     }
 
-    /// Reports joints below the base of the arm. These joints do not move, but their offset changes the position of the base.
+    /// Warns about each joint below the base of the arm that has an offset. A joint below the base does not move, but its offset changes
+    /// the position of the base.
     fn look_below(&mut self, base: &str) {
         let mut at = base.to_owned();
         for _ in 0..self.robot.joints.len() {
@@ -260,7 +262,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Returns a link in the rotated frame, together with all bodies attached by joints that do not move.
+    /// Returns a link in the rotated frame. The link includes all bodies that are attached to it by joints other than the six joints of the
+    /// arm.
     fn link(&mut self, name: &str, turn: &Frame) -> Result<Link, FileError> {
         let mut bodies = Vec::new();
         let mut todo = vec![(name.to_owned(), Frame::IDENTITY)];

@@ -1,4 +1,4 @@
-//! List of all numbers of an arm, each with unit, range, default and source.
+//! List of all numbers of an arm, with the unit, range, default and source of each number.
 
 use jtc_core::settings::{self, Setting};
 use jtc_core::{Config, ParameterBounds, PidGains, WORKING_AREA};
@@ -8,25 +8,26 @@ use serde::Serialize;
 use super::toml_form::{ACCELERATION_DEFAULT, POSITION_ERROR_DEFAULT, VELOCITY_DEFAULT};
 use super::{Arm, Source};
 
-/// Number of an arm.
+/// Number of an arm, with its unit, range, default and source.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmValue {
-    /// Key in an arm file. For a number in a table or list, the part follows after a dot, for example `pid.kp`, `com_xyz_m.x`.
+    /// Key of the number in an arm file. If the key is a table or a list, the name of the element follows after a dot, for example
+    /// `pid.kp`, `com_xyz_m.x`.
     pub name: &'static str,
-    /// Joint, if the number belongs to a joint; `None` for the flange.
+    /// Joint to which the number belongs; `None` for a number of the flange, of a link or of the whole arm.
     pub joint: Option<Joint>,
-    /// Link (0 is the base), if the number belongs to a link. The origin of a joint has the number of the link that the
-    /// joint carries. The flange has number 7.
+    /// Index of the link to which the number belongs; 0 is the base. The origin of a joint has the index of the link that the joint
+    /// carries. The flange has index 7.
     pub link: Option<usize>,
-    /// Value; `None` if the number is missing.
+    /// Value of the number; `None` if the number is missing.
     pub value: Option<f64>,
-    /// Unit of the value.
+    /// Unit of the number.
     pub unit: &'static str,
-    /// Smallest value that a controller accepts, if there is a bound.
+    /// Smallest value that a controller accepts; `None` if the number has no lower bound.
     pub min: Option<f64>,
-    /// Largest value that a controller accepts, if there is a bound.
+    /// Largest value that a controller accepts; `None` if the number has no upper bound.
     pub max: Option<f64>,
-    /// Default if the number is missing in the file.
+    /// Value that is used if the number is missing in the file.
     pub default: Option<f64>,
     /// Source of the number.
     pub from: Source,
@@ -67,11 +68,11 @@ const FRICTION: [(&str, &str); 6] = [
     ("friction_polynomial.c5", "°C"),
 ];
 
-/// Numbers of a type `T`: properties of each number, and a function that reads the number.
+/// List of the numbers in a value of the type `T`. Each item contains the properties of a number and a function that reads the number.
 pub(super) type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
 
-/// Returns the properties of a setting of the joints or of the controller. The range comes from the settings table and is narrowed to the
-/// range of the drives.
+/// Returns the properties of a setting of the joints or of the controller. The range of the setting is the range in the settings table,
+/// narrowed to the range of the drives.
 fn setting(row: &Setting, drives: &Config) -> Kind {
     let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
     let (low, high) = match row.name {
@@ -85,9 +86,9 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
         "position_error_max_rad" => Some(POSITION_ERROR_DEFAULT),
         "rotor_inertia_kg_m2" => Some(0.0),
         "torque_gain" => Some(1.0),
-        // The default depends on the torque limit, which differs from joint to joint.
+        // This default depends on the torque limit, which differs from joint to joint.
         "teach_damping_nm_s_rad" => None,
-        // An arm file must contain these numbers.
+        // The other numbers of a joint have no default, because an arm file must contain them.
         _ if row.of_joint() => None,
         _ => row.get(drives, 0),
     };
@@ -112,7 +113,7 @@ fn value(kind: Kind, value: Option<f64>, from: Source) -> ArmValue {
     ArmValue { name, joint: None, link: None, value, unit, min, max, default, from }
 }
 
-/// Creates the numbers of a list in the arm file.
+/// Creates one number for each element of a list in the arm file.
 fn listed(
     names: &[&'static str],
     unit: &'static str,
@@ -128,8 +129,8 @@ fn listed(
 }
 
 impl Arm {
-    /// Returns every number of the arm except the long friction tables: gravity, the numbers of the joints, frames and links, and the
-    /// settings of the controller.
+    /// Returns all numbers of the arm except the friction tables: gravity, the numbers of the joints, frames and links, and the settings of
+    /// the controller.
     pub fn values(&self) -> Vec<ArmValue> {
         let (drives, config) = (Config::avena(), self.config());
         let gravity = self.gravity.map_or(Source::Default, |_| self.sources.of((None, "gravity_m_s2")));
@@ -172,7 +173,7 @@ impl Arm {
             all.extend(listed(&COM_RPY, "rad", &link.origin.rpy, i, None));
             all.extend(listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max)));
         }
-        // Settings of the controller, except gravity, which the list already contains.
+        // The list already contains gravity, so gravity is not added again with the settings of the controller.
         let of_controller =
             |row: &&Setting| !row.of_joint() && row.of_arm() && !row.name.starts_with("gravity");
         for row in settings::TABLE.iter().filter(of_controller) {

@@ -1,4 +1,4 @@
-//! Values of a file that the loader changed, filled in or left out.
+//! Warnings about values of a file that the loader changed, filled in or ignored.
 
 use serde::Serialize;
 
@@ -13,26 +13,26 @@ pub enum Change {
     Flange,
     /// The axis of a joint was rotated to +z.
     AxisTurned,
-    /// A fixed joint, or its body, was merged into the link to which it is attached.
+    /// A fixed joint was merged into another joint, or the body of a link was merged into another link.
     Merged,
     /// A joint that is not one of the six arm joints is fixed at position 0.
     LeftOut,
     /// A limit was narrowed to the range of the drives.
     LimitCut,
-    /// A limit is missing or unusable, and another value is used.
+    /// A limit is missing or unusable, so another value is used.
     LimitAssumed,
-    /// An arm file has no key for the number.
+    /// A number of the robot description is not imported.
     NotCarried,
     /// A number of a robot description is used only as a starting value.
     Doubtful,
     /// Some numbers of the file are proposals of `jtc arm import`.
     Proposed,
-    /// The loader chose between several files.
+    /// The loader found several files or tables and did not use all of them.
     Files,
 }
 
 impl Change {
-    /// Returns a heading for changes of this kind.
+    /// Returns the heading of a list of changes of this kind.
     pub const fn heading(self) -> &'static str {
         match self {
             Self::Base => "base",
@@ -55,11 +55,11 @@ impl Change {
 /// Item of a file that the loader ignored, changed or filled in.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
-    /// Kind of the change.
+    /// Kind of the change that the loader made.
     pub change: Change,
-    /// Name of the joint, link or key.
+    /// Name of the joint, link or key to which the warning applies.
     pub place: String,
-    /// Problem, and the change that the loader made.
+    /// Description of the problem and of the change that the loader made.
     pub problem: String,
 }
 

@@ -1,4 +1,4 @@
-//! Summary of the problems with one cause: joints, number of points, first occurrence and worst occurrence.
+//! Summary of the problems of one kind: joints, number of points, first occurrence and worst occurrence.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -14,17 +14,17 @@ use super::problem::{Problem, Seen};
 pub struct Cause {
     /// Kind of the problems.
     pub kind: ProblemKind,
-    /// Kind in words.
+    /// Text that describes the kind of the problems.
     pub words: &'static str,
-    /// Unit of values and limits. Empty for counts.
+    /// Unit of the values and limits; empty if the problems are about a count.
     pub unit: &'static str,
-    /// Joints with this problem; empty if the problem concerns the whole trajectory.
+    /// Joints in which the problem occurs; empty if the problem concerns the whole trajectory.
     pub joints: Vec<Joint>,
     /// Number of file points with the problem, either at the point or before the next point.
     pub points: usize,
-    /// First occurrence along the path.
+    /// First occurrence of the problem along the path.
     pub first: Seen,
-    /// Occurrence with the largest excess over the limit.
+    /// Occurrence at which the value exceeds the limit the most.
     pub worst: Seen,
     /// `true` if the trajectory can run despite the problem.
     pub warning: bool,
@@ -33,7 +33,7 @@ pub struct Cause {
 /// Points at which each kind of problem occurs.
 pub(super) type Places = BTreeMap<ProblemKind, BTreeSet<usize>>;
 
-/// Returns one cause for each kind of `problems`, in the order of the problems.
+/// Returns one cause for each kind of problem, in the order of `problems`. Warnings get their own cause.
 pub(super) fn causes(problems: &[Problem], places: &Places) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     let mut excess = Vec::new();
@@ -71,7 +71,7 @@ pub(super) fn causes(problems: &[Problem], places: &Places) -> Vec<Cause> {
 }
 
 impl fmt::Display for Cause {
-    /// Writes one line if the problem occurs at a single place, otherwise three lines.
+    /// Writes one line if the problem occurs at a single point in at most one joint, otherwise two or three lines.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.warning {
             f.write_str("warning: ")?;
@@ -84,7 +84,7 @@ impl fmt::Display for Cause {
         if self.points > 1 {
             write!(f, ", at {} points", self.points)?;
         }
-        // Removes the words that the previous line already contains.
+        // The first line already contains the text of the kind, so the other lines omit this text.
         let short = |words: &str| words.replacen(&format!("{}: ", self.words), "", 1);
         write!(f, "\n    worst: {}", short(&worst))?;
         if self.first != self.worst {

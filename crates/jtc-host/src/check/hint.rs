@@ -1,4 +1,4 @@
-//! Advice after a verdict, with the next command as text.
+//! Advice for the user after the check of a trajectory, with the next command.
 
 use host_kit::{Action, Next};
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
@@ -7,9 +7,9 @@ use super::kind::ProblemKind;
 use super::verdict::{Suspicion, Verdict};
 
 impl Verdict {
-    /// Returns the speed (% of the file's own speed) at which no value exceeds its limit. Returns `None` if a lower speed does not help.
-    /// The speed is estimated from the worst values. To find the exact speed, use [`plan::at_speed`](crate::plan::at_speed) and check
-    /// again.
+    /// Returns the speed (% of the file's own speed) at which no value exceeds its limit. Returns `None` if a lower speed does not solve
+    /// the problems. The speed is estimated from the worst values. To find the exact speed, use [`plan::at_speed`](crate::plan::at_speed)
+    /// and check again.
     pub fn slower(&self, now_pct: f64) -> Option<f64> {
         use ProblemKind::*;
         let mut speed = 1.0f64;
@@ -17,7 +17,7 @@ impl Verdict {
             let over = (p.value / p.limit).abs();
             speed = speed.min(match p.kind {
                 Velocity => 0.95 / over,
-                // The problem occurs between two points, and the joint may be faster elsewhere on the path.
+                // The value of this problem belongs to one step between two points. The joint may be faster in another step of the path.
                 PositionSpeed => {
                     let peak = p
                         .joint
@@ -30,11 +30,11 @@ impl Verdict {
                 _ => return None,
             });
         }
-        // The hint does not suggest a speed below 1 %.
+        // The function does not return a speed below 1 %.
         (speed < 1.0).then(|| (now_pct * speed).floor()).filter(|&percent| percent >= 1.0)
     }
 
-    /// Returns the next command or action that solves the problem. The result contains `FILE` instead of the name of the trajectory file.
+    /// Returns the next command or action that solves the problem. The text contains `FILE` instead of the name of the trajectory file.
     pub fn hint(&self) -> Next {
         self.hint_for("FILE", 100.0)
     }
@@ -45,8 +45,8 @@ impl Verdict {
         self.hint_with(file, speed_pct, self.slower(speed_pct))
     }
 
-    /// Like [`Verdict::hint_for`]; `passes` is a speed (% of the file's own speed) that is known to pass the check, if such a speed is
-    /// known.
+    /// Like [`Verdict::hint_for`], with the speed `passes` (% of the file's own speed) at which the trajectory passes the check. `passes`
+    /// is `None` if no such speed is known.
     pub fn hint_with(&self, file: &str, speed_pct: f64, passes: Option<f64>) -> Next {
         let has = |kind| self.problems.iter().any(|p| p.kind == kind);
         let only = |kind| self.refusals().all(|p| p.kind == kind);

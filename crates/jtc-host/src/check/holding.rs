@@ -1,8 +1,9 @@
-//! Check that the drives can hold the arm wherever the path is at rest: at the start, at the end, and at rests in between.
+//! Check that the drives can hold the arm at rest: at the start, at the end, and at rests along the path.
 //!
-//! If the torque that holds an arm is close to a limit, the arm falls after some time, even without a motion. The gains amplify the encoder
-//! noise, so the commanded torque exceeds the limit repeatedly. More than 10 ms over the limit within 100 ms is an error (J-43). A path may
-//! pass through such a pose without stopping, although a Pause could stop the arm there.
+//! If a holding torque is close to the torque limit, the arm falls after some time, even without a motion. The gains amplify the encoder
+//! noise, so the commanded torque exceeds the limit repeatedly. The controller reports an error if a torque exceeds its limit for more than
+//! 10 ms within 100 ms (J-43). The check accepts a path that passes through a pose with a high holding torque without stopping, although a
+//! Pause could stop the arm there.
 
 use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
@@ -10,11 +11,11 @@ use jtc_wire::Joint;
 
 use super::{HOLD_SHARE, ProblemKind, Verdict};
 
-/// Joint speed up to which a joint is considered at rest, rad/s. The smallest velocity in a serial frame is about 0.1 mrad/s.
+/// Speed up to which a joint counts as at rest, rad/s. For comparison, the smallest velocity in a serial frame is about 0.1 mrad/s.
 const STANDS: f64 = 0.001;
 
 /// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit while the arm is at rest on the path. If
-/// `stands_at_start` is set, the start is not checked, because the arm is already at rest in this pose before the motion.
+/// `stands_at_start` is `true`, the start pose is not checked, because the arm is already at rest in this pose before the motion.
 pub(super) fn holds(
     config: &Config,
     dynamics: &Dynamics,

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-/// Maximum share of a joint's torque limit for holding the arm, without friction. With 98 %, arms have fallen.
+/// Maximum share of a joint's torque limit that may be needed to hold the arm, without friction. Arms that needed 98 % have fallen.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Declares the kinds of problems, each with meaning, name, text, and the unit of value and limit if there is one.
+/// Declares the kinds of problems. Each kind has a meaning, a name and a text. If the problem has a value, the kind also has a unit.
 macro_rules! kinds {
     ($($(#[$meaning:meta])* $name:ident, $words:literal $(in $unit:literal)?;)+) => {
         /// Kind of a problem of a trajectory.
@@ -16,17 +16,17 @@ macro_rules! kinds {
         }
 
         impl ProblemKind {
-            /// All kinds.
+            /// All kinds of problems.
             pub const ALL: [Self; [$($words),+].len()] = [$(Self::$name),+];
 
-            /// Returns the kind as text, without values and places.
+            /// Returns a text that describes the kind. The text does not contain values or points.
             pub fn words(self) -> &'static str {
                 match self {
                     $(Self::$name => $words,)+
                 }
             }
 
-            /// Returns the unit of value and limit; the unit of a count is empty.
+            /// Returns the unit of the value and of the limit. The unit of a count is empty.
             pub(super) fn unit(self) -> &'static str {
                 match self {
                     $(Self::$name => concat!($($unit)?),)+
@@ -43,7 +43,7 @@ kinds! {
     TooManyPoints, "too many points";
     /// The trajectory has more segments than allowed.
     TooManySegments, "too many segments";
-    /// The number of points per segment is outside 1..1500.
+    /// The number of points per segment is outside 1 to 1500.
     SegmentPoints, "points per segment";
     /// The step time is 0.
     StepTime, "step time of 0 ms";
@@ -61,9 +61,9 @@ kinds! {
     Velocity, "velocity over its limit" in "rad/s";
     /// An acceleration exceeds its limit.
     Acceleration, "acceleration over its limit" in "rad/s²";
-    /// The torque computed with the arm model exceeds its limit.
+    /// The torque that is computed with the arm model exceeds its limit.
     Torque, "torque over its limit" in "N·m";
-    /// While the arm is at rest on the path, a joint needs nearly its whole torque limit to hold the arm, so the arm would fall later.
+    /// While the arm is at rest, a joint needs nearly its whole torque limit to hold the arm, so the arm would fall after some time.
     HoldTorque, "too much torque needed at rest" in "N·m";
     /// A velocity is outside the friction table (J-36).
     FrictionVelocity, "velocity outside the friction table" in "rad/s";
@@ -71,14 +71,14 @@ kinds! {
     NoStop, "no stop in time" in "N·m";
     /// The positions in the file change faster than the velocity limit allows, independent of the velocities in the file.
     PositionSpeed, "positions move faster than the velocity limit" in "rad/s";
-    /// The speed at which the positions change differs from the velocities in the file. The problem is a warning if it occurs at few
-    /// places.
+    /// The speed at which the positions change differs from the velocities in the file. This problem is a warning if it occurs at few
+    /// points.
     VelocityMismatch, "positions and velocities disagree" in "rad/s";
     /// The first or last point is not at rest.
     NotAtRest, "not at rest at an end" in "rad/s";
     /// The arm is not at the first point (J-34).
     StartPose, "the arm is not at the first point" in "rad";
-    /// The changes of the velocities differ from the accelerations in the file.
+    /// The velocities in the file change at other rates than the accelerations in the file.
     AccelerationMismatch, "velocities and accelerations disagree" in "rad/s²";
 }
 
@@ -91,7 +91,7 @@ impl ProblemKind {
         }
     }
 
-    /// Returns `true` if the problem ends the motion before an operator could stop the arm, or if the path cannot be executed at all.
+    /// Returns `true` if the path cannot be executed at all, or if the problem ends the motion before an operator could stop the arm.
     pub(super) fn stops_at_once(self) -> bool {
         use ProblemKind::*;
         !matches!(

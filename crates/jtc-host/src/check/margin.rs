@@ -7,35 +7,35 @@ use serde::Serialize;
 
 use super::Verdict;
 
-/// Torque margin below which a check warns, % of the limit. With a smaller margin, the torque may reach the limit if the arm has 10 % more
-/// mass and 20 % more friction than its model.
+/// Torque margin below which a check warns, % of the limit. If the margin is smaller, an arm with 10 % more mass and 20 % more friction
+/// than its model may reach the torque limit.
 pub const MARGIN_LOW_PCT: f64 = 10.0;
 
-/// Smallest share of a torque limit that a motion leaves unused, with the place on the path.
+/// Smallest share of a torque limit that a motion does not use, with the time at which this margin occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TorqueMargin {
-    /// Margin, % of the limit; negative if the torque is above the limit.
+    /// Torque margin, % of the torque limit; negative if the torque is above the limit.
     pub percent: f64,
     /// Joint with the smallest margin.
     pub joint: Joint,
-    /// Time from the start, s.
+    /// Time from the start of the motion to the smallest margin, s.
     pub time_s: f64,
-    /// Torque of the arm model at this time, N·m.
+    /// Torque of the arm model at the time of the smallest margin, N·m.
     pub torque_nm: f64,
-    /// Torque limit, N·m.
+    /// Torque limit of the joint, N·m.
     pub limit_nm: f64,
-    /// Bearing temperature for which the friction was computed, °C. Of the checked temperatures, this is the temperature with the greater
-    /// torque.
+    /// Bearing temperature for which the friction was computed, °C. The check computes the torque for two temperatures. This field contains
+    /// the temperature with the greater torque.
     pub temperature_c: f64,
 }
 
 impl TorqueMargin {
-    /// Returns `true` if the margin is below [`MARGIN_LOW_PCT`].
+    /// Returns `true` if the torque margin is below [`MARGIN_LOW_PCT`].
     pub fn is_low(&self) -> bool {
         self.percent < MARGIN_LOW_PCT
     }
 
-    /// Returns a warning if the margin is low.
+    /// Returns a warning if the torque margin is low.
     pub fn warning(&self) -> Option<String> {
         self.is_low().then(|| {
             format!(
@@ -59,8 +59,7 @@ impl fmt::Display for TorqueMargin {
 }
 
 impl Verdict {
-    /// Updates the margin with the torque of a joint, computed for a bearing temperature (°C) and a millisecond of the
-    /// path.
+    /// Updates the smallest torque margin with the torque of a joint at a millisecond of the path, computed for a bearing temperature (°C).
     pub(super) fn take_margin(
         &mut self,
         joint: Joint,
@@ -75,7 +74,7 @@ impl Verdict {
         }
     }
 
-    /// Returns the verdict with the smaller margin, either the present margin or `other`. Both margins must belong to the same trajectory.
+    /// Returns the verdict with the smaller torque margin: its own margin or `other`. `other` must be a margin of the same trajectory.
     pub(crate) fn or_less(mut self, other: Option<TorqueMargin>) -> Self {
         if let Some(other) = other
             && self.margin.is_none_or(|margin| other.percent < margin.percent)

@@ -1,4 +1,4 @@
-//! Problem of a trajectory with kind, joint, first occurrence and worst occurrence.
+//! Problem of a trajectory, with its kind, joint, first occurrence and worst occurrence.
 
 use std::fmt;
 
@@ -7,33 +7,33 @@ use serde::Serialize;
 
 use super::kind::{HOLD_SHARE, ProblemKind};
 
-/// Place on the path at which a problem occurs.
+/// Point or time of the path at which a problem occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Seen {
-    /// Joint; `None` if the problem concerns the whole trajectory.
+    /// Joint in which the problem occurs; `None` if the problem concerns the whole trajectory.
     pub joint: Option<Joint>,
-    /// Point (from 0); if `ms` > 0, the place is between this point and the next point.
+    /// Index of the point, from 0. If `ms` > 0, the problem occurs between this point and the next point.
     pub point: usize,
-    /// Time after `point`, ms.
+    /// Time from `point` to the problem, ms.
     pub ms: f64,
-    /// Time along the path, s.
+    /// Time along the path at which the problem occurs, s.
     pub time_s: f64,
-    /// Value at this place, in the unit of the kind of problem.
+    /// Value that causes the problem, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit for the value. If two channels disagree, this is the value of the other channel.
+    /// Limit for the value. If two channels disagree, `limit` is the value of the other channel.
     pub limit: f64,
 }
 
-/// Problems of one kind in one joint; each jump is a separate problem.
+/// Problems of one kind in one joint. Each jump is a separate problem.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Problem {
     /// Kind of the problem.
     pub kind: ProblemKind,
-    /// Joint; `None` if the problem concerns the whole trajectory.
+    /// Joint in which the problem occurs; `None` if the problem concerns the whole trajectory.
     pub joint: Option<Joint>,
-    /// First occurrence along the path.
+    /// First occurrence of the problem along the path.
     pub first: Seen,
-    /// Point (from 0) at or before the worst occurrence.
+    /// Index (from 0) of the point at or before the worst occurrence.
     pub point: usize,
     /// Time from `point` to the worst occurrence, ms.
     pub ms: f64,
@@ -41,11 +41,11 @@ pub struct Problem {
     pub time_s: f64,
     /// Worst value, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit for the value. If two channels disagree, this is the value of the other channel.
+    /// Limit for the value. If two channels disagree, `limit` is the value of the other channel.
     pub limit: f64,
     /// Number of milliseconds, points or steps with the problem.
     pub count: usize,
-    /// `true` if the trajectory can be executed despite the problem. In this case only the feed-forward torque is less accurate.
+    /// `true` if the problem is only a warning: the trajectory can be executed, but the feed-forward torque is less accurate.
     pub warning: bool,
 }
 
@@ -56,8 +56,8 @@ impl Problem {
         Seen { joint, point, ms, time_s, value, limit }
     }
 
-    /// Returns the value relative to its limit, for sorting. If the problem has no limit, returns the absolute value or the difference of
-    /// two channels.
+    /// Returns the worst value relative to its limit, for sorting. If the problem has no limit, returns the absolute value or the
+    /// difference of two channels.
     pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
@@ -81,7 +81,7 @@ impl fmt::Display for Problem {
 }
 
 impl Seen {
-    /// Describes the problem at this place, with value, limit, point and time.
+    /// Returns a text that describes this occurrence of the problem, with the value, limit, point and time.
     pub(super) fn words(&self, kind: ProblemKind) -> String {
         use ProblemKind::*;
         let Self { joint, point, ms, time_s, value, limit } = self;

@@ -1,8 +1,9 @@
 //! Check that the arm can stop from every point of a path within the stop time of Pause and Stop (J-33).
 //!
-//! If a path is executed at the rate r, and r changes with the slope s, the model's torque is g + r²·f + s·h. Here g is the torque that
-//! holds the arm, f the torque of the motion at full speed, and h the torque for the change of rate (Bobrow 1985; Pham & Pham 2018). These
-//! three torques are computed once per place. Each ramp to standstill then needs only a few additions.
+//! The path is executed at the rate r, and r changes with the slope s. The torque of the arm model is g + r²·f + s·h (Bobrow 1985; Pham &
+//! Pham 2018). The torque g holds the arm, f is the torque of the motion at full speed, and h is the torque for the change of rate. The
+//! torques g, f and h are computed once for each checked time of the path. The torques during a ramp to standstill are then weighted sums
+//! of g, f and h.
 
 use std::collections::VecDeque;
 
@@ -12,16 +13,16 @@ use jtc_wire::Joint;
 
 use super::{ProblemKind, Verdict};
 
-/// Distance between the checked places, along the path and along each ramp, ms.
+/// Time between two checks of the torque, along the path and along each ramp, ms.
 const SPACING: f64 = 10.0;
-/// Durations of the ramps that are tried from every place, as shares of the allowed stop time. One feasible ramp is sufficient.
+/// Durations of the tried ramps, as shares of the allowed stop time. The arm can stop if one of these ramps is feasible.
 const LENGTHS: [f64; 3] = [1.0, 0.7, 0.4];
-/// Share of the ramp time in which the slope increases. The slope decreases in an equal share at the end.
+/// Share of the ramp time during which the slope increases. At the end of the ramp, the slope decreases during an equal share.
 const CORNER: f64 = 0.2;
 
-/// Parts of the torque at a place of the path, N·m.
+/// Terms of the torque at one time of the path, N·m.
 struct Place {
-    /// Last point before the place, and the time since that point in ms.
+    /// Index of the last point at or before this time of the path. `ms` is the time since this point, ms.
     point: usize,
     ms: f64,
     hold: [f64; JOINTS],
@@ -37,8 +38,8 @@ struct Load {
     torque: f64,
 }
 
-/// Adds a problem for every place from which no tried ramp within `config.stop_ms` keeps the torque of the arm model, without friction,
-/// within the limits.
+/// Adds a problem for every checked time of the path from which the arm cannot stop within `config.stop_ms`. From such a time, each tried
+/// ramp exceeds a torque limit. The torque is computed with the arm model, without friction.
 pub(super) fn stops(
     config: &Config,
     dynamics: &Dynamics,
@@ -49,7 +50,7 @@ pub(super) fn stops(
     let end = points.len().saturating_sub(1) as f64 * f64::from(step_ms);
     let last = (end / SPACING).ceil() as usize;
     let stop_ms = f64::from(config.stop_ms).max(SPACING);
-    // A ramp advances the path by half of the ramp's time.
+    // During a ramp, the path time advances by half of the ramp's duration.
     let ahead = (0.5 * stop_ms / SPACING).ceil() as usize + 1;
     let mut window = VecDeque::with_capacity(ahead + 1);
     let mut next = 0;
@@ -90,7 +91,7 @@ fn place(config: &Config, dynamics: &Dynamics, step_ms: u16, points: &[SetPoint]
     }
 }
 
-/// Returns the greatest load during a ramp of `length` ms that begins at the first place of `window`.
+/// Returns the greatest load during a ramp of `length` ms that begins at the first element of `window`.
 fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     let mut worst = Load { share: 0.0, joint: Joint::ALL[0], torque: 0.0 };
     let samples = (length / SPACING).ceil().max(2.0);
@@ -120,8 +121,8 @@ fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     worst
 }
 
-/// Returns how much of the ramp is complete (as a share) after the share `x` of the ramp time, and the slope at that time. The ramp is a
-/// straight line with rounded ends.
+/// Returns the completed share of the ramp and its slope after the share `x` of the ramp time. The ramp is a straight line with rounded
+/// ends.
 fn profile(x: f64) -> (f64, f64) {
     let steepest = 1.0 / (1.0 - CORNER);
     let end = 1.0 - x;

@@ -1,4 +1,4 @@
-//! Tests of the check with generated and existing trajectories.
+//! Tests of the check of a trajectory, with generated and existing trajectories.
 
 use jtc_core::Config;
 
@@ -31,7 +31,7 @@ fn a_planned_move_passes_with_torque_and_start_pose() {
     assert!(verdict.joints[1].torque_peak_nm.unwrap() > 1.0);
 }
 
-/// J-34: the start pose is checked.
+/// J-34: the check compares the start pose with the first point.
 #[test]
 fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     let config = Config::avena();
@@ -47,7 +47,7 @@ fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     assert!(!Checker { start: Some(start), ..Checker::new(&config) }.check(&smooth()).is_ok());
 }
 
-/// J-32: both points are within the limits, but the controller's interpolation between them exceeds a limit.
+/// J-32: two points are within the limits, but the controller's interpolation between these points exceeds a limit.
 #[test]
 fn j32_limits_are_checked_between_points() {
     let at = |q: f64, v: f64| Point {
@@ -102,7 +102,7 @@ fn channels_that_contradict_each_other_all_along_are_refused() {
     assert!(verdict.refusals().any(|p| p.kind == ProblemKind::VelocityMismatch), "{verdict}");
 }
 
-/// J-30: the numbers of points and segments are checked.
+/// J-30: the check refuses too many points or segments.
 #[test]
 fn j30_counts_are_checked() {
     let t = Trajectory { step_ms: 10, points: vec![Point::default(); 12_001] };
@@ -135,7 +135,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     );
 }
 
-/// Two points that are too far apart are reported as too fast, with a speed that passes the check.
+/// If two points are too far apart, the check reports that the motion is too fast, and suggests a speed that passes the check.
 #[test]
 fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     let to = Point { position: [0.0, 0.0, 2.5, 0.0, 0.0, 0.0], ..Point::default() };
@@ -147,13 +147,12 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
         (ProblemKind::PositionSpeed, Joint::from_number(3)),
         "{verdict}"
     );
-    // The peak velocity is 15/8 of the mean velocity, 2.5 rad in 0.3 s. The peak velocity occurs between the points.
+    // The peak velocity is 15/8 of the mean velocity, which is 2.5 rad in 0.3 s. The peak velocity occurs between the points.
     assert!((verdict.joints[2].velocity_peak_rad_s - 15.625).abs() < 0.01);
     assert!(verdict.hint().to_string().contains("--speed 9`"), "{}", verdict.hint());
     let slow = check(&plan::at_speed(&t, 9.0).unwrap());
     assert!(slow.is_ok(), "{slow}");
-    // The trajectory was checked at half of the file's speed. The advised percentage must still refer to the file's own
-    // speed.
+    // The trajectory was checked at half of the file's speed. The suggested percentage must still refer to the file's own speed.
     let half = check(&plan::at_speed(&t, 50.0).unwrap());
     assert!(
         half.hint_for("my.csv", 50.0).to_string().contains("traj check my.csv --speed 9`"),
@@ -175,7 +174,7 @@ fn degrees_are_recognised() {
     assert!(verdict.to_string().lines().count() < 30, "{verdict}");
 }
 
-/// A single cause summarises all joints and points, with the first and the worst occurrence.
+/// A cause summarises the problems of one kind in all joints and points, with the first and the worst occurrence.
 #[test]
 fn long_lists_are_summed_by_cause() {
     let mut t = smooth();
@@ -195,7 +194,7 @@ fn long_lists_are_summed_by_cause() {
         "{verdict}"
     );
     assert!((cause.worst.value + 1.9).abs() < 1e-3, "{verdict}");
-    // The velocity that the controller interpolates exceeds the limit before this point.
+    // The interpolated velocity exceeds the limit shortly before the point with the high velocity.
     assert_eq!((cause.first.joint, cause.first.point), (Joint::from_number(6), n / 4 - 1), "{verdict}");
     let time = (cause.first.point as f64 * f64::from(t.step_ms) + cause.first.ms) * 1e-3;
     assert_eq!(cause.first.time_s, time);
@@ -213,7 +212,7 @@ fn long_lists_are_summed_by_cause() {
     assert_eq!(config.joints[1].velocity_max, 1.5);
 }
 
-/// J-36: the check refuses a trajectory that the controller refuses, with the same text in all cases.
+/// J-36: the check refuses every trajectory that the controller refuses.
 #[test]
 fn j36_nothing_passes_that_the_controller_refuses() {
     let mut t = smooth();
@@ -222,7 +221,7 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     let bump = verdict.refusals().next().expect("refused");
     assert_eq!((bump.kind, bump.joint), (ProblemKind::PositionSpeed, Joint::from_number(5)), "{verdict}");
     assert!((19..=20).contains(&bump.point) && bump.ms > 0.0, "{verdict}");
-    // Limits beyond the range of the drives.
+    // The limits in these settings are beyond the range of the drives.
     let mut config = Config::avena();
     config.joints[0].position_max = 3.05;
     let mut out = Trajectory { step_ms: 100, points: vec![Point::default(); 3] };
@@ -257,7 +256,7 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
         let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
         assert_eq!((problem.kind, problem.limit), (ProblemKind::Position, limit));
     }
-    // A motion to the limit can also be planned, and ends exactly at the limit.
+    // The planner can also plan a motion to the limit. The planned motion ends exactly at the limit.
     let planned = plan::joint_move(&[0.0; 6], &[0.0, 1.15, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     assert_eq!(planned.points.last().unwrap().position[1], 1.15);
 }
@@ -265,7 +264,8 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
 #[test]
 fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     let config = between_steps();
-    // The serial frames contain the raw positions 11 997, −5 739, 12 100 and 15 000. The rounding of the velocities adds some µrad.
+    // In the serial frames, the end positions of these motions are the raw values 11 997, −5 739, 12 100 and 15 000. The rounding of the
+    // velocities changes the interpolated positions by some µrad.
     for (end, excess) in [(1.150233, 0.000233), (-0.550236, 0.000236), (1.160108, 0.0101), (1.438151, 0.288)]
     {
         let verdict = Checker::new(&config).check(&of_joint_2(0.2, end));
@@ -280,7 +280,7 @@ fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     }
 }
 
-/// Like the controller, the check accepts a path that starts outside the limits by at most the start tolerance and returns inside.
+/// Like the controller, the check accepts a path that starts outside the limits by at most the start tolerance and moves inwards.
 #[test]
 fn j36_j58_a_path_from_outside_the_limits_inwards_passes() {
     let config = between_steps();
@@ -335,17 +335,17 @@ fn gentle(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> Trajectory {
     Trajectory { step_ms: 10, points: (0..=steps).map(point).collect() }
 }
 
-/// J-33: the torque is sufficient for the motion, but not for a stop during the downward motion of the stretched arm.
+/// J-33: the torque limit is sufficient for the motion, but not for a stop while the stretched arm moves downwards.
 #[test]
 fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     let arm = Arm::avena();
     let mut config = arm.config();
-    // The arm passes the horizontal pose at up to 1.1 rad/s, with a smooth start and end.
+    // The motion passes the horizontal pose at up to 1.1 rad/s, and starts and ends smoothly.
     let t = gentle(&[0.0, 0.2, 0.0, 0.0, 0.0, 0.0], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], 2.25);
     let verdict = |config: &Config| Checker { model: Some(&arm.model), ..Checker::new(config) }.check(&t);
     let peak = verdict(&config).joints[1].torque_peak_nm.unwrap();
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
-    // The torque limit is just above the peak torque of the motion itself.
+    // The test sets the torque limit just above the peak torque of the motion.
     config.joints[1].torque_max = peak + 0.5;
     let refused = verdict(&config);
     let stop = refused.refusals().next().expect("refused");
@@ -356,12 +356,12 @@ fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
         "{}",
         refused.hint()
     );
-    // With a stop time of 5 s the path passes.
+    // With a stop time of 5 s, the check accepts the path.
     config.stop_ms = 5_000;
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
 }
 
-/// If holding an arm needs nearly a whole torque limit, the arm falls later, even without a motion.
+/// J-43: if a joint needs nearly its whole torque limit to hold the arm, the arm falls after some time, even without a motion.
 #[test]
 fn j43_torque_is_in_hand_where_the_arm_stands() {
     let arm = Arm::avena();
@@ -388,7 +388,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     let last = there.points.len() - 1;
     for share in [0.98, 0.975] {
         let (joint, point, over, hint) = refusal(&there, share, None).expect("at its end");
-        // At the last points, the speed is already so low that the arm is considered at rest.
+        // At the last points of the motion, the speed is so low that the arm counts as at rest.
         assert!(
             joint == Joint::from_number(2) && over && (last - 5..=last).contains(&point),
             "{point} of {last}"
@@ -405,7 +405,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
             "{point} of {last}"
         );
         assert!(refusal(&back, share, None).is_some(), "at its start");
-        // If the arm is already in that pose, a motion out of it is accepted.
+        // If the arm is already in the pose with the high holding torque, a motion out of this pose is accepted.
         assert_eq!(refusal(&back, share, Some(high)), None);
         assert!(refusal(&there, share, Some(low)).is_some());
     }
@@ -414,7 +414,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     }
     let text = check(&there, 0.98, None).to_string();
     assert!(text.contains("joint 2: rest at point") && text.contains("98.0 % of the torque limit"), "{text}");
-    // Joint 1 rotates about the vertical axis at the same time, so the arm is not at rest in that pose.
+    // In the pose with the high holding torque, joint 1 rotates about the vertical axis, so the arm is not at rest.
     let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
     for (i, point) in both.points.iter_mut().enumerate() {
         let (sin, cos) = (std::f64::consts::PI * i as f64 / n).sin_cos();
@@ -440,7 +440,7 @@ fn the_existing_trajectories_pass() {
         let checker =
             Checker { model: Some(&arm.model), friction: friction.as_ref(), ..Checker::new(&config) };
         let verdict = checker.check(&t);
-        // At five places where pieces of the trajectory join, the positions are one sample ahead of the velocities.
+        // At five joins between pieces of the trajectory, the positions are one sample ahead of the velocities.
         assert!(verdict.is_ok(), "{name}: {verdict}");
         assert!(
             verdict.warnings().all(|p| p.kind == ProblemKind::VelocityMismatch && p.count == 5),

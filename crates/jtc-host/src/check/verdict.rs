@@ -1,4 +1,4 @@
-//! Result of a check with all problems in groups, worst first.
+//! Result of the check of a trajectory. The problems are grouped, and the worst problem is first.
 
 use std::fmt;
 
@@ -12,22 +12,22 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Number of places with contradictory channels that the check tolerates. Existing files have contradictory channels where pieces are
-/// joined.
+/// Number of points with contradictory channels that the check tolerates. Existing files have contradictory channels at the joins between
+/// two pieces.
 const SEAMS: usize = 20;
 
 /// Values of a joint along the path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct JointFigures {
-    /// Lowest position, rad.
+    /// Lowest position of the joint along the path, rad.
     pub position_min_rad: f64,
-    /// Highest position, rad.
+    /// Highest position of the joint along the path, rad.
     pub position_max_rad: f64,
-    /// Peak velocity, rad/s.
+    /// Peak velocity of the joint, rad/s.
     pub velocity_peak_rad_s: f64,
-    /// Peak acceleration, rad/s².
+    /// Peak acceleration of the joint, rad/s².
     pub acceleration_peak_rad_s2: f64,
-    /// Peak torque of the arm model, N·m; `None` if it was not computed.
+    /// Peak torque of the arm model, N·m; `None` if the torque was not computed.
     pub torque_peak_nm: Option<f64>,
 }
 
@@ -59,10 +59,10 @@ impl JointFigures {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Suspicion {
-    /// No particular fault.
+    /// No probable fault was found.
     Nothing,
-    /// Positions are far outside the range of a joint. After division by 57.3, the positions would be plausible, so they are probably in
-    /// degrees.
+    /// Positions are far outside the range of a joint, but would be plausible after division by 57.3. Therefore the positions are probably
+    /// in degrees.
     Degrees,
     /// The trajectory consists of pieces whose ends do not match.
     Pieces,
@@ -73,13 +73,13 @@ pub enum Suspicion {
 /// Result of the check of a trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Number of points.
+    /// Number of points of the trajectory.
     pub points: usize,
-    /// Step time, ms.
+    /// Step time between two points, ms.
     pub step_ms: u16,
     /// Time from the first to the last point, s.
     pub duration_s: f64,
-    /// Problems, worst first: one entry for each kind and joint, and one for each jump.
+    /// Problems, the worst first. Each kind of problem has one entry per joint, but each jump has its own entry.
     pub problems: Vec<Problem>,
     /// Problems summarised by kind. The first entry is the kind with the strongest effect on an arm.
     pub causes: Vec<Cause>,
@@ -87,12 +87,12 @@ pub struct Verdict {
     places: Places,
     /// Values of the joints along the path.
     pub joints: [JointFigures; JOINTS],
-    /// Smallest torque margin of the model, with friction at 20 °C and at the temperature of the check. `None`: not
+    /// Smallest torque margin of the arm model, with friction at 20 °C and at the temperature of the check; `None` if the torque was not
     /// computed.
     pub margin: Option<TorqueMargin>,
 }
 
-/// Step time from which the points are considered waypoints instead of samples of a motion, ms.
+/// Step time from which the points count as waypoints instead of samples of a motion, ms.
 const WAYPOINTS_MS: u16 = 100;
 
 impl Verdict {
@@ -137,7 +137,8 @@ impl Verdict {
         }
     }
 
-    /// Sorts the problems by the effect of their kind on an arm. Jumps are sorted along the path, other problems by their excess.
+    /// Sorts the problems by the effect of their kind on an arm. Jumps are sorted by time along the path. Other problems are sorted by
+    /// their excess over the limit.
     pub(super) fn done(mut self) -> Self {
         self.part_haste_from_seams();
         let seams = SEAMS.max(self.points / 50);
@@ -159,12 +160,12 @@ impl Verdict {
         self
     }
 
-    /// Distinguishes moves that are too fast from pieces whose ends do not match. Pieces whose ends do not match cause single jumps between
-    /// two samples. Jumps belong to moves that are too fast in three cases:
+    /// Distinguishes moves that are too fast from pieces whose ends do not match. If the ends of two pieces do not match, the trajectory
+    /// has a single jump between two samples. A jump belongs to a move that is too fast in three cases:
     ///
-    /// - At least every fifth step has a jump: the whole path is too fast, or its positions are not in radians.
-    /// - The step is 100 ms or more: the points are waypoints.
-    /// - There are three or more jumps in a row.
+    /// - At least every fifth step has a jump, so the whole path is too fast or its positions are not in radians.
+    /// - The step time is 100 ms or more, so the points are waypoints.
+    /// - Three or more steps in a row have a jump.
     ///
     /// The jumps of a move that is too fast become one problem per joint.
     fn part_haste_from_seams(&mut self) {
@@ -173,7 +174,7 @@ impl Verdict {
         places.sort_unstable();
         places.dedup();
         let all = 5 * places.len() >= self.points || self.step_ms >= WAYPOINTS_MS;
-        // The join between two pieces affects only one step. Jumps in many consecutive steps belong to one move.
+        // The join between two pieces of a trajectory affects only one step. Jumps in many consecutive steps belong to one move.
         let on_the_way = |point: usize| {
             let has = |p: Option<usize>| p.is_some_and(|p| places.binary_search(&p).is_ok());
             let (before, after) = (point.checked_sub(1), Some(point + 1));
@@ -194,12 +195,12 @@ impl Verdict {
         }
     }
 
-    /// Returns `true` if no problem prevents the execution.
+    /// Returns `true` if no problem prevents the execution of the trajectory.
     pub fn is_ok(&self) -> bool {
         self.problems.iter().all(|p| p.warning)
     }
 
-    /// Returns `true` if the only problem that prevents the execution is that the arm is not at the first point.
+    /// Returns `true` if only one problem prevents the execution: the arm is not at the first point.
     pub fn is_only_elsewhere(&self) -> bool {
         !self.is_ok() && self.refusals().all(|p| p.kind == ProblemKind::StartPose)
     }
@@ -234,7 +235,7 @@ impl Verdict {
         }
     }
 
-    /// Returns the joint whose position is farthest from zero, with this position (rad).
+    /// Returns the joint with the position that is farthest from zero, and this position (rad).
     fn furthest(&self) -> Option<(Joint, f64)> {
         let ends = Joint::ALL.into_iter().zip(&self.joints);
         let ends = ends.flat_map(|(j, f)| [(j, f.position_min_rad), (j, f.position_max_rad)]);
@@ -260,7 +261,7 @@ impl fmt::Display for Verdict {
         let (mut shown, mut left) = (self.causes.len(), 0);
         if let (Suspicion::Degrees, Some(far)) = (self.suspicion(), self.furthest()) {
             write!(f, "\n  the positions look like degrees: {} is at {:.1}", far.0, far.1)?;
-            // All other problems are consequences of the wrong unit.
+            // If the unit of the positions is wrong, all other problems are consequences of the wrong unit.
             shown = self.causes.iter().take_while(|c| c.kind <= ProblemKind::Position).count().max(1);
             left = self.causes.len().saturating_sub(shown);
         }

@@ -7,20 +7,19 @@ use crate::arm::{Difference, NOT_CARRIED};
 use crate::check::Verdict;
 use crate::file::FileError;
 
-/// Reason why a trajectory must not be executed; no frame was sent.
+/// Reason why a trajectory must not be executed. No frame was sent.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckError {
-    /// The check found problems.
+    /// The check found problems in the trajectory.
     #[error("{0}")]
     Refused(Box<Verdict>),
-    /// The arm file and the controller have different values for settings that are not sent with friction, gains and arm
-    /// model (J-55).
+    /// The arm file and the controller have different values of the limits, the gravity or the rotor inertia (J-55).
     #[error("{arm}: {} of this arm cannot be sent to the controller, which uses its own; nothing was sent ({})", values(differences.len()), listed(differences))]
     DeviceLimits {
         /// Name of the arm.
         arm: String,
-        /// Values that differ.
+        /// Values that differ between the arm file and the controller.
         differences: Vec<Difference>,
     },
     /// The numbers of the arm are not physically possible.

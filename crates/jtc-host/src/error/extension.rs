@@ -1,4 +1,4 @@
-//! Errors when a whole arm is read, sent or stored.
+//! Errors when a program reads all values of an arm from a controller, sends them to the controller, or stores them there.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_core::settings::SettingError;
@@ -11,21 +11,21 @@ use crate::arm::Difference;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExtensionError {
-    /// The arm in the device changed while the program read it, so the parts do not belong to one arm.
+    /// The arm in the device changed while the program read it, so the received values do not belong to one arm.
     #[error("the arm of the device changed while it was read")]
     Changed,
     /// The device does not have an arm that this program can read.
     #[error("the arm of the device cannot be read: {why}")]
     NoArm {
-        /// Fault of the arm in the device.
+        /// Reason why the program cannot read the arm in the device.
         why: String,
     },
-    /// The arm file is incomplete.
+    /// The arm file does not contain all parameters that a controller needs.
     #[error("{arm}: no {} in the file", missing.join(", no "))]
     Incomplete {
         /// Name of the arm.
         arm: String,
-        /// Names of the parts that a controller needs and that are missing in the file.
+        /// Names of the parameters that a controller needs but the file does not contain.
         missing: Vec<&'static str>,
     },
     /// The arm in the device differs from the arm in the file (J-55).
@@ -33,22 +33,22 @@ pub enum ExtensionError {
     Differs {
         /// Name of the arm in the file.
         arm: String,
-        /// Every value that differs.
+        /// All values that differ between the file and the device.
         differences: Vec<Difference>,
     },
     /// An arm can be stored only while the torque is off, because storing changes the parameters that hold the arm.
     #[error("the arm cannot be stored in the state {state}; nothing was sent")]
     Powered {
-        /// State of the device.
+        /// State of the controller at the time of the request.
         state: Code<ControllerState>,
     },
     /// The settings are invalid for every controller, or invalid in combination with the settings of this controller (J-53).
     #[error("{0}")]
     Setting(#[source] SettingError),
-    /// The payload is not a valid body, or outside the range of the controller (J-60).
+    /// The payload is not a physically possible body, or is outside the range of the controller (J-60).
     #[error("{why}")]
     NoBody {
-        /// Fault of the payload.
+        /// Reason why the payload is not valid.
         why: String,
     },
     /// A joint cannot hold the payload in the current pose (J-60).
@@ -63,18 +63,18 @@ pub enum ExtensionError {
         /// Torque limit of the joint, N·m.
         limit: f64,
     },
-    /// The payload cannot change while a motion runs (J-60).
+    /// The payload cannot be changed during a motion (J-60).
     #[error("the payload cannot change during a motion (state {state}, trajectory {trajectory})")]
     PayloadInMotion {
         /// State of the controller when it refused the payload.
         state: Code<ControllerState>,
-        /// Trajectory execution state at that time.
+        /// Trajectory execution state when the controller refused the payload.
         trajectory: Code<TrajectoryState>,
     },
-    /// The memory of the device does not contain the arm.
+    /// The non-volatile memory of the device does not contain the arm.
     #[error("the arm was not stored: {state}")]
     NotStored {
-        /// State of the memory that the device reports.
+        /// State of the non-volatile memory that the device reports.
         state: StoreState,
     },
 }

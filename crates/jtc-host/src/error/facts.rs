@@ -1,4 +1,4 @@
-//! Facts about errors: joint, value, limit and cause.
+//! Facts about an error: joint, value, limit and cause.
 
 use host_kit::{Facts, HeldStopFacts};
 use jtc_core::ConfigError;
@@ -11,7 +11,7 @@ use crate::held_stop::HeldStop;
 use crate::plan::{MARGIN_PCT_MAX, PlanError};
 use crate::{explain, held_stop, labels};
 
-/// Returns the cause from the explain page for the text `words`.
+/// Returns the usual cause from the explain page that belongs to the text `words`.
 fn cause(words: &str) -> Option<&'static str> {
     explain::find(words).first().map(|page| page.cause)
 }
@@ -21,12 +21,12 @@ fn problem(joint: Joint, value: f64, limit: f64, kind: ProblemKind) -> Facts {
     Facts { cause: cause(kind.words()), ..Facts::beyond(value, limit).at_joint(joint.number()) }
 }
 
-/// Returns facts that contain only a joint.
+/// Returns facts that contain only the joint of an error.
 pub(super) fn of_joint(joint: Joint) -> Facts {
     Facts::default().at_joint(joint.number())
 }
 
-/// Returns the facts of the worst problem of a check.
+/// Returns the facts about the worst problem that a check found.
 pub(crate) fn of_verdict(verdict: &Verdict) -> Facts {
     let Some(worst) = verdict.refusals().next() else { return Facts::default() };
     Facts {
@@ -37,7 +37,7 @@ pub(crate) fn of_verdict(verdict: &Verdict) -> Facts {
     }
 }
 
-/// Returns the limit of a range that a value exceeds.
+/// Returns the lower or upper limit of a range that a value exceeds.
 fn nearest(value: f64, low: f64, high: f64) -> f64 {
     if value < low { low } else { high }
 }
@@ -124,7 +124,7 @@ pub(super) fn of_setting(error: &SettingError) -> Facts {
     }
 }
 
-/// Returns the facts of the errors that a controller reports.
+/// Returns the facts about the errors in a status.
 pub fn of_status(status: &Status) -> Facts {
     let reports = |joint: &Joint| status.joints[joint.index()].internal != 0;
     Facts {
@@ -154,13 +154,13 @@ mod tests {
         let facts = refused.expect_err("it is over its limit").facts();
         assert_eq!((facts.joint, facts.point), (Some(2), Some(0)));
         assert_eq!(facts.limit, Some(limit));
-        // The resolution of the value is the resolution of a serial frame.
+        // The value is rounded to the resolution of a serial frame.
         assert!(facts.value.is_some_and(|value| (value - limit - 0.5).abs() < 1e-3), "{:?}", facts.value);
         assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
     }
 
-    /// A rejected plan has the same facts as a trajectory that the check rejected. The test covers a position outside the limits, a
-    /// position that needs too much torque, and a path that starts outside the limits.
+    /// If the planner rejects a motion, the error contains the same facts as the error of the check. The test covers a position outside the
+    /// limits, a position that needs too much torque, and a path that starts outside the limits.
     #[test]
     fn what_planning_refuses_has_joint_value_limit_and_cause() {
         let arm = Arm::avena();

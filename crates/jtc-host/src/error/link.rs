@@ -6,59 +6,59 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, FrameType, Respon
 use crate::labels;
 use crate::port::PortError;
 
-/// Reason why a request received no answer, or an unexpected answer.
+/// Reason why a request was not sent, not answered or not accepted.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// The port cannot be used.
+    /// The port to the controller cannot be used.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// No status was received.
+    /// No status was received from the controller.
     #[error("{port}: no status within {waited_s:.1} s ({})", received(*bytes))]
     NoLink {
         /// Name of the port.
         port: String,
         /// Bit rate of the serial line, Bd.
         baud: Option<u32>,
-        /// Waiting time, s.
+        /// Time for which the program waited for a status, s.
         waited_s: f64,
         /// Number of bytes received while the program waited for a status.
         bytes: u64,
     },
-    /// A request was not confirmed, although status frames are received.
+    /// The controller did not confirm a request, but the program receives status frames.
     #[error("{}: not confirmed in {tries} tries", labels::request(*request))]
     NotConfirmed {
-        /// The request.
+        /// Type of the request.
         request: FrameType,
         /// Number of times that the request was sent.
         tries: u32,
-        /// Last negative response to the request, if there was one.
+        /// Last negative response to the request; `None` if no negative response was received.
         last: Option<Response>,
     },
-    /// The device has no extensions.
+    /// The controller does not have the extensions that the request needs.
     #[error("{}: this device has no extensions", labels::request(*request))]
     NoExtension {
-        /// The request.
+        /// Type of the request.
         request: FrameType,
     },
-    /// The shared line rejected the request, so the request did not reach the controller.
+    /// The agent that shares the line to the controller rejected the request, so the request did not reach the controller.
     #[error("{}: not sent: {reason}", labels::request(*request))]
     Denied {
-        /// The request.
+        /// Type of the request.
         request: FrameType,
-        /// Reason.
+        /// Reason for the refusal.
         reason: String,
     },
     /// The controller refused a request.
     #[error("{}: {} (state {}, trajectory {})", labels::request(*request), labels::data_status(*code), state, trajectory)]
     Refused {
-        /// The request.
+        /// Type of the request.
         request: FrameType,
-        /// Reason.
+        /// Reason for the refusal.
         code: DataStatus,
         /// State of the controller when it refused the request.
         state: Code<ControllerState>,
-        /// Trajectory execution state at that time.
+        /// Trajectory execution state when the controller refused the request.
         trajectory: Code<TrajectoryState>,
     },
 }
@@ -164,7 +164,7 @@ impl Diagnose for LinkError {
 }
 
 impl LinkError {
-    /// Returns `true` if the line or the port failed, so that it is unknown if the controller received the request.
+    /// Returns `true` if the line or the port failed, so it is unknown if the controller received the request.
     pub(crate) fn is_loss(&self) -> bool {
         !matches!(
             self,
@@ -199,7 +199,8 @@ fn after_refused_execution(
             TrajCheck
         ));
     }
-    // In these states the controller refuses Execute with another code, and the session does not send Resume.
+    // While no trajectory runs (`idle`), the controller refuses Execute with another code, and the session does not send Resume. Therefore
+    // the refused request is Pause or Stop.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then(|| {
         next!(
@@ -210,13 +211,13 @@ fn after_refused_execution(
     })
 }
 
-/// Returns `true` if the code means that the arm is not in the required position. If extended codes are not enabled on the line, the
+/// Returns `true` if the code means that the arm is not in the required position. If extended codes are not enabled on the serial line, the
 /// controller sends code 6 instead of the codes 7 and 8 (J-51).
 fn is_place(code: DataStatus) -> bool {
     matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
 }
 
-/// Returns advice for a refusal with this code in this state.
+/// Returns the next step after the controller refused a request with this code in this state.
 pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> Next {
     match (code, state.known()) {
         (DataStatus::NotAllowed, Some(ControllerState::Start | ControllerState::Init)) => {
@@ -246,7 +247,7 @@ pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> N
     }
 }
 
-/// Returns `true` if the response confirms the frame that it belongs to.
+/// Returns `true` if the response confirms the frame to which it belongs.
 pub(crate) fn accepted(r: &Response) -> bool {
     r.status == FrameStatus::NoError && r.data == DataStatus::NoError
 }

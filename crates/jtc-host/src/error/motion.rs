@@ -11,33 +11,34 @@ use crate::{held_stop, labels};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionError {
-    /// Execution was requested for a trajectory that this session did not upload, or that the controller no longer has. No frame was sent.
+    /// The controller does not have the trajectory that the caller wanted to execute. The session did not upload the requested trajectory,
+    /// or this trajectory was replaced or deleted. No frame was sent.
     #[error(
         "the controller does not have this trajectory: it was not uploaded, another upload replaced it, or an error deleted it; nothing was sent"
     )]
     NotUploaded,
-    /// Resume was requested, but no motion is paused.
+    /// The caller requested Resume, but no motion is paused.
     #[error("{} (state {}, trajectory {})", not_paused(*trajectory), state, trajectory)]
     NotPaused {
-        /// State of the controller.
+        /// State of the controller at the time of the request.
         state: Code<ControllerState>,
-        /// Trajectory execution state.
+        /// Trajectory execution state at the time of the request.
         trajectory: Code<TrajectoryState>,
     },
-    /// The check refuses the remainder of a paused motion; no frame was sent.
+    /// The check refuses the remainder of a paused motion. No frame was sent.
     #[error("the remainder of the motion from {:.3} s fails the check with the present settings and payload: {why}; nothing was sent", f64::from(*point) * 1e-3)]
     RestRefused {
         /// Index of the 1 ms point at which the motion is paused.
         point: u32,
-        /// Error from the check of the remainder.
+        /// Error from the check of the remainder of the motion.
         why: Box<PlanError>,
     },
-    /// The motion did not end as requested.
+    /// The motion ended early: the controller reports an error, the trajectory was deleted, or nodes are no longer in operation.
     #[error("the run ended early at point {point} ({:.3} s): {}", f64::from(*point) * 1e-3, labels::errors_line(status))]
     RunFault {
         /// Index of the 1 ms point at which the motion ended.
         point: u32,
-        /// Status with the errors.
+        /// Status that contains the errors.
         status: Box<Status>,
     },
     /// The controller stopped the motion, and holds the arm in position (J-69).
@@ -47,25 +48,25 @@ pub enum MotionError {
         point: u32,
         /// Errors of each joint that had occurred before the motion.
         before: [u16; 6],
-        /// Status with the errors.
+        /// Status that contains the errors.
         status: Box<Status>,
-        /// First cause, with its value and limit, if the device reports it.
+        /// First cause of the held stop, with its value and limit; `None` if the device does not report the cause.
         cause: Option<StopCause>,
     },
-    /// The link was lost while the arm moves, or may move.
+    /// The connection was lost during a motion, so the arm may still move.
     #[error("{source}. {}", where_the_arm_is(last.as_deref(), *stop_sent))]
     LinkLost {
         /// Last status that was received.
         last: Option<Box<Status>>,
-        /// `true` if a Stop was written to the port. The controller has not confirmed it.
+        /// `true` if the program wrote a Stop to the port. The controller has not confirmed this Stop.
         stop_sent: bool,
-        /// Failure of the link.
+        /// Failure of the connection.
         source: Box<LinkError>,
     },
 }
 
-/// Returns the cause of the held stop in one line. If the status no longer shows the cause, returns the errors that have occurred since the
-/// start of the motion.
+/// Returns the cause of the held stop in one line. If the status does not contain the cause any more, returns the errors that have occurred
+/// since the start of the motion.
 fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
     if status.is_held_stop() || cause.is_some() {
         labels::why_held(status, cause)
@@ -78,7 +79,7 @@ fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> St
 fn after_held_stop(cause: Option<&StopCause>) -> Next {
     let remedy = match cause.map(|cause| cause.kind) {
         None => "remove the obstacle, or set the payload".to_owned(),
-        // No trajectory can continue before the drive is reset.
+        // After an encoder jump, no trajectory can continue before the drive is reset.
         Some(StopKind::EncoderJump) => return held_stop::after_encoder_jump(),
         Some(kind) => held_stop::remedy(kind),
     };
@@ -92,7 +93,7 @@ fn after_held_stop(cause: Option<&StopCause>) -> Next {
     Next::from(remedy).then(then)
 }
 
-/// Describes the known state of the motion after the link was lost.
+/// Returns a text that describes the last known state of the motion after the connection was lost.
 fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     match last {
         Some(s) if s.trajectory == TrajectoryState::Pause => format!(
@@ -114,8 +115,8 @@ fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     }
 }
 
-/// Returns the reason why no motion is paused. Right after a Pause request the trajectory state stays Execute until the arm
-/// is at rest.
+/// Returns the reason why no motion is paused. Immediately after a Pause request, the trajectory state is still Execute, until the arm is
+/// at rest.
 fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
     if trajectory == TrajectoryState::Execute {
         "no motion is paused yet: the motion is still slowing down after a Pause, or no client paused it"
@@ -194,8 +195,8 @@ impl Diagnose for MotionError {
 mod tests {
     use super::*;
 
-    /// J-34: after a Pause request the trajectory state stays Execute until the arm has stopped. A Resume command during this time has its
-    /// own error message.
+    /// J-34: after a Pause request the trajectory state stays Execute until the arm has stopped. A Resume command before the arm has
+    /// stopped has its own error message.
     #[test]
     fn a_resume_too_early_is_told_from_one_without_a_pause() {
         let early = MotionError::NotPaused {

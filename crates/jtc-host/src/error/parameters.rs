@@ -1,4 +1,4 @@
-//! Errors when friction, gains and arm model are sent to the controller.
+//! Errors when the friction, the gains and the arm model are sent to the controller.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 use jtc_wire::{DataStatus, FrameType};
@@ -16,33 +16,33 @@ pub enum ParametersError {
     /// The controller refused a parameter that is out of the bounds of known controllers.
     #[error("{}: {}: {beyond}", labels::request(*request), labels::data_status(DataStatus::IncorrectValue))]
     BeyondBounds {
-        /// The request.
+        /// Type of the request.
         request: FrameType,
-        /// Joint, value and bounds.
+        /// Joint, value and bounds of the refused parameter.
         beyond: Beyond,
     },
-    /// The arm is unstable with these gains.
+    /// The control loop of the arm is unstable with the gains.
     #[error("{arm}: {problem}; nothing was sent")]
     Unstable {
         /// Name of the arm.
         arm: String,
-        /// Joint, value and limit, as text.
+        /// Text with the joint, the value and the limit.
         problem: String,
         /// Next step for the operator.
         next: Next,
     },
-    /// The controller needs parameters, but the caller did not provide them.
+    /// The controller needs parameters that the caller did not provide.
     #[error("the controller lacks parameters: {}; nothing was sent", missing.join(", "))]
     NoSource {
-        /// Missing parameters.
+        /// Names of the missing parameters.
         missing: Vec<&'static str>,
     },
-    /// An arm file lacks parameters that a controller needs.
+    /// An arm file does not contain all parameters that a controller needs.
     #[error("{arm}: {} missing, and parts of another arm cannot replace them; nothing was sent", missing.join(", "))]
     IncompleteArm {
         /// Name of the arm.
         arm: String,
-        /// Missing parameters.
+        /// Names of the missing parameters.
         missing: Vec<&'static str>,
     },
 }

@@ -1,4 +1,4 @@
-//! Errors while the library waits for a state.
+//! Errors while the library waits for a state of the controller.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, next};
 use jtc_wire::{Code, ControllerState, Joint, Status, StopCause};
@@ -10,34 +10,34 @@ use crate::{held_stop, labels};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StateError {
-    /// The controller reports errors.
+    /// The controller reports errors in its status.
     #[error("the controller reports an error: {}", labels::errors_line(status))]
     Device {
-        /// Status with the errors.
+        /// Status that contains the errors.
         status: Box<Status>,
     },
     /// The arm is in a held stop (J-69): the drives hold the arm, and no motion is possible until the cause is cleared.
     #[error("the arm is in a held stop: {}", labels::why_held(status, cause.as_ref()))]
     HeldStop {
-        /// Status with the causes.
+        /// Status that contains the errors of the joints.
         status: Box<Status>,
-        /// First cause, with its value and limit, if the device reports it.
+        /// First cause of the held stop, with its value and limit; `None` if the device does not report the cause.
         cause: Option<StopCause>,
     },
-    /// The state was not reached in time.
+    /// The controller did not reach the expected state in time.
     #[error("{what} not reached within {waited_s:.1} s: {}", labels::waiting_for(status))]
     Timeout {
-        /// Expected state.
+        /// Name of the expected state.
         what: &'static str,
-        /// Waiting time, s.
+        /// Time for which the library waited, s.
         waited_s: f64,
-        /// The last status.
+        /// Last status that was received.
         status: Box<Status>,
     },
-    /// The controller is not in HoldPos, and it is not starting up to that state.
+    /// The controller is not in HoldPos and does not change to HoldPos.
     #[error("{}", labels::waiting_for(status))]
     NotReady {
-        /// Status in which the controller was not ready.
+        /// Status that shows that the controller is not ready.
         status: Box<Status>,
     },
     /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the drive's speed has another scale. The controller executes
@@ -48,7 +48,7 @@ pub enum StateError {
         labels::joints(joints)
     )]
     EncoderJumped {
-        /// Joints with this fault.
+        /// Joints whose encoders disagree.
         joints: Vec<Joint>,
     },
     /// The controller reports errors while a guided motion is recorded.
@@ -66,7 +66,7 @@ pub enum StateError {
     /// The arm moves, but a pose must be saved at rest.
     #[error("{what}, but a pose can be saved only at rest; nothing was saved")]
     Moving {
-        /// Description of the moving part.
+        /// Text that names the moving joint or the motion.
         what: String,
     },
     /// The position of a joint is unknown.
@@ -75,20 +75,20 @@ pub enum StateError {
         /// Joint with the unknown position.
         joint: Joint,
     },
-    /// The arm is moving and would fall if these nodes lost their torque.
+    /// The arm moves, and would fall if the nodes lost their torque.
     #[error("{nodes} cannot be reset in {state}: the arm would fall")]
     WouldFall {
-        /// Names of the nodes.
+        /// Names of the nodes that the caller wanted to reset.
         nodes: String,
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// The arm has torque, and a reset of these nodes can remove it.
+    /// The arm is under torque, and a reset of these nodes can switch off the torque.
     #[error(
         "the arm has torque ({state}), and a reset of {nodes} can remove it: the arm may fall; nothing was sent"
     )]
     MayFall {
-        /// Names of the nodes.
+        /// Names of the nodes that the caller wanted to reset.
         nodes: String,
         /// State of the controller.
         state: Code<ControllerState>,
@@ -99,7 +99,7 @@ pub enum StateError {
         labels::joints(joints)
     )]
     Absent {
-        /// Absent joints.
+        /// Joints that the user has marked as absent.
         joints: Vec<Joint>,
     },
 }

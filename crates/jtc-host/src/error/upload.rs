@@ -1,4 +1,4 @@
-//! Errors of an upload.
+//! Errors of the upload of a trajectory.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use jtc_wire::{Code, ControllerState, DataStatus, TrajectoryState};
@@ -10,17 +10,17 @@ use crate::labels;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UploadError {
-    /// The controller refused a segment permanently.
+    /// The controller refused a segment permanently: another attempt would not help.
     #[error("segment {segment} of {segments} was refused: {}", labels::data_status(*code))]
     SegmentRefused {
-        /// Number of the segment, from 0.
+        /// Index of the refused segment, from 0.
         segment: usize,
-        /// Number of segments.
+        /// Number of segments of the trajectory.
         segments: usize,
-        /// Reason.
+        /// Reason for the refusal.
         code: DataStatus,
     },
-    /// The upload did not end with a complete trajectory.
+    /// The upload ended, but the controller does not have the complete trajectory.
     #[error(
         "upload failed after {restarts} restarts: {confirmed} of {segments} segments confirmed, trajectory {}",
         trajectory
@@ -28,11 +28,11 @@ pub enum UploadError {
     Incomplete {
         /// Number of segments that the controller has confirmed.
         confirmed: usize,
-        /// Number of segments.
+        /// Number of segments of the trajectory.
         segments: usize,
-        /// Number of times the upload was restarted.
+        /// Number of times that the upload was restarted.
         restarts: u32,
-        /// Trajectory execution state at the end.
+        /// Trajectory execution state at the end of the upload.
         trajectory: Code<TrajectoryState>,
     },
 }

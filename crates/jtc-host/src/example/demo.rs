@@ -3,14 +3,14 @@ use crate::trajectory::{Point, Trajectory};
 
 /// Duration of the demo motion, s.
 const TIME: f64 = 10.0;
-/// Time between two points, ms.
+/// Time between two points of the demo motion, ms.
 const STEP_MS: u16 = 10;
-/// Values of each joint: deflection (rad), oscillation amplitude (rad) and number of oscillations.
+/// For each joint: deflection (rad), amplitude of the oscillation (rad) and number of oscillations.
 const MOTION: [(f64, f64, f64); 6] =
     [(0.0, 1.5, 1.0), (0.45, 0.4, 2.0), (-1.5, 0.35, 2.0), (0.5, 0.6, 2.0), (0.9, 0.7, 1.0), (0.0, 0.5, 3.0)];
 
-/// Returns the motion of `jtc demo`, a smooth motion of all joints from the zero pose and back. The motion is the sum of a deflection and
-/// windowed oscillations. The motion begins and ends at rest, without a step in position, velocity or acceleration.
+/// Returns the motion of `jtc demo`: a smooth motion of all joints from the zero pose and back. The motion of each joint is the sum of a
+/// deflection and a windowed oscillation. The motion begins and ends at rest. Position, velocity and acceleration have no steps.
 pub fn demo_motion() -> Trajectory {
     let count = (TIME * 1e3) as usize / usize::from(STEP_MS) + 1;
     let omega = std::f64::consts::TAU / TIME;
@@ -19,7 +19,8 @@ pub fn demo_motion() -> Trajectory {
         let mut p = Point::default();
         for (j, (bend, swing, n)) in MOTION.into_iter().enumerate() {
             p.position[j] = bend * 0.375;
-            // B·sin⁴(πs) + A·sin²(πs)·sin(2πns), written as a sum of sines and cosines because these have simple derivatives.
+            // The position is B·sin⁴(πs) + A·sin²(πs)·sin(2πns). The formula is written as a sum of sines and cosines, because they have
+            // simple derivatives.
             for (a, b, n) in [
                 (0.0, -0.5 * bend, 1.0),
                 (0.0, 0.125 * bend, 2.0),

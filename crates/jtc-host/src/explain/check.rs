@@ -1,4 +1,4 @@
-//! Pages about the problems that a check of a trajectory finds, and about parameters that a controller still needs.
+//! Pages about the problems that the check of a trajectory finds, and about parameters that a controller has not received.
 
 use super::{Family, Page, page};
 use crate::check::ProblemKind;
@@ -20,8 +20,8 @@ pub(super) const MISSING: &[Page] = &[
     missing(2, "missing-arm-model", "The controller has no masses and frames of the arm, and waits in Init."),
 ];
 
-/// Declares the pages of the check, each with kind, name, meaning, usual cause, remedy and next command. By default, the next command is
-/// another check.
+/// Declares the pages about problems of a trajectory. Each page has a kind, name, meaning, usual cause, remedy and next command. By
+/// default, the next command is `jtc traj check FILE`.
 macro_rules! found {
     (@next) => { "jtc traj check FILE" };
     (@next $command:literal) => { $command };

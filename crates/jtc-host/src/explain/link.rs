@@ -1,4 +1,4 @@
-//! Pages about the records of received frames.
+//! Pages about the data status and the frame status of a response.
 
 use super::entries;
 

@@ -1,11 +1,11 @@
-//! Pages about the causes of a held stop (J-69). The page with number 0 is about the held stop itself.
+//! Pages about the causes of a held stop (J-69). The page with the number 0 is about held stops in general.
 
 use jtc_wire::StopKind;
 
 use super::{Family, Page, page};
 
-/// Declares the pages of the causes of a held stop, each with kind, name, meaning, usual cause, remedy and next command. By default, the
-/// next command is `jtc clear`.
+/// Declares the pages about the causes of a held stop. Each page has a kind, name, meaning, usual cause, remedy and next command. By
+/// default, the next command is `jtc clear`.
 macro_rules! stops {
     (@next) => { "jtc clear" };
     (@next $command:literal) => { $command };
@@ -16,7 +16,7 @@ macro_rules! stops {
     };
 }
 
-/// Page about the held stop itself.
+/// Page about held stops in general.
 pub(super) const HELD_STOP: &[Page] = &[page(
     Family::Stop,
     0,
@@ -33,7 +33,7 @@ pub(super) const HELD_STOP: &[Page] = &[page(
     ],
 )];
 
-/// Pages about the causes, in the order of the cause numbers.
+/// Pages about the causes of a held stop, in the order of the cause numbers.
 pub(super) const CAUSES: &[Page] = &KINDS;
 
 stops! {

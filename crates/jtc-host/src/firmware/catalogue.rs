@@ -1,4 +1,4 @@
-//! Catalogue of the installed images: a folder with `firmware.json`.
+//! Catalogue of the installed firmware images: a folder that contains the images and the list `firmware.json`.
 
 use std::env;
 use std::fs;
@@ -10,28 +10,28 @@ use super::{FLASH, FirmwareError, Image};
 
 /// Name of the file that lists the images.
 const FILE: &str = "firmware.json";
-/// Folder in which packages install the images.
+/// Folder in which packages install the images, relative to the installation prefix.
 const INSTALLED: &str = "share/openjtc/firmware";
-/// Environment variable with a folder that replaces the default folders.
+/// Environment variable that contains a folder with a catalogue. The folder in this variable replaces the default folders.
 const VARIABLE: &str = "OPENJTC_FIRMWARE";
 
-/// Entry of the catalogue for one image.
+/// Entry in the catalogue about one image.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 pub struct CatalogueImage {
-    /// Board of the image.
+    /// Name of the board for which the image was built.
     pub board: String,
-    /// Name of the file, in the folder of the catalogue.
+    /// Name of the image file in the folder of the catalogue.
     pub file: String,
-    /// SHA-256 of the file, hexadecimal.
+    /// SHA-256 of the image file, hexadecimal.
     pub sha256: String,
     /// Flash address of the first byte of the image.
     pub address: u32,
-    /// Size of the file, bytes.
+    /// Size of the image file, bytes.
     pub bytes: u64,
 }
 
 impl CatalogueImage {
-    /// Checks that the content of a file matches the catalogue.
+    /// Checks that the content of an image file matches the catalogue.
     fn check(&self, path: &Path, bytes: &[u8]) -> Result<(), FirmwareError> {
         let sha256: String = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
         if bytes.len() as u64 == self.bytes && sha256.eq_ignore_ascii_case(&self.sha256) {
@@ -51,7 +51,7 @@ impl CatalogueImage {
 pub struct Catalogue {
     /// Release version of the images.
     pub version: String,
-    /// Images.
+    /// Images in the catalogue.
     pub images: Vec<CatalogueImage>,
     /// Folder of the catalogue.
     #[serde(skip)]
@@ -59,8 +59,8 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Returns the folders in which a catalogue is searched. If the environment variable is set, it contains the only folder. Otherwise the
-    /// folders are the installation prefix of the program and the folder into which packages install images.
+    /// Returns the folders in which the program searches for a catalogue. If the environment variable is set, its value is the only folder.
+    /// Otherwise the program searches in the installation prefix of the program and in the folder into which packages install images.
     pub fn folders() -> Vec<PathBuf> {
         if let Some(folder) = env::var_os(VARIABLE).filter(|folder| !folder.is_empty()) {
             return vec![folder.into()];
@@ -75,11 +75,11 @@ impl Catalogue {
         folders
     }
 
-    /// Returns the first catalogue in `folders`.
+    /// Returns the first catalogue that is found in `folders`.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoCatalogue`], and the errors of [`Catalogue::read`].
+    /// Returns [`FirmwareError::NoCatalogue`] if no folder contains a catalogue, and the errors of [`Catalogue::read`].
     pub fn find(folders: &[PathBuf]) -> Result<Self, FirmwareError> {
         match folders.iter().find(|folder| folder.join(FILE).exists()) {
             Some(folder) => Self::read(folder),
@@ -91,7 +91,7 @@ impl Catalogue {
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::File`] and [`FirmwareError::BadCatalogue`].
+    /// Returns [`FirmwareError::File`] if the file cannot be read, and [`FirmwareError::BadCatalogue`] if its content is not valid.
     pub fn read(folder: &Path) -> Result<Self, FirmwareError> {
         let path = folder.join(FILE);
         let text =
@@ -113,12 +113,12 @@ impl Catalogue {
         Ok(catalogue)
     }
 
-    /// Returns `true` if a catalogue in the folder of this file lists the file with the same content. Returns `false` if the folder has no
-    /// readable catalogue.
+    /// Returns `true` if the catalogue in the folder of an image file lists this file with the same content. Returns `false` if the folder
+    /// does not contain a readable catalogue.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::Damaged`] if the content differs from the content in the catalogue.
+    /// Returns [`FirmwareError::Damaged`] if the content of the file differs from the catalogue.
     pub(super) fn lists(path: &Path, bytes: &[u8]) -> Result<bool, FirmwareError> {
         let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return Ok(false) };
         let Ok(catalogue) = Self::read(folder) else { return Ok(false) };
@@ -132,8 +132,9 @@ impl Catalogue {
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoBoard`], [`FirmwareError::Damaged`], [`FirmwareError::BadCatalogue`] if the file is for another board,
-    /// and the errors of [`Image::read`].
+    /// Returns [`FirmwareError::NoBoard`] if the catalogue has no image for the board. Returns [`FirmwareError::Damaged`] if the file
+    /// differs from the catalogue. Returns [`FirmwareError::BadCatalogue`] if the file is for another board. Also returns the errors of
+    /// [`Image::read`].
     pub fn image(&self, board: &str) -> Result<Image, FirmwareError> {
         let Some(listed) = self.images.iter().find(|image| image.board == board) else {
             return Err(FirmwareError::NoBoard {
@@ -171,7 +172,7 @@ mod tests {
         assert_eq!(found.image("nucleo-h743zi2").unwrap().record().board, "nucleo-h743zi2");
         let said = found.image("nucleo-f401re").unwrap_err().to_string();
         assert!(said.contains("nucleo-f401re") && said.contains("nucleo-h745zi-q, nucleo-h743zi2"), "{said}");
-        // The test changes one bit of the file.
+        // The test changes one bit of the image file.
         let path = folder.path().join("nucleo-h743zi2.bin");
         let mut bytes = fs::read(&path).unwrap();
         bytes[0x800] ^= 1;

@@ -1,4 +1,4 @@
-//! Advice if an image was not written to a board, or if the board does not run it.
+//! Advice for the user after an image was not written to a board, or if the board does not run the image.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 

@@ -1,4 +1,4 @@
-//! Drive that an ST-LINK presents on USB, with its board name and its files.
+//! USB drive that an ST-LINK presents, with the name of the board and the files on the drive.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ const LABEL_MAX: usize = 11;
 /// Maximum number of bytes read from the drive's small files.
 const TEXT_MAX: usize = 4096;
 
-/// Prefixes of the board name in a label. The first prefix is used by ST-LINK firmware since 2019, the second by older firmware.
+/// Prefixes of the board name in a label. ST-LINK firmware since 2019 uses the first prefix. Older ST-LINK firmware uses the second prefix.
 const PREFIXES: [&str; 2] = ["NOD_", "NODE_"];
 
-/// Board numbers in `MBED.HTM`, with the board names in labels.
+/// Board numbers in `MBED.HTM`, each with the board name that is used in labels.
 const CODES: [(&str, &str); 6] = [
     ("0813", "H743ZI"),
     ("0836", "H743ZI2"),
@@ -23,32 +23,33 @@ const CODES: [(&str, &str); 6] = [
     ("0847", "H745I-DISCO"),
 ];
 
-/// Drive with the description of the board in its files.
+/// Drive of an ST-LINK, with the information from its files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Drive {
-    /// Mount point.
+    /// Mount point of the drive.
     pub path: PathBuf,
-    /// Label of the drive, if the operating system knows it.
+    /// Label of the drive; `None` if the operating system does not report it. If the block device is unknown, the label is the name of the
+    /// folder.
     pub label: Option<String>,
-    /// Board number in `MBED.HTM`, if the file contains one.
+    /// Board number in `MBED.HTM`; `None` if the file does not contain a board number.
     pub code: Option<String>,
     /// Content of `DETAILS.TXT`: version and build date of the ST-LINK firmware, one line each.
     pub details: String,
-    /// Block device of the drive, such as `/dev/sda`, if the operating system knows it.
+    /// Block device of the drive, such as `/dev/sda`; `None` if the operating system does not report the device.
     pub device: Option<PathBuf>,
-    /// USB device to which the drive belongs, if the operating system knows it.
+    /// USB device to which the drive belongs; `None` if the operating system does not report the USB device.
     pub usb: Option<UsbDevice>,
-    /// Number of the file system at the path, if the operating system has such numbers. The number shows a removal of the drive, because
-    /// the path then belongs to another file system.
+    /// Number of the file system at the mount point; `None` if the operating system has no such numbers. After the drive is removed, the
+    /// path belongs to another file system and the number changes.
     pub volume: Option<u64>,
 }
 
-/// USB device of the ST-LINK of a board, which presents a drive, a serial port and a debugger.
+/// USB device of a board's ST-LINK. The USB device presents a drive, a serial port and a debugger.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbDevice {
-    /// Folder in the device tree of the operating system. The name of this folder contains the USB connector.
+    /// Folder of the USB device in the device tree of the operating system. The name of this folder contains the USB connector.
     pub folder: PathBuf,
-    /// Device number on the USB bus. The number changes each time the device is plugged in.
+    /// Number of the device on the USB bus. The number changes each time the device is plugged in.
     pub number: String,
 }
 
@@ -60,7 +61,7 @@ pub enum Fit {
     Same,
     /// The drive does not name its board, or contains only a part of the board name.
     Unknown,
-    /// The drive belongs to another board.
+    /// The drive belongs to a different board.
     Other,
 }
 
@@ -69,7 +70,7 @@ impl Drive {
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoDrive`] if the folder does not contain a file of an ST-LINK drive.
+    /// Returns [`FirmwareError::NoDrive`] if the folder does not contain a file of an ST-LINK drive.
     pub fn at(path: &Path) -> Result<Self, FirmwareError> {
         let no_drive = |why: &str| FirmwareError::NoDrive { path: path.to_owned(), why: why.to_owned() };
         if !path.is_dir() {
@@ -81,7 +82,7 @@ impl Drive {
         }
         Ok(Self {
             path: path.to_owned(),
-            // If the operating system mounts a drive automatically, it uses the label as the folder name.
+            // If the operating system mounts a drive automatically, the label of the drive is the name of the folder.
             label: path.file_name().map(|name| name.to_string_lossy().into_owned()),
             code: page.as_deref().and_then(code),
             details: details.unwrap_or_default(),
@@ -91,15 +92,15 @@ impl Drive {
         })
     }
 
-    /// Adds the information about the drive that the operating system provides. The label of the device replaces the folder name, which can
-    /// be misleading. The operating system appends a digit to the folder name of a second drive with the same label. So the folder
-    /// `NODE_H743ZI2` may belong to a NUCLEO-H743ZI.
+    /// Adds the information about the drive that the operating system provides. The label of the block device replaces the folder name,
+    /// because the folder name can be wrong. The operating system appends a digit to the folder name of a second drive with the same label.
+    /// For example, the folder `NODE_H743ZI2` may belong to a NUCLEO-H743ZI.
     pub fn of_system(self, device: PathBuf, label: Option<String>, usb: Option<UsbDevice>) -> Self {
         Self { device: Some(device), label, usb, ..self }
     }
 
-    /// Returns the board name in the form used in labels (`H745ZIQ`), and `true` if the name is complete. Returns `None` if the drive does
-    /// not name its board.
+    /// Returns the board name in the form that drive labels use (`H745ZIQ`), and `true` if the name is complete. Returns `None` if the
+    /// drive does not name its board.
     pub fn board(&self) -> Option<(&str, bool)> {
         let by_code =
             |code: &String| CODES.iter().find(|(known, _)| known == code).map(|(_, name)| (*name, true));
@@ -121,7 +122,7 @@ impl Drive {
         let wanted = short_name(board);
         match self.board() {
             Some((name, _)) if name == wanted => Fit::Same,
-            // A label of maximum length may contain only the beginning of a board name.
+            // A label with the maximum length may contain only the beginning of a board name.
             Some((name, false)) if wanted.starts_with(name) => Fit::Unknown,
             Some(_) => Fit::Other,
             None => Fit::Unknown,
@@ -146,13 +147,14 @@ pub(super) fn volume(found: &fs::Metadata) -> Option<u64> {
     Some(found.dev())
 }
 
-/// Returns `None`, because this system does not number its file systems.
+/// Returns `None`, because this operating system does not number its file systems.
 #[cfg(not(unix))]
 pub(super) fn volume(_: &fs::Metadata) -> Option<u64> {
     None
 }
 
-/// Returns the board name in the form used in labels. `nucleo-h745zi-q-ldo` and `nucleo-h745zi-q` are names of the same board, `H745ZIQ`.
+/// Returns the board name in the form that drive labels use. `nucleo-h745zi-q-ldo` and `nucleo-h745zi-q` are names of the same board,
+/// `H745ZIQ`.
 fn short_name(board: &str) -> String {
     let name = same_board(board);
     name.strip_prefix("nucleo-").unwrap_or(name).replace('-', "").to_uppercase()
@@ -174,14 +176,14 @@ fn text(folder: &Path, file: &str) -> Option<String> {
     Some(String::from_utf8_lossy(&bytes[..bytes.len().min(TEXT_MAX)]).into_owned())
 }
 
-/// Returns the first four digits after `code=`. These digits are the number of the board.
+/// Returns the four digits after the first `code=`, which are the number of the board.
 fn code(page: &str) -> Option<String> {
     let (_, behind) = page.split_once("code=")?;
     let code = behind.get(..4)?;
     code.bytes().all(|byte| byte.is_ascii_hexdigit()).then(|| code.to_owned())
 }
 
-/// Returns `true` if the chip of this board has a second core, which starts at the beginning of bank 2 of the flash.
+/// Returns `true` if the chip of this board has a second core. The second core starts at the beginning of bank 2 of the flash.
 pub(super) fn has_second_core(board: &str) -> bool {
     ["nucleo-h745", "nucleo-h755"].iter().any(|chip| board.starts_with(chip))
 }

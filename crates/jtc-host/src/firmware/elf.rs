@@ -1,14 +1,14 @@
-//! Extraction of the flash content from an ELF file. The parser supports only the necessary part of the ELF format.
+//! Parser that extracts the flash content from an ELF file. The parser supports only the necessary part of the ELF format.
 
 use super::image::{ERASED, FLASH, STORED_ARM};
 
 /// First bytes of a 32-bit little-endian ELF file.
 const MAGIC: [u8; 6] = [0x7F, b'E', b'L', b'F', 1, 1];
-/// ELF type of a segment that is loaded.
+/// ELF type of a segment that is loaded into memory.
 const PT_LOAD: u32 = 1;
-/// ELF machine number of Arm.
+/// Machine number of the Arm architecture in ELF files.
 const EM_ARM: u16 = 40;
-/// Maximum number of segments. The programs of this project have fewer segments.
+/// Maximum number of segments in an ELF file. The programs of this project have fewer segments.
 const SEGMENTS_MAX: u16 = 64;
 
 /// Returns `true` if the file is an ELF file of any kind.
@@ -16,8 +16,8 @@ pub(super) fn is_elf(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC[..4])
 }
 
-/// Returns the flash content from the file; the result starts at the first byte of the flash. Gaps are filled with the value of erased
-/// flash.
+/// Returns the flash content from an ELF file. The first byte of the result is the first byte of the flash. Gaps are filled with the value
+/// of erased flash.
 pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let damaged = || "an incomplete or damaged ELF file".to_owned();
     let half =
@@ -63,7 +63,7 @@ pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
 mod tests {
     use super::*;
 
-    /// Builds an ELF file with these segments. Each segment consists of an address and bytes.
+    /// Builds an ELF file with the segments `segments`. Each segment consists of an address and bytes.
     fn file(segments: &[(u32, &[u8])]) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.resize(52, 0);
@@ -106,7 +106,7 @@ mod tests {
         let mut other = bytes.clone();
         other[18] = 62;
         assert!(flat(&other).unwrap_err().contains("another processor"));
-        // Arbitrary numbers must not cause a panic.
+        // Arbitrary numbers in the file must not cause a panic.
         for at in 28..bytes.len() - 4 {
             let mut wild = bytes.clone();
             wild[at..at + 4].fill(0xFF);

@@ -8,14 +8,14 @@ use jtc_wire::{Code, ControllerState};
 use super::{CatalogueImage, DriveAfter};
 use crate::port::PortError;
 
-/// Reason why a board was not flashed, or why it is not certain that the board runs the flashed image.
+/// Reason why a board was not flashed, or why it is not verified that the board runs the image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirmwareError {
     /// A file cannot be read.
     #[error("{}: {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Error of the operating system.
         source: io::Error,
@@ -23,12 +23,12 @@ pub enum FirmwareError {
     /// The file is not firmware for these boards.
     #[error("{}: not firmware for a board of this project: {why}", path.display())]
     NoImage {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Description of the fault in the file.
+        /// Text that describes the fault in the file.
         why: String,
     },
-    /// No images are installed.
+    /// No catalogue of firmware images is installed.
     #[error("no firmware images are installed: no firmware.json in {}", listed(folders))]
     NoCatalogue {
         /// Folders that were searched.
@@ -37,17 +37,17 @@ pub enum FirmwareError {
     /// The catalogue of images is invalid, or does not match the image files.
     #[error("{}: {why}", path.display())]
     BadCatalogue {
-        /// The catalogue.
+        /// Path of the catalogue.
         path: PathBuf,
-        /// Description of the fault in the catalogue.
+        /// Text that describes the fault in the catalogue.
         why: String,
     },
     /// The catalogue has no image for this board.
     #[error("no image for the board {board}; the images are for {}", known.join(", "))]
     NoBoard {
-        /// Requested board.
+        /// Name of the requested board.
         board: String,
-        /// Boards in the catalogue.
+        /// Names of the boards in the catalogue.
         known: Vec<String>,
     },
     /// A file differs from the file of the release.
@@ -55,27 +55,27 @@ pub enum FirmwareError {
         "{}: this is not the released file: {bytes} bytes with the SHA-256 {sha256}, expected {} with {}", path.display(), listed.bytes, listed.sha256
     )]
     Damaged {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// SHA-256 of the file.
         sha256: String,
         /// Length of the file, bytes.
         bytes: u64,
-        /// Entry of the catalogue.
+        /// Entry of the file in the catalogue.
         listed: Box<CatalogueImage>,
     },
-    /// The folder is not a drive of an ST-LINK.
+    /// The folder is not the mount point of an ST-LINK drive.
     #[error("{}: not the drive of an ST-LINK: {why}", path.display())]
     NoDrive {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
-        /// Reason.
+        /// Reason why the folder is not a drive.
         why: String,
     },
-    /// No drive is mounted.
+    /// No ST-LINK drive is mounted.
     #[error("no drive of an ST-LINK is mounted")]
     NoneFound,
-    /// The user selected no drive, and several are mounted.
+    /// Several ST-LINK drives are mounted, but the user did not select one of them.
     #[error("several drives of ST-LINKs are mounted: {}", listed(drives))]
     Several {
         /// Mount points of the drives.
@@ -84,18 +84,18 @@ pub enum FirmwareError {
     /// Before flashing, the program must query the board over a serial port, but the port cannot be used.
     #[error("the board must report its state over {port} before it is flashed: {source}")]
     NotAsked {
-        /// The port.
+        /// Name of the serial port.
         port: String,
         /// Reason why the port cannot be used.
         source: PortError,
     },
-    /// The drive or board has changed since it was checked.
+    /// The drive or the board has changed since the last check.
     #[error("{what}")]
     Changed {
-        /// Description of the change.
+        /// Text that describes the change.
         what: String,
     },
-    /// The arm has or may have torque, so the board must not be reset.
+    /// The arm is or may be under torque, so the board must not be reset.
     #[error(
         "the controller at {port} holds an arm (state {state}); flashing resets the board, and the arm falls"
     )]
@@ -110,43 +110,43 @@ pub enum FirmwareError {
     OtherController {
         /// Port of the controller.
         port: String,
-        /// Board that the controller reports.
+        /// Name of the board that the controller reports.
         runs: String,
-        /// Board of the image.
+        /// Board for which the image was built.
         board: String,
     },
-    /// The drive belongs to another board.
+    /// The drive belongs to a different board than the image.
     #[error("{}: this drive belongs to a board {named}, but the image is for {board}", drive.display())]
     OtherBoard {
-        /// The drive.
+        /// Path of the drive.
         drive: PathBuf,
         /// Board name on the drive.
         named: String,
-        /// Board of the image.
+        /// Board for which the image was built.
         board: String,
     },
     /// The drive does not name its board.
     #[error("{}: the drive{} does not report its board; the image is for {board}", drive.display(), of_label(label))]
     UnnamedBoard {
-        /// The drive.
+        /// Path of the drive.
         drive: PathBuf,
-        /// Label of the drive.
+        /// Label of the drive; `None` if the label is unknown.
         label: Option<String>,
-        /// Board of the image.
+        /// Board for which the image was built.
         board: String,
     },
     /// The wiring of the board may use a core supply that does not match the image.
     #[error("the image is for {board}, {}", as_supplied(board, runs))]
     Supply {
-        /// Board of the image.
+        /// Board for which the image was built.
         board: String,
-        /// Board of the running program, if the controller reports it and if it differs from the board of the image.
+        /// Board of the running program; `None` if the controller does not report its board, or if this board is the board of the image.
         runs: Option<String>,
     },
-    /// The drive has no space for a file of this size.
+    /// The drive does not have space for the image file.
     #[error("{}: the drive has no space for {bytes} bytes{}", drive.display(), with_failure(failure))]
     DriveFull {
-        /// The drive.
+        /// Path of the drive.
         drive: PathBuf,
         /// Size of the image, bytes.
         bytes: usize,
@@ -158,7 +158,7 @@ pub enum FirmwareError {
     NotOpened {
         /// Path of the file on the drive.
         path: PathBuf,
-        /// Block device of the drive, if it is known.
+        /// Block device of the drive; `None` if the device is unknown.
         device: Option<PathBuf>,
         /// Error of the operating system.
         source: io::Error,
@@ -176,12 +176,12 @@ pub enum FirmwareError {
     /// The ST-LINK reports that it could not write the image.
     #[error("{}: the ST-LINK could not write the image: {text}", drive.display())]
     Refused {
-        /// The drive.
+        /// Path of the drive.
         drive: PathBuf,
         /// Content of `FAIL.TXT`.
         text: String,
     },
-    /// The drive does not behave as it does after it has accepted an image.
+    /// The drive does not behave like a drive that has accepted an image.
     #[error("the image was copied, but {seen}{}", with_doubt(doubt))]
     NotTaken {
         /// Observed behaviour of the drive.
@@ -192,14 +192,14 @@ pub enum FirmwareError {
     /// The running program differs from the image.
     #[error("the board does not run {}: {why}; it reports {runs}", path.display())]
     OtherProgram {
-        /// The image.
+        /// Path of the image file.
         path: PathBuf,
         /// Version and board that the controller reports.
         runs: String,
-        /// Difference between the flash of the board and the image.
+        /// Text that describes the difference between the flash of the board and the image.
         why: String,
     },
-    /// The running program does not report the content of its flash.
+    /// The program on the board does not report the content of its flash.
     #[error(
         "the board runs {runs}, which does not report the content of its flash, so the image cannot be verified"
     )]
@@ -210,15 +210,15 @@ pub enum FirmwareError {
     /// No controller answers on the serial line.
     #[error("no controller answers")]
     NoController,
-    /// No controller started in time.
+    /// No controller started with the image in time.
     #[error(
         "the image was copied, but no controller started with it within {waited_s:.0} s: {last}{}",
         with_doubt(doubt)
     )]
     NotStarted {
-        /// Waiting time, s.
+        /// Time for which the program waited, s.
         waited_s: f64,
-        /// Last observation.
+        /// Text that describes the last observation.
         last: String,
         /// Error that the operating system reported during the copying.
         doubt: Option<String>,

@@ -1,4 +1,4 @@
-//! Test doubles: images, a board on a line, and the drive of its ST-LINK.
+//! Test doubles: firmware images, a board on a serial line, and the drive of the board's ST-LINK.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,12 +17,13 @@ use crate::port::{Port, PortError};
 /// Size of the program in an image, bytes.
 const PROGRAM: usize = 0x1000;
 
-/// Returns an image for a board; the content depends on `seed`. If the board has a second core, the image contains a program for it.
+/// Returns an image for a board. The content of the image depends on `seed`. If the board has a second core, the image contains a program
+/// for this core.
 pub(super) fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     let mut bytes = vec![0; PROGRAM];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
     bytes[4..8].copy_from_slice(&0x0800_0601u32.to_le_bytes());
-    // Interrupt handler at the end of the program.
+    // The sixth vector is the address of an interrupt handler at the end of the program.
     bytes[20..24].copy_from_slice(&0x0800_0F05u32.to_le_bytes());
     let record = &mut bytes[0x400..0x460];
     record[..8].copy_from_slice(b"OPENJTC\0");
@@ -43,7 +44,7 @@ pub(super) fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     bytes
 }
 
-/// Returns the report about the flash that a device with this image sends. The function computes the CRC bit by bit from the definition.
+/// Returns the report about the flash that a device with this image sends. The function computes the CRC bit by bit from its definition.
 pub(super) fn program_of(image: &[u8]) -> Program {
     let bytes = &image[..PROGRAM];
     let mut register = u32::MAX;
@@ -74,7 +75,7 @@ pub(super) fn catalogue(folder: &Path, boards: &[&str]) {
     fs::write(folder.join("firmware.json"), text).unwrap();
 }
 
-/// Processor of a board, with the content of its flash.
+/// Simulated processor of a board, with the content of its flash.
 #[derive(Clone)]
 pub(super) struct Board(Arc<Mutex<Flashed>>);
 
@@ -84,13 +85,13 @@ struct Flashed {
     program: Option<Program>,
     board: String,
     started: Instant,
-    /// Running time at the beginning of the test, ms.
+    /// Time for which the board has run before the test began, ms.
     before_ms: u64,
     status: Status,
 }
 
 impl Board {
-    /// Creates a board that has run this image for an hour. The arm is configured and has no torque.
+    /// Creates a board that has run the program for an hour. The arm is configured and its torque is off.
     pub(super) fn running(board: &str, program: Option<Program>) -> Self {
         let mut status = Status { state: jtc_wire::ControllerState::Init.into(), ..Status::default() };
         status.joints.iter_mut().for_each(|joint| joint.state = jtc_wire::NodeState::READY);
@@ -104,17 +105,17 @@ impl Board {
         })))
     }
 
-    /// Changes the status that the board sends from now on.
+    /// Changes the status that the board sends after this call.
     pub(super) fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.0.lock().unwrap().status);
     }
 
-    /// Stops the processor, so that the board sends no data, or releases the processor.
+    /// Stops the processor, or lets it run again. A stopped processor does not send data.
     pub(super) fn hold(&self, held: bool) {
         self.0.lock().unwrap().held = held;
     }
 
-    /// Like [`Board::hold`]. Returns the program that was running, and its board name.
+    /// Like [`Board::hold`]. Returns the program that was running, and the name of its board.
     fn hold_with(&self, held: bool) -> (Option<Program>, String) {
         self.hold(held);
         let flashed = self.0.lock().unwrap();
@@ -165,31 +166,32 @@ impl Board {
         }))
     }
 
-    /// Returns a function that opens a line to the board.
+    /// Returns a function that opens a serial line to the board.
     pub(super) fn opener(&self) -> impl FnMut() -> Result<Box<dyn Port>, PortError> {
         let board = self.clone();
         move || Ok(board.port())
     }
 }
 
-/// Reaction of an ST-LINK to a file.
+/// Reaction of a simulated ST-LINK to a file on its drive.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Behaviour {
-    /// Writes the file into the flash. The drive disappears and appears again.
+    /// The ST-LINK writes the file into the flash. The drive disappears and appears again.
     Takes,
-    /// Like `Takes`, but a part of the flash stays empty. A real ST-LINK behaves like this if the bytes arrive in another order.
+    /// Like `Takes`, but a part of the flash stays empty after the write. A real ST-LINK behaves like this if the bytes arrive in another
+    /// order.
     LeavesHole,
-    /// Like `Takes`, but the previous program restarts before the ST-LINK stops it.
+    /// Like `Takes`, but the previous program restarts once before the ST-LINK stops the processor.
     StartsBeforeAnew,
-    /// Creates `FAIL.TXT`.
+    /// The ST-LINK creates `FAIL.TXT` with this text.
     Fails(&'static str),
-    /// Ignores the file.
+    /// The ST-LINK ignores the file.
     Ignores,
 }
 
 /// Drive of a board, and a thread that acts as its ST-LINK.
 pub(super) struct StLink {
-    /// Temporary folder, removed together with the drive.
+    /// Temporary folder that contains the drive. The folder is removed together with the drive.
     _folder: tempfile::TempDir,
     pub path: PathBuf,
     stop: Arc<AtomicBool>,
@@ -208,12 +210,13 @@ impl StLink {
             let mut length = 0;
             while !end.load(Ordering::Relaxed) {
                 thread::sleep(Duration::from_millis(5));
-                // If the path is a link to a device such as `/dev/full`, reading would never end and would use all memory.
+                // The thread skips a path that is not a regular file. If the path is a link to a device such as `/dev/full`, reading would
+                // never end and would use all memory.
                 let file = at.join("openjtc.bin");
                 if !file.symlink_metadata().is_ok_and(|data| data.is_file()) {
                     continue;
                 }
-                // The file is incomplete while its size still increases.
+                // While the size of the file increases, the file is incomplete.
                 let Ok(bytes) = fs::read(&file) else { continue };
                 if Image::parse(&file, bytes.clone()).is_err() || bytes.len() != length {
                     length = bytes.len();
@@ -227,7 +230,7 @@ impl StLink {
         Self { _folder: folder, path, stop, thread: Some(thread) }
     }
 
-    /// Returns the drive in the form in which a program finds it.
+    /// Returns the drive as a program that searches for drives finds it.
     pub(super) fn drive(&self) -> Drive {
         Drive::at(&self.path).unwrap()
     }
@@ -256,7 +259,7 @@ fn work(path: &Path, board: &Board, behaviour: &Behaviour, mut bytes: Vec<u8>) {
             if *behaviour == Behaviour::LeavesHole {
                 bytes[0x800..0xA00].fill(0);
             }
-            // The program must start later than the tolerance for clock differences.
+            // The delay until the program starts must be longer than the tolerance for clock differences.
             thread::sleep(Duration::from_millis(400));
             if *behaviour == Behaviour::StartsBeforeAnew {
                 board.start_with(&name, before);

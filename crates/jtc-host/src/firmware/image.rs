@@ -1,4 +1,4 @@
-//! Flash image of a board. The image is read from a file and checked before it is used.
+//! Flash image of a board. The program reads the image from a file and checks the image before the image is used.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,30 +12,30 @@ use super::{Catalogue, FirmwareError};
 
 /// First address of the flash.
 pub const FLASH: u32 = 0x0800_0000;
-/// Size of bank 1, which holds the program, in bytes.
+/// Size of bank 1 of the flash, bytes. Bank 1 contains the program.
 pub(super) const BANK1: usize = 1024 * 1024;
-/// Offset of the memory for the stored arm. An image must end before this offset.
+/// Offset of the flash memory for the stored arm. An image must end before this offset.
 pub(super) const STORED_ARM: usize = 0x1C_0000;
-/// Number of words in the vector table at the beginning of a program: the stack, and the entries of the core's and the
-/// chip's interrupts.
+/// Number of words in the vector table at the beginning of a program. The table contains the stack pointer and the interrupt vectors of the
+/// core and the chip.
 const VECTORS: usize = 166;
-/// Value of erased flash.
+/// Value of a byte in erased flash.
 pub(super) const ERASED: u8 = 0xFF;
 
-/// Memories that can contain a stack: the tightly coupled memory and the memory on the AXI bus. Each entry contains the first address and
-/// the first address after the end.
+/// Memories that can contain a stack: the tightly coupled memory and the memory on the AXI bus. Each entry contains the first address of
+/// the memory and the first address after the memory.
 const STACKS: [(u32, u32); 2] = [(0x2000_0000, 0x2002_0000), (0x2400_0000, 0x2408_0000)];
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// Record in the image with a description of the image.
+/// Record in an image that describes the image.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Record {
-    /// Version of the firmware.
+    /// Version of the firmware in the image.
     pub version: String,
-    /// Board of the image.
+    /// Name of the board for which the image was built.
     pub board: String,
-    /// Commit, with `+` if files were changed after that commit.
+    /// Commit from which the image was built, with `+` if files were changed after this commit.
     pub build: String,
     /// Bit rate of the serial lines, Bd.
     pub baud: u32,
@@ -45,12 +45,12 @@ impl Record {
     /// Offset of the record in the image.
     pub const OFFSET: usize = 0x400;
     const MAGIC: &[u8] = b"OPENJTC\0";
-    /// Size of the first version of the record, bytes. Later versions are longer.
+    /// Size of the first version of the record, bytes. Later versions of the record are longer.
     const LEN: usize = 96;
     /// Bit rates that are valid in a record, Bd.
     const RATES: std::ops::RangeInclusive<u32> = 9_600..=15_000_000;
 
-    /// Reads the record of an image; `None` if the offset does not contain a record.
+    /// Reads the record of an image. Returns `None` if the image does not contain a record at this offset.
     pub fn parse(image: &[u8]) -> Option<Self> {
         let bytes = image.get(Self::OFFSET..Self::OFFSET + Self::LEN)?;
         let size = u16::from_le_bytes([bytes[10], bytes[11]]);
@@ -86,13 +86,13 @@ impl std::fmt::Debug for Image {
 }
 
 impl Image {
-    /// Reads a binary or an ELF file, and checks that it is firmware for a board of this project. If a catalogue in the same folder lists
-    /// the file, the content must match the catalogue.
+    /// Reads a binary or an ELF file, and checks that the file is firmware for a board of this project. If a catalogue in the same folder
+    /// lists the file, the content must match the catalogue.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::File`] if the file cannot be read, [`FirmwareError::NoImage`] if the file is not firmware for these boards, and
-    /// [`FirmwareError::Damaged`] if the file differs from the catalogue.
+    /// Returns [`FirmwareError::File`] if the file cannot be read. Returns [`FirmwareError::NoImage`] if the file is not firmware for these
+    /// boards. Returns [`FirmwareError::Damaged`] if the file differs from the catalogue.
     pub fn read(path: &Path) -> Result<Self, FirmwareError> {
         let bytes = fs::read(path).map_err(|source| FirmwareError::File { path: path.to_owned(), source })?;
         let listed = Catalogue::lists(path, &bytes)?;
@@ -100,13 +100,13 @@ impl Image {
         Ok(if listed { image.listed() } else { image })
     }
 
-    /// Like [`Image::read`], but takes the content `bytes` of the file at `path`, and does not use a catalogue.
+    /// Like [`Image::read`], but uses `bytes` as the content of the file `path`, and does not use a catalogue.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoImage`].
+    /// Returns [`FirmwareError::NoImage`] if the file is not firmware for these boards.
     pub fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, FirmwareError> {
-        // An ELF file contains the lengths of all its parts, so a truncated file is detected.
+        // An ELF file contains the lengths of all its segments, so the parser detects a truncated ELF file.
         let whole = elf::is_elf(&bytes);
         let flat = if whole { elf::flat(&bytes) } else { Ok(bytes) };
         let looked_at = flat.and_then(|bytes| Ok((examine(&bytes)?, bytes)));
@@ -115,13 +115,13 @@ impl Image {
         Ok(Self { path: path.to_owned(), bytes, record, whole })
     }
 
-    /// Marks the image as complete, because a catalogue contains its length and digest.
+    /// Marks the image as complete, because a catalogue lists the same length and digest.
     pub(super) fn listed(self) -> Self {
         Self { whole: true, ..self }
     }
 
-    /// Returns `true` if the image is known to be complete, because of the file format or a catalogue. Without a catalogue, only some
-    /// truncated binary files are detected.
+    /// Returns `true` if an ELF file or a catalogue proves that the image is complete. Without a catalogue, only some truncated binary
+    /// files are detected.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
@@ -141,13 +141,12 @@ impl Image {
         &self.record
     }
 
-    /// Checks that the flash report of a device matches this image (J-67). The CRC over the bytes that the device has read must equal the
-    /// CRC of these bytes in the image. The remaining part of bank 1 in the image may contain only filler bytes (0 or the value of erased
-    /// flash).
+    /// Checks that the flash report of a device matches this image (J-67). The CRC that the device reports must equal the CRC over the same
+    /// number of bytes in the image. After these bytes, bank 1 of the image may contain only filler bytes (0 or the value of erased flash).
     ///
     /// # Errors
     ///
-    /// Returns a description of the difference.
+    /// Returns a text that describes the difference.
     pub fn is_what_runs(&self, program: Program) -> Result<(), String> {
         let bank1 = &self.bytes[..self.bytes.len().min(BANK1)];
         let Some((read, rest)) = bank1.split_at_checked(program.bytes as usize) else {
@@ -212,7 +211,7 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
 fn starts_second_core(bytes: &[u8]) -> bool {
     let bank2 = FLASH + BANK1 as u32;
     let reset = bytes.get(BANK1 + 4..BANK1 + 8).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    // The program begins with two instructions; the second instruction jumps back to the first one.
+    // The program of the second core begins with two instructions. The second instruction jumps back to the first instruction.
     reset.is_some_and(|reset| {
         reset % 2 == 1 && reset >= bank2 && (reset & !1) + 4 <= FLASH + bytes.len() as u32
     })
@@ -273,7 +272,7 @@ mod tests {
             let said = parsed(good[..end].to_vec()).unwrap_err();
             assert!(said.contains("incomplete") && said.contains("second core"), "{end}: {said}");
         }
-        // The other board has only one core.
+        // The NUCLEO-H743ZI2 has only one core.
         assert_eq!(image_bytes("nucleo-h743zi2", 7).len(), 0x1000);
         assert!(parsed(image_bytes("nucleo-h743zi2", 7)).is_ok());
     }
@@ -284,14 +283,14 @@ mod tests {
         let path = folder.path().join("nucleo-h743zi2.bin");
         fs::write(&path, image_bytes("nucleo-h743zi2", 7)).unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
-        // A catalogue of other files and an invalid catalogue do not affect the result for the file.
+        // A catalogue that does not list the file, and an invalid catalogue, have no effect on the image.
         catalogue(folder.path(), &["nucleo-h745zi-q"]);
         assert!(!Image::read(&path).unwrap().is_whole());
         fs::write(folder.path().join("firmware.json"), "{").unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
         catalogue(folder.path(), &["nucleo-h743zi2"]);
         assert!(Image::read(&path).unwrap().is_whole());
-        // The test truncates the file at a position at which the file content does not show the truncation.
+        // The test truncates the file at a position at which only the catalogue shows the truncation.
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..0xFF0]).unwrap();
         assert!(parsed(bytes[..0xFF0].to_vec()).is_ok());
@@ -303,7 +302,7 @@ mod tests {
         let image = parsed(image_bytes("nucleo-h743zi2", 7)).unwrap();
         let program = program_of(image.bytes());
         assert_eq!(image.is_what_runs(program), Ok(()));
-        // The two words of the second core, far after the program, and the filler in the gap are not compared.
+        // The comparison ignores the words of the second core in bank 2 and the filler bytes before bank 2.
         for gap in [0, 0xFF] {
             let mut longer = image.bytes().to_vec();
             longer.resize(BANK1, gap);

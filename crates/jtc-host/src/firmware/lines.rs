@@ -1,7 +1,8 @@
 //! Serial lines on which the program queries the controller of a board before it flashes the board.
 //!
-//! The drive and the serial port of an ST-LINK belong to the same USB device. So this port is connected to the board that is flashed, and
-//! is always queried. The caller can pass one more port, because another program may use the controller over its RS422 line.
+//! The drive and the serial port of an ST-LINK belong to the same USB device. Therefore this serial port is connected to the board that is
+//! flashed, and the program always queries this port. The caller can add one more port, because another program may use the controller over
+//! its RS422 line.
 
 use std::fs;
 use std::path::PathBuf;
@@ -14,8 +15,7 @@ use crate::session::Session;
 /// Function that opens a serial port for exclusive use by this program.
 pub type OpenLine<'a> = dyn FnMut(&str) -> Result<Box<dyn Port>, PortError> + 'a;
 
-/// Serial lines on which controllers are queried. While these lines are open, other programs and agents cannot reach a controller through
-/// them.
+/// Serial lines on which the program queries controllers. While these lines are open, other programs and agents cannot use them.
 pub struct Lines(Vec<Line>);
 
 struct Line {
@@ -25,11 +25,11 @@ struct Line {
 }
 
 impl Lines {
-    /// Opens the serial ports of the drive's own USB device, and the port `named` if the caller passes one.
+    /// Opens the serial ports of the drive's USB device. Also opens the port `named` if the caller selected a port.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NotAsked`] if a port of the drive's own device cannot be opened, or the port `named` is in use;
+    /// Returns [`FirmwareError::NotAsked`] if a port of the drive's USB device cannot be opened, or if the port `named` is in use. Returns
     /// [`FirmwareError::Port`] if the port `named` cannot be opened for another reason.
     pub fn open(
         places: &Places,
@@ -58,7 +58,7 @@ impl Lines {
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NotAsked`] if a port is lost.
+    /// Returns [`FirmwareError::NotAsked`] if a port is lost.
     pub fn look(&mut self) -> Result<Preflight, FirmwareError> {
         let ask = |line: &mut Line| {
             let answers = look(&mut line.session).map_err(|error| match error {
@@ -70,8 +70,9 @@ impl Lines {
         Ok(Preflight { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
     }
 
-    /// Returns the serial line on which the new program is verified. This is the line of the board itself, or, if the board has no line,
-    /// the line that the user selected. The second value is `true` if the line belongs to the drive's USB device.
+    /// Returns the serial line on which the new program is verified. The verification uses the line of the board's ST-LINK. If the ST-LINK
+    /// has no known serial line, the verification uses the line that the user selected. The second value of the result is `true` if the
+    /// line belongs to the drive's USB device.
     pub fn proving(&self) -> Option<(&str, Option<bool>)> {
         self.0.first().map(|line| (line.port.as_str(), line.same_device))
     }
@@ -81,7 +82,7 @@ fn not_asked(port: &str, source: PortError) -> FirmwareError {
     FirmwareError::NotAsked { port: port.to_owned(), source }
 }
 
-/// Returns the device node to which a port name refers, after all symbolic links.
+/// Returns the device node to which a port name refers. Symbolic links are resolved.
 fn real(port: &str) -> PathBuf {
     fs::canonicalize(port).unwrap_or_else(|_| port.into())
 }

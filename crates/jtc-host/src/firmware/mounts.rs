@@ -5,23 +5,23 @@ use std::path::{Path, PathBuf};
 
 use super::{Drive, FirmwareError, UsbDevice};
 
-/// Locations at which the operating system lists drives and ports.
+/// Paths at which the operating system lists drives and serial ports.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// Path of the mount table, which has the Linux format.
     pub mounts: PathBuf,
-    /// Folder with links from volume labels to devices.
+    /// Folder that contains a link from each volume label to its device.
     pub by_label: PathBuf,
-    /// Folders whose subfolders may be drives.
+    /// Folders whose subfolders may be mount points of drives.
     pub folders: Vec<PathBuf>,
-    /// Folder of the device classes, with links into the device tree.
+    /// Folder of the device classes, which contains links into the device tree.
     pub classes: PathBuf,
-    /// Folder of the device nodes.
+    /// Folder that contains the device nodes.
     pub nodes: PathBuf,
 }
 
 impl Places {
-    /// Returns the locations on this computer.
+    /// Returns the paths on this computer.
     pub fn of_system() -> Self {
         let mut folders: Vec<PathBuf> = vec!["/Volumes".into()];
         if cfg!(windows) {
@@ -57,7 +57,7 @@ impl Places {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Drive::at`].
+    /// Returns the same errors as [`Drive::at`].
     pub fn at(&self, path: &Path) -> Result<Drive, FirmwareError> {
         let drive = Drive::at(path)?;
         let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -68,11 +68,11 @@ impl Places {
         })
     }
 
-    /// Checks that the drive is still present and that it was not replaced by another drive.
+    /// Checks that the drive is still present and was not replaced by another drive.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::Changed`] if the drive was removed or replaced; no byte was written.
+    /// Returns [`FirmwareError::Changed`] if the drive was removed or replaced. If this error is returned, no byte was written.
     pub fn still_there(&self, drive: &Drive) -> Result<(), FirmwareError> {
         let what = match self.at(&drive.path) {
             Ok(now) if now == *drive => return Ok(()),
@@ -82,8 +82,8 @@ impl Places {
         Err(FirmwareError::Changed { what: format!("{}: {what}", drive.path.display()) })
     }
 
-    /// Returns the current state of the drive. The function looks for the drive at its path. If its USB device is known, the function also
-    /// finds the drive in another folder after it was unplugged and plugged in again.
+    /// Searches for the drive at its path and returns its current state. If the drive was unplugged and plugged in again, it may be mounted
+    /// in another folder. The function finds the drive in another folder if the USB device of the drive is known.
     pub fn again(&self, drive: &Drive) -> Option<Drive> {
         let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
         let own = connector(drive);
@@ -100,8 +100,8 @@ impl Places {
         drive.of_system(device, label, usb)
     }
 
-    /// Returns devices and mount points of file systems of the types that an ST-LINK drive can have. If several devices are mounted at one
-    /// folder, only the last one is visible.
+    /// Returns the devices and mount points of all file systems that may be an ST-LINK drive, according to their type. If several devices
+    /// are mounted at one folder, only the last device is visible.
     fn mounted(&self) -> Vec<(PathBuf, PathBuf)> {
         let table = fs::read(&self.mounts).unwrap_or_default();
         let mount = |line: &[u8]| {
@@ -131,8 +131,8 @@ impl Places {
         links.into_iter().find_map(label)
     }
 
-    /// Returns the names of the serial ports on the USB device of the drive, which are the ports of its board. The list is empty if the
-    /// operating system does not report the USB devices. Linux does.
+    /// Returns the names of the serial ports on the USB device of the drive. These serial ports are connected to the board of the drive.
+    /// The list is empty if the operating system does not report the USB devices. Linux reports the USB devices.
     pub fn ports_of(&self, drive: &Drive) -> Vec<String> {
         let Some(usb) = &drive.usb else { return Vec::new() };
         let entries = fs::read_dir(self.classes.join("tty")).into_iter().flatten().flatten();
@@ -143,8 +143,8 @@ impl Places {
         ports
     }
 
-    /// Returns `true` if a serial port and a drive belong to the same USB device, which means to the same board. Returns `None` if the
-    /// operating system does not report the USB devices. Linux does.
+    /// Returns `true` if a serial port and a drive belong to the same USB device, and therefore to the same board. Returns `None` if the
+    /// operating system does not report the USB devices. Linux reports the USB devices.
     pub fn same_usb_device(&self, port: &str, drive: &Drive) -> Option<bool> {
         let of_port = self.usb_device("tty", Path::new(port))?;
         Some(of_port.folder == drive.usb.as_ref()?.folder)
@@ -154,7 +154,7 @@ impl Places {
     fn usb_device(&self, class: &str, node: &Path) -> Option<UsbDevice> {
         let node = fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
         let mut folder = fs::canonicalize(self.classes.join(class).join(node.file_name()?)).ok()?;
-        // The folder that contains a vendor id is the USB device.
+        // The folder of a USB device contains a vendor id.
         while !folder.join("idVendor").exists() {
             folder = folder.parent()?.to_owned();
         }
@@ -183,14 +183,14 @@ fn unescaped(text: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// Returns a path that consists of these bytes. The bytes may be invalid text.
+/// Returns the path that consists of these bytes. The bytes may be invalid text.
 #[cfg(unix)]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     use std::os::unix::ffi::OsStringExt as _;
     Some(std::ffi::OsString::from_vec(bytes).into())
 }
 
-/// Returns a path that consists of these bytes, if the bytes are valid text.
+/// Returns the path that consists of these bytes. Returns `None` if the bytes are not valid text.
 #[cfg(not(unix))]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     String::from_utf8(bytes).ok().map(Into::into)
@@ -205,7 +205,7 @@ mod tests {
     use super::super::Fit;
     use super::*;
 
-    /// Two boards on USB, each with a drive and a serial port, and the locations at which a system with these boards lists them.
+    /// Simulated computer with two boards on USB. Each board has a drive and a serial port, which are listed at the paths `places`.
     struct Desk {
         folder: tempfile::TempDir,
         places: Places,
@@ -229,7 +229,7 @@ mod tests {
                 fs::write(at(usb).join("idVendor"), "0483\n").unwrap();
                 fs::write(at(usb).join("devnum"), "7\n").unwrap();
             }
-            // A port that does not belong to a USB device.
+            // The port ttyS0 does not belong to a USB device.
             fs::create_dir_all(at("platform/ttyS0")).unwrap();
             symlink(at("platform/ttyS0"), at("class/tty/ttyS0")).unwrap();
             let places = Places {
@@ -282,7 +282,7 @@ mod tests {
             found,
             [(one.clone(), Some("NOD_H745ZIQ")), (desk.at("more/NOD_H743ZI2"), Some("NOD_H743ZI2"))]
         );
-        // The drive at the path is the same drive, with the label of the block device.
+        // The drive that is found at its path equals the listed drive, with the label of the block device.
         let named = desk.places.at(&one).unwrap();
         assert_eq!((&named, named.fit("nucleo-h745zi-q")), (&drives[0], Fit::Same));
         assert_eq!(desk.places.at(&other).unwrap().label.as_deref(), Some("usb"));
@@ -300,7 +300,8 @@ mod tests {
     #[test]
     fn the_name_of_a_folder_is_no_label_where_the_device_is_known() {
         let mut desk = Desk::new();
-        // This is the second NUCLEO-H743ZI on a computer. The name of its folder is the label of the first board with an appended digit.
+        // The folder belongs to the second NUCLEO-H743ZI on a computer. The name of the folder is the label of the first board with an
+        // appended digit.
         let path = desk.mount("dev/sdb", b"NODE_H743ZI2", "vfat");
         let drive = desk.places.at(&path).unwrap();
         assert_eq!((drive.label.as_deref(), drive.fit("nucleo-h743zi2")), (None, Fit::Unknown));
@@ -318,7 +319,7 @@ mod tests {
         assert_eq!(same(&port("ttyACM0")), Some(true));
         assert_eq!(same(&port("ttyACM1")), Some(false));
         assert_eq!((same("/dev/ttyS0"), same("/tmp/jtc")), (None, None));
-        // No serial ports are found for an unknown drive.
+        // For a drive without a known USB device, no serial ports are found.
         let unknown = Drive::at(&path).unwrap();
         assert_eq!(desk.places.ports_of(&unknown), [""; 0]);
         assert_eq!(desk.places.same_usb_device(&port("ttyACM0"), &unknown), None);
@@ -332,7 +333,7 @@ mod tests {
         let drive = desk.places.at(&path).unwrap();
         let again = |desk: &Desk| desk.places.again(&drive).map(|found| found.path);
         assert_eq!(again(&desk), Some(path));
-        // The device was removed, but the drive is still mounted.
+        // The USB device was removed, but the drive is still mounted.
         fs::remove_file(desk.at("class/block/sda")).unwrap();
         assert_eq!(again(&desk), None);
         let elsewhere = desk.mount("dev/sdd", b"one1", "vfat");
@@ -352,12 +353,12 @@ mod tests {
             let error = desk.places.still_there(&drive).unwrap_err();
             assert!(matches!(error, FirmwareError::Changed { .. }), "{error}");
         };
-        // The device was unplugged and plugged in again.
+        // The USB device was unplugged and plugged in again.
         fs::write(desk.at("1-2/devnum"), "8\n").unwrap();
         refused(&desk);
         fs::write(desk.at("1-2/devnum"), "7\n").unwrap();
         desk.places.still_there(&drive).unwrap();
-        // Another board is mounted at the path of the drive.
+        // The drive of another board is mounted at the path of the drive.
         desk.mount("dev/sdb", b"one", "vfat");
         refused(&desk);
         // No drive is mounted at the path, and the folder is on a disk of this computer.

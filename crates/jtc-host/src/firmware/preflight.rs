@@ -1,4 +1,4 @@
-//! Check of a board before flashing: the state of the controller, and if the controller can be stopped safely.
+//! Check of a board before flashing. The check reads the state of the controller and determines if the controller can be stopped safely.
 //!
 //! Flashing resets the processor of the board. After the reset, the drives no longer receive frames, and an arm that is held by the drives
 //! falls. Therefore a board is never flashed while its controller reports torque. If the report is incomplete, or may come from another
@@ -20,22 +20,22 @@ const SILENT: Duration = Duration::from_millis(1_500);
 /// Report of the controller on a serial line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answers {
-    /// The line has no readable data, because the board has no firmware, another firmware or another bit rate.
+    /// No status frame was received on the line. The board may have no firmware, another firmware or another bit rate.
     Nothing {
-        /// Number of bytes received.
+        /// Number of bytes received on the line.
         bytes: u64,
     },
-    /// A controller answers.
+    /// A controller answers on the line.
     Controller {
         /// State of the controller.
         state: Code<ControllerState>,
-        /// `true` if the arm has or may have torque.
+        /// `true` if the arm is or may be under torque.
         torque: bool,
-        /// Joints that do not answer the controller, so that their torque is unknown.
+        /// Joints that do not answer the controller. The torque of these joints is unknown.
         silent: Vec<Joint>,
-        /// `true` if the gripper is on, so that it may hold a part.
+        /// `true` if the gripper is on and may hold an object.
         grips: bool,
-        /// Identity of the controller. `None` if the controller has no extensions, or if the program cannot read the report.
+        /// Identity of the controller; `None` if the controller has no extensions, or if the program cannot read its answer.
         info: Option<Box<Info>>,
     },
 }
@@ -43,12 +43,12 @@ pub enum Answers {
 /// Serial line on which the board was queried.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
-    /// Name of the port.
+    /// Name of the serial port.
     pub port: String,
-    /// `true` if the line and the drive belong to the same USB device, which means to the same board. `None` if the operating system does
-    /// not report the USB devices.
+    /// `true` if the serial line and the drive belong to the same USB device, and therefore to the same board. `None` if the operating
+    /// system does not report the USB devices.
     pub same_device: Option<bool>,
-    /// Report of the controller on the line.
+    /// Report of the controller on this serial line.
     pub answers: Answers,
 }
 
@@ -60,12 +60,13 @@ impl Asked {
         }
     }
 
-    /// Returns `true` if the line belongs to the board with the drive.
+    /// Returns `true` if the serial line belongs to the board of the drive.
     fn is_own(&self) -> bool {
         self.same_device == Some(true)
     }
 
-    /// Returns the reasons why the operator must confirm the flashing. This method does not check if the line belongs to the board.
+    /// Returns the reasons why the operator must confirm the flashing. This function does not check if the serial line belongs to the
+    /// board.
     fn doubts(&self) -> Option<String> {
         match &self.answers {
             Answers::Nothing { bytes: 0 } => None,
@@ -87,32 +88,33 @@ impl Asked {
     }
 }
 
-/// Facts about a board before flashing: the controller's report on each line that was queried. If the list of lines is empty, no controller
+/// Facts about a board before flashing: the controller's report on each queried serial line. If the list of lines is empty, no controller
 /// was queried.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Preflight {
-    /// Lines that were queried, each with the report.
+    /// Serial lines that were queried, each with the report of its controller.
     pub lines: Vec<Asked>,
 }
 
 impl Preflight {
-    /// Returns the identities of the controllers on the lines of the board itself.
+    /// Returns the identities of the controllers on the serial lines of the drive's board.
     pub fn own_info(&self) -> impl Iterator<Item = &Info> {
         self.lines.iter().filter(|line| line.is_own()).filter_map(Asked::info)
     }
 
-    /// Returns the identity of the board's own controller, or, if that is unknown, of another controller that was queried.
+    /// Returns the identity of the controller on the drive's board. If this identity is unknown, returns the identity of another queried
+    /// controller.
     pub fn info(&self) -> Option<&Info> {
         self.own_info().next().or_else(|| self.lines.iter().find_map(Asked::info))
     }
 
-    /// Returns `true` if the board stores an arm, which flashing might remove.
+    /// Returns `true` if the board stores an arm. Flashing may delete this arm. Returns `None` if no controller reported its identity.
     pub fn stored_arm(&self) -> Option<bool> {
         self.info().map(|info| info.store == StoreState::Stored)
     }
 
-    /// Returns the statement that an operator must confirm before the board is flashed with this image. Returns `None` if
-    /// the board's own controller reports that the arm has no torque, that each joint answers, and that the gripper is off.
+    /// Returns the statement that an operator must confirm before the board is flashed with this image. Returns `None` if the controller on
+    /// the drive's board reports that the torque is off, that each joint answers, and that the gripper is off.
     pub fn to_confirm(&self, image: &Image) -> Option<String> {
         let reports = |line: &Asked| matches!(line.answers, Answers::Controller { .. });
         let mut doubts: Vec<String> = self.lines.iter().filter_map(Asked::doubts).collect();
@@ -151,11 +153,11 @@ pub struct Permissions {
     pub accept_supply: bool,
 }
 
-/// Requests the current state from the controller on a line.
+/// Requests the current state from the controller on a serial line.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Port`] if the port is lost.
+/// Returns [`FirmwareError::Port`] if the port is lost.
 pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError> {
     session.timeouts = Timeouts { status: SILENT, confirmation: Duration::from_millis(300), tries: 3 };
     let before = session.statistics().bytes_received;
@@ -164,8 +166,8 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     if answered(session.poll(SILENT))?.flatten().is_none() {
         return silent(session);
     }
-    // Status frames may have been buffered for minutes while the program waited for the operator. The program skips these frames because it
-    // waits for the answer to this request.
+    // While the program waited for the operator, old status frames may have been buffered for minutes. The program skips these old frames,
+    // because it waits for the answer to the following request.
     let info = answered(session.info())?.flatten().map(Box::new);
     match answered(session.fresh_status())? {
         Some(status) => Ok(controller(&status, info)),
@@ -173,7 +175,7 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     }
 }
 
-/// Returns the result of a request, or `None` if no usable answer arrived. A lost port is an error.
+/// Returns the result of a request, or `None` if no usable answer was received. If the port is lost, returns an error.
 fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError> {
     match result {
         Ok(value) => Ok(Some(value)),
@@ -184,7 +186,7 @@ fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError>
 
 fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     let flag = |joint: &Joint| status.can_current & can_flag::no_answer(joint.index()) != 0;
-    // All joints begin in Start. A joint that is still in Start has not answered yet.
+    // After the start of the controller, all joints are in the state Start. A joint that is still in Start has not answered.
     let begins = |joint: &Joint| status.joints[joint.index()].state == NodeState::START;
     let grips = status.gripper.is_some_and(|gripper| gripper.pump != 0 || !is_idle(gripper.state));
     Answers::Controller {
@@ -196,14 +198,14 @@ fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     }
 }
 
-/// Returns `true` if the arm has or may have torque. The result is derived from the states of the controller and the drives.
+/// Returns `true` if the arm is or may be under torque. The function uses the states of the controller and of the drives.
 fn has_torque(status: &Status) -> bool {
     let idle = [ControllerState::Init, ControllerState::Error].into_iter().any(|idle| status.state == idle);
     !idle || status.joints.iter().any(|joint| !is_idle(joint.state))
 }
 
 /// Returns `true` if the motor of this node is off. Returns `false` in the transitions to and from *enabled*, in the reaction to a fault,
-/// and in states of later drives that this program does not know, because the motor may hold, align or calibrate in these states.
+/// and in unknown states of later drives. In these states the motor may hold, align or calibrate.
 fn is_idle(state: NodeState) -> bool {
     [
         NodeState::START,
@@ -220,8 +222,8 @@ fn is_idle(state: NodeState) -> bool {
 ///
 /// # Errors
 ///
-/// [`FirmwareError::HasTorque`], [`FirmwareError::OtherBoard`], [`FirmwareError::OtherController`], [`FirmwareError::UnnamedBoard`] and
-/// [`FirmwareError::Supply`] if the image must not be written; no byte was written.
+/// Returns [`FirmwareError::HasTorque`], [`FirmwareError::OtherBoard`], [`FirmwareError::OtherController`], [`FirmwareError::UnnamedBoard`]
+/// or [`FirmwareError::Supply`] if the image must not be written. If one of these errors is returned, no byte was written.
 pub fn may_flash(
     image: &Image,
     drive: &Drive,
@@ -245,7 +247,7 @@ pub fn may_flash(
         let named = drive.board().map(|(name, _)| name.to_owned()).unwrap_or_default();
         return Err(FirmwareError::OtherBoard { drive: drive.path.clone(), named, board: board.clone() });
     }
-    // A controller on the USB device of the drive also identifies the board.
+    // If the drive does not name its board, a controller on the USB device of the drive can also identify the board.
     let named = fit == Fit::Same || before.own_info().next().is_some();
     if !named && !permissions.assume_board {
         return Err(FirmwareError::UnnamedBoard {
@@ -254,7 +256,7 @@ pub fn may_flash(
             board: board.clone(),
         });
     }
-    // A running program proves that the board has the core supply that this program needs. Software cannot read the solder bridges.
+    // A running program proves that the board has the core supply of this program. Software cannot read the solder bridges.
     let mut runs = before.own_info().map(|info| info.board.as_str());
     let runs_this = runs.next().is_some_and(|runs| runs == board) && runs.all(|runs| runs == board);
     let supply_known = !has_two_supplies(board) || runs_this;

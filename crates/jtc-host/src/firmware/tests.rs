@@ -1,4 +1,4 @@
-//! Tests of all steps, from reading an image file to verifying the flash, with a simulated board and ST-LINK.
+//! Tests of all steps of flashing, from reading an image file to verifying the flash, with a simulated board and ST-LINK.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,8 @@ mod before;
 mod lines;
 
 const H745: &str = "nucleo-h745zi-q";
-/// Time limits for tests in which the expected event occurs immediately, followed by limits for tests in which it never occurs.
+/// Time limits for tests in which the expected event occurs immediately. `SHORT` contains the limits for tests in which the expected event
+/// never occurs.
 const LIMITS: Limits = Limits { wait: Duration::from_secs(20), pause: Duration::from_millis(20) };
 const SHORT: Limits = Limits { wait: Duration::from_millis(300), pause: Duration::from_millis(20) };
 
@@ -23,7 +24,7 @@ fn image(board: &str, seed: u8) -> Image {
     Image::parse(Path::new("new.bin"), image_bytes(board, seed)).unwrap()
 }
 
-/// Returns the locations on a system without drives and ports.
+/// Returns the paths on a computer without drives and ports.
 fn places() -> Places {
     let nowhere = || Path::new("/nowhere-of-test").to_owned();
     Places {
@@ -35,7 +36,7 @@ fn places() -> Places {
     }
 }
 
-/// Returns the report of the board on a line. `same_device` is `true` if the line belongs to the drive's USB device.
+/// Returns the report of the board on a serial line. `same_device` is `true` if the line belongs to the drive's USB device.
 fn asked(board: &Board, same_device: Option<bool>) -> Preflight {
     let answers = look(&mut Session::new(board.port())).unwrap();
     Preflight { lines: vec![Asked { port: "ttyX".into(), same_device, answers }] }
@@ -64,7 +65,7 @@ fn j67_a_board_is_flashed_and_proves_it() {
     assert_eq!(verification.program, program_of(&image_bytes(H745, 2)));
     assert_eq!((verification.info.firmware(), verification.stored_arm()), ("0.2.0", true));
     assert_eq!(verification.drive, DriveAfter::CameBack);
-    // The answer to each request confirms the new image and rejects the old image.
+    // The report that the new program sends matches the new image and does not match the old image.
     let info = Session::new(board.port()).info().unwrap().unwrap();
     assert!(compare(&image(H745, 2), &info).is_ok());
     let said = compare(&image(H745, 1), &info).unwrap_err().to_string();
@@ -88,7 +89,7 @@ fn j67_the_program_of_before_may_start_anew_before_it_is_stopped() {
 
 #[test]
 fn a_controller_that_never_has_read_its_flash_is_not_waited_for() {
-    // The clock of this controller does not advance, so the device always appears to have just started.
+    // The clock of this simulated controller does not advance, so the device always appears to have just started.
     let mut asked = 0;
     let port = crate::port::test::ScriptedPort::new(Some(9_600), move |_, bytes| {
         if bytes.is_empty() {
@@ -114,7 +115,7 @@ fn what_fail_txt_says_is_reported() {
     let error = verification.unwrap_err();
     assert!(error.to_string().ends_with("The target flash is write protected"), "{error}");
     assert_eq!(error.kind(), ErrorKind::Device);
-    // The program does not treat the failure text of an earlier attempt as a report about the next attempt.
+    // The failure text of an earlier attempt is not a report about the next attempt.
     let (drive, new) = (link.drive(), image(H745, 2));
     let written = write_image(&drive, &new, &mut |_| {}).unwrap();
     assert_eq!(written.failure_before.as_deref(), Some("The target flash is write protected"));
@@ -167,9 +168,9 @@ fn nothing_is_written_where_the_drive_has_gone() {
         assert_eq!(error.kind(), ErrorKind::Refused);
         assert!(!link.path.join("openjtc.bin").exists());
     };
-    // The test simulates that another file system is now mounted at the path.
+    // The test simulates that another file system is mounted at the path of the drive.
     refused(&Drive { volume: Some(u64::MAX), ..drive.clone() });
-    // The mount point is now an empty folder.
+    // The drive was removed, so the mount point is an empty folder.
     fs::remove_file(link.path.join("DETAILS.TXT")).unwrap();
     refused(&drive);
 }

@@ -1,4 +1,5 @@
-//! Verification after an image was copied to a drive, with the report of the drive and the flash report of the running program.
+//! Verification after an image was copied to a drive. The verification uses the report of the drive and the flash report of the running
+//! program.
 
 use std::fmt;
 use std::thread::sleep;
@@ -11,28 +12,29 @@ use crate::error::LinkError;
 use crate::port::{Port, PortError};
 use crate::session::{Session, Timeouts};
 
-/// Time after the start within which a device reads its flash (J-67).
+/// Maximum time that a device needs after its start to read its flash (J-67).
 const READ_WITHIN: Duration = Duration::from_secs(3);
-/// Tolerance between two clocks: a relative difference, and a delay until the program observes the start of a device.
+/// Tolerance between the clocks of this computer and of a device: a relative difference, and a delay until the program observes the start
+/// of the device.
 const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
 
 /// Time after the copying during which the previous program may still run before the ST-LINK stops it.
 const OTHER_STOPS: Duration = Duration::from_secs(10);
-/// Maximum time to wait until a controller has read its flash, measured with the clock of the line.
+/// Maximum time to wait until a controller has read its flash, measured with the clock of the port.
 const READS_NOW: Duration = Duration::from_secs(5);
 
-/// Waiting times.
+/// Waiting times of the verification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Maximum time to wait until the controller has started with the image.
     pub wait: Duration,
-    /// Pause between two attempts.
+    /// Pause between two attempts to query the controller.
     pub pause: Duration,
 }
 
 impl Default for Limits {
-    /// Returns 120 s for `wait` and 250 ms for `pause`. The ST-LINK needs about 30 s for one megabyte, and an operating system needs some more
-    /// seconds to mount a drive.
+    /// Returns 120 s for `wait` and 250 ms for `pause`. The ST-LINK needs about 30 s to write one megabyte. An operating system needs some
+    /// more seconds to mount the drive.
     fn default() -> Self {
         Self { wait: Duration::from_secs(120), pause: Duration::from_millis(250) }
     }
@@ -45,11 +47,12 @@ pub type OpenPort<'a> = dyn FnMut() -> Result<Box<dyn Port>, PortError> + 'a;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriveAfter {
-    /// The drive disappeared and appeared again, which is normal after it has accepted an image.
+    /// The drive disappeared and appeared again. A drive normally disappears and appears again after it has accepted an image.
     CameBack,
-    /// The drive disappeared and has not appeared again. This is normal on a system that does not mount drives automatically.
+    /// The drive disappeared and has not appeared again. A drive normally does not appear again on a system that does not mount drives
+    /// automatically.
     Gone,
-    /// The drive was present all the time.
+    /// The drive has not disappeared.
     Stayed,
 }
 
@@ -63,16 +66,16 @@ impl fmt::Display for DriveAfter {
     }
 }
 
-/// Result of the verification that a controller runs the image.
+/// Result of a successful verification: a controller runs the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verification {
     /// Identity of the controller.
     pub info: Info,
     /// Report of the controller about its flash.
     pub program: Program,
-    /// Behaviour of the drive.
+    /// Behaviour of the drive after the copying.
     pub drive: DriveAfter,
-    /// Time between the copying and the verification.
+    /// Time from the start of the copying to the end of the verification.
     pub took: Duration,
 }
 
@@ -103,7 +106,7 @@ impl Watch<'_> {
             (Some(_), _) => DriveAfter::CameBack,
         };
         let Some(now) = now else { return Ok(()) };
-        // The drive shows an old failure report until the drive disappears. An old report does not concern this image.
+        // The drive shows an old failure report until the drive disappears. An old failure report does not concern the copied image.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };
@@ -114,13 +117,13 @@ impl Watch<'_> {
     }
 }
 
-/// Waits until the drive has appeared again, at most until the time limit. The function is used for boards without a serial line. The
-/// result does not prove that the image runs.
+/// Waits until the drive has appeared again, at most until the time limit. This function is used for boards without a serial line. A drive
+/// that has appeared again does not prove that the image runs.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] if the drive has not disappeared, or if it has not appeared again and the
-/// operating system could not confirm that all bytes were written.
+/// Returns [`FirmwareError::Refused`] if the drive reports a failure. Returns [`FirmwareError::NotTaken`] if the drive has not disappeared.
+/// Also returns this error if the drive has not appeared again and the operating system could not confirm that all bytes were written.
 pub fn wait_for_drive(
     places: &Places,
     drive: &Drive,
@@ -138,19 +141,19 @@ pub fn wait_for_drive(
     let (seen, doubt) = (watch.seen, written.doubt.clone());
     match seen {
         DriveAfter::CameBack => Ok(seen),
-        // On a system that does not mount drives automatically, the drive does not appear again.
+        // If the system does not mount drives automatically, the drive does not appear again.
         DriveAfter::Gone if doubt.is_none() => Ok(seen),
         DriveAfter::Gone | DriveAfter::Stayed => Err(FirmwareError::NotTaken { seen, doubt }),
     }
 }
 
-/// Waits until the controller on the line has started with the image, and verifies the image.
+/// Waits until the controller on the serial line has started with the image, and verifies the image.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`] if the drive reports a failure, [`FirmwareError::OtherProgram`] if another program runs,
-/// [`FirmwareError::NotReported`] if the program does not report its flash, [`FirmwareError::NotStarted`] if no program
-/// started in time.
+/// Returns [`FirmwareError::Refused`] if the drive reports a failure. Returns [`FirmwareError::OtherProgram`] if another program runs, and
+/// [`FirmwareError::NotReported`] if the program does not report its flash. Returns [`FirmwareError::NotStarted`] if no program started in
+/// time.
 pub fn verify_program(
     places: &Places,
     image: &Image,
@@ -169,7 +172,7 @@ pub fn verify_program(
             Ok(Some(info)) if still_reads(&info) => "the controller still reads its flash".into(),
             Ok(Some(info)) => match compare(image, &info) {
                 Ok(program) => {
-                    // The drive may have appeared again in the meantime and may contain a failure report.
+                    // During the request, the drive may have appeared again with a failure report.
                     watch.look()?;
                     return Ok(Verification {
                         info,
@@ -192,8 +195,8 @@ pub fn verify_program(
     }
 }
 
-/// Returns `true` if the running program will no longer be replaced. The previous program can restart before the ST-LINK begins to write,
-/// and after a reset without a write.
+/// Returns `true` if the ST-LINK will not replace the running program any more. Before the ST-LINK begins to write, the previous program
+/// can restart. The previous program also restarts after a reset without a write.
 fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
     let written = watch.written;
     watch.seen == DriveAfter::CameBack
@@ -212,12 +215,12 @@ fn still_reads(info: &Info) -> bool {
     info.program.is_none() && Duration::from_millis(info.uptime_ms) < READ_WITHIN
 }
 
-/// Returns the identity of the controller after it has read its flash, at the latest after five seconds. Returns `None` for
-/// a device without extensions.
+/// Returns the identity of the controller after the controller has read its flash, at the latest after five seconds. Returns `None` for a
+/// device without extensions.
 ///
 /// # Errors
 ///
-/// Returns the errors of [`Session::info`].
+/// Returns the same errors as [`Session::info`].
 pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Info>, LinkError> {
     let end = session.now() + READS_NOW;
     loop {
@@ -232,7 +235,7 @@ pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Inf
 fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
     let mut session = Session::new(port);
     session.timeouts = Timeouts { status: limits.pause * 4, confirmation: limits.pause * 2, tries: 2 };
-    // While the ST-LINK keeps the processor stopped, a request would only time out.
+    // The first status shows that the processor runs. While the ST-LINK keeps the processor stopped, a request would only time out.
     session.next_status()?;
     session.info()
 }
@@ -241,7 +244,8 @@ fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
 ///
 /// # Errors
 ///
-/// [`FirmwareError::OtherProgram`] and [`FirmwareError::NotReported`].
+/// Returns [`FirmwareError::OtherProgram`] if another program runs, and [`FirmwareError::NotReported`] if the program does not report its
+/// flash.
 pub fn compare(image: &Image, info: &Info) -> Result<Program, FirmwareError> {
     let runs = format!("{} on {}", info.firmware_and_revision(), info.board);
     let Some(program) = info.program else {
@@ -262,7 +266,7 @@ mod tests {
         let since = |uptime_ms, time_s| {
             started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
         };
-        // The device started just before the copying began, and the clock of the device is 5 % too slow.
+        // In the first case, the device started just before the copying began, and the clock of the device is 5 % too slow.
         assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
         assert!(since(1_000, 10.0) && since(0, 0.4));
     }

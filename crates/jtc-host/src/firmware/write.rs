@@ -1,4 +1,4 @@
-//! Copying of an image to the drive of a board.
+//! Functions that copy an image to the drive of a board.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
@@ -8,34 +8,36 @@ use std::time::Instant;
 use super::drive::volume;
 use super::{Drive, FirmwareError, Image};
 
-/// Name of the file on the drive. The ST-LINK uses the bytes immediately when they arrive, so the file does not remain on the drive.
+/// Name of the image file on the drive. The ST-LINK processes the bytes when they arrive, so the file does not stay on the drive.
 const FILE: &str = "openjtc.bin";
-/// Number of bytes per write. Because each write is small, the program can show the progress. The operating system decides in which order
-/// the bytes reach the drive. A flush after each write would also write the length of a partial file to the directory. The ST-LINK might
-/// then treat the partial file as complete. The flash report of the program shows damage that a wrong order causes.
+/// Number of bytes that the program writes at once. Small writes allow the program to show its progress. The operating system decides in
+/// which order the bytes reach the drive. The program does not flush after each write. A flush would also write the length of the partial
+/// file to the directory, so the ST-LINK might treat the partial file as complete. If a wrong order damages the flash, the flash report of
+/// the controller shows the damage.
 const PIECE: usize = 32 * 1024;
 
 /// Record of an image that was copied to the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
-    /// Time when the copying began. A controller that started before this time runs the previous program.
+    /// Time at which the copying of the image began. A controller that started before this time runs the previous program.
     pub began: Instant,
-    /// Time when this computer had sent all bytes to the drive.
+    /// Time at which this computer had sent all bytes to the drive.
     pub ended: Instant,
     /// Content of `FAIL.TXT` before the copying.
     pub failure_before: Option<String>,
     /// Reason why the operating system could not confirm that all bytes were written. The drive disappears after the last byte, and some
-    /// systems report this as an error. Only the content of the flash shows if the write succeeded.
+    /// systems report this disappearance as an error. Only the content of the flash shows if the write succeeded.
     pub doubt: Option<String>,
 }
 
-/// Copies the image to the drive. `progress` receives the number of bytes copied so far. Does not write if the drive was removed in the
-/// meantime, because the folder is then on a disk of this computer.
+/// Copies the image to the drive. `progress` receives the number of bytes copied so far. Does not write if the drive was removed, because
+/// the folder would then be on a disk of this computer.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`] mean that no byte was written. [`FirmwareError::DriveFull`] and
-/// [`FirmwareError::NotWritten`] if the copying failed; the board has the previous program or only a part of a program.
+/// Returns [`FirmwareError::Changed`] or [`FirmwareError::NotOpened`] if no byte was written. Returns [`FirmwareError::DriveFull`] or
+/// [`FirmwareError::NotWritten`] if the copying failed. After a failed copy, the board has the previous program or only a part of a
+/// program.
 pub fn write_image(
     drive: &Drive,
     image: &Image,
@@ -71,7 +73,7 @@ pub fn write_image(
     Ok(Written { began, ended: Instant::now(), failure_before, doubt })
 }
 
-/// Creates the file on the drive. If the file was created on another file system, the function removes it.
+/// Creates the file on the drive. If the file was created on another file system, the function removes this file.
 fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let gone =
         || FirmwareError::Changed { what: format!("{}: the drive has disappeared", drive.path.display()) };
@@ -82,12 +84,12 @@ fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let not_opened =
         |source| FirmwareError::NotOpened { path: path.to_owned(), device: drive.device.clone(), source };
     let file = OpenOptions::new().write(true).create(true).truncate(true).open(path).map_err(not_opened)?;
-    // The drive may have been removed since the first check. An open file always stays on its file system, so this check is final.
+    // The drive may have been removed since the first check. An open file always stays on its file system, so no later check is needed.
     if file.metadata().is_ok_and(|found| !found.is_file() || is_drive(&found)) {
         return Ok(file);
     }
     drop(file);
-    // The file is empty and is on a disk of this computer.
+    // The new file is empty and is on a disk of this computer.
     let _ = fs::remove_file(path);
     Err(gone())
 }

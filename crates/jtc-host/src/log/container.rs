@@ -8,10 +8,10 @@ use jtc_wire::{LogState, POINT_LEN, RawPoint};
 use super::{FlightLog, blocks_of};
 use crate::recording::{self, RecordingError};
 
-/// Magic bytes at the start, including the version.
+/// Magic bytes at the start of an encoded log. The last byte is the version of the format.
 const MAGIC: &[u8; 8] = b"JTCLOG\0\x01";
 
-/// Kinds of the parts of an encoded log.
+/// Kinds of the sections of an encoded log.
 mod part {
     pub(super) const STATE: u8 = 1;
     pub(super) const BLOCKS: u8 = 2;
@@ -22,7 +22,7 @@ mod part {
     pub(super) const DEVICE: u8 = 7;
 }
 
-/// Reason why no log can be read from a file.
+/// Reason why a log cannot be read from a file.
 #[derive(Debug, thiserror::Error)]
 pub enum LogFileError {
     /// The file cannot be read or is not a recording.
@@ -31,7 +31,7 @@ pub enum LogFileError {
     /// The recording contains no log.
     #[error("{}: the file contains no log of a flight recorder", path.display())]
     NoLog {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
 }
@@ -81,7 +81,7 @@ impl FlightLog {
         log.ok_or_else(|| LogFileError::NoLog { path: path.to_owned() })
     }
 
-    /// Decodes a log and skips parts that a later version of the format has added. Returns `None` if the bytes are not a valid log.
+    /// Decodes a log. Sections that a later version of the format has added are skipped. Returns `None` if the bytes are not a valid log.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut rest = bytes.strip_prefix(MAGIC)?;
         let mut log = Self::default();

@@ -9,19 +9,19 @@ use serde::Serialize;
 use super::FlightLog;
 use crate::sample::{JointSample, Sample};
 
-/// Reliability of a replayed tick.
+/// Reliability of the values of a replayed tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Worth {
-    /// The tick is identical to the original tick, bit for bit.
+    /// The replayed tick is identical to the original tick, bit for bit.
     Same,
-    /// The original controller computed different outputs.
+    /// The original controller computed different outputs in this tick.
     Differs,
-    /// The tick was computed while an input was missing. The values may differ from the original until the next snapshot. The measured
-    /// values are correct.
+    /// The tick was computed while an input was missing. Until the next snapshot, the computed values may differ from the original values.
+    /// The measured values are correct even if an input was missing.
     Unsure,
-    /// The tick was not computed, because the arm or the trajectory used at that time is missing. The tick contains only the measured
-    /// values.
+    /// The tick was not computed, because the arm or the trajectory used at that time is missing. A tick that was not computed contains
+    /// only the measured values.
     Measured,
 }
 
@@ -32,14 +32,14 @@ pub struct Tick {
     pub tick: u64,
     /// Number of starts of the device.
     pub boots: u32,
-    /// Values at the time of `tick`.
+    /// Computed and measured values of the tick.
     pub sample: Sample,
-    /// Status that the controller would have reported, with the errors of the drives. The status contains only what the replay could
-    /// compute.
+    /// Status that the controller would have reported, with the errors of the drives. The status contains only the fields that the replay
+    /// can compute.
     pub status: Status,
     /// Inputs of the tick. `None` if the tick is the state in a snapshot.
     pub inputs: Option<RecordedInputs>,
-    /// Reliability of the tick.
+    /// Reliability of the values of the tick.
     pub worth: Worth,
 }
 
@@ -59,24 +59,24 @@ pub struct Difference {
     pub tick: u64,
     /// State of the controller in the replay.
     pub state: &'static str,
-    /// Outputs of the replay that differ from the log.
+    /// Text with the outputs of the replay that differ from the log.
     pub replayed: String,
 }
 
-/// A replayed log.
+/// Log after its replay through the controller.
 #[derive(Clone, Debug, Default)]
 pub struct Replayed {
-    /// Ticks in order.
+    /// Replayed ticks in order.
     pub ticks: Vec<Tick>,
     /// Configuration of a controller that uses the arm of the log.
     pub config: Option<Box<Config>>,
-    /// Number of ticks that are known to equal the original ticks.
+    /// Number of replayed ticks that equal the original ticks.
     pub same: usize,
     /// First tick that differs from the original tick.
     pub difference: Option<Difference>,
     /// Number of ticks that were computed while an input was missing.
     pub unsure: usize,
-    /// Number of ticks that were recorded with another arm than the available arm.
+    /// Number of ticks that were recorded with a different arm than the available arm.
     pub other_arm: usize,
     /// Number of ticks during a trajectory that is not available.
     pub other_points: usize,
@@ -89,7 +89,7 @@ pub struct Replayed {
 }
 
 impl FlightLog {
-    /// Builds a controller with the arm of the log and the points stored with it.
+    /// Builds a controller with the arm `arm` and with the trajectory points of the log.
     fn controller(&self, arm: &[u8]) -> Controller<Vec<RawPoint>> {
         let mut controller = Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX]);
         controller.load_arm(arm);

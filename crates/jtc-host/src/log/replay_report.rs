@@ -1,4 +1,4 @@
-//! A replayed log with its timeline and the recording that is created from it.
+//! Report of a replayed log: the log, its ticks, its timeline and the header of the recording that is created from the log.
 
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -8,24 +8,24 @@ use crate::arm::Arm;
 use crate::recording::{Ending, RecordingError, RecordingInfo, write_with_log};
 use crate::report::RunFailure;
 
-/// A log with its replay, timeline and recording information.
+/// Log with its replay, its timeline and the header of its recording.
 #[derive(Debug)]
 pub struct Account {
-    /// The log.
+    /// Log that was replayed.
     pub log: FlightLog,
-    /// All ticks of the log after the replay.
+    /// Result of the replay, with all ticks of the log.
     pub replayed: Replayed,
     /// Events of the log in order.
     pub story: Timeline,
     /// Header of the recording.
     pub info: RecordingInfo,
-    /// First error with its consequences. `None` if the log contains no error.
+    /// First error and its consequences; `None` if the log contains no error.
     pub failure: Option<RunFailure>,
 }
 
 impl Account {
-    /// Replays a log. `other` is an arm together with its image. The replay uses this arm instead of the arm that is stored with the log.
-    /// `source` is the location from which the log was read.
+    /// Replays a log. `other` is an arm with its image. If `other` is set, the replay uses this arm instead of the arm that is stored with
+    /// the log. `source` is the file or device from which the log was read.
     pub fn of(log: FlightLog, other: Option<(Arm, Vec<u8>)>, source: &str) -> Self {
         let (arm, image) = other.unzip();
         let replayed = log.replay(image.as_deref());
@@ -45,11 +45,11 @@ impl Account {
         Self { log, replayed, story, info, failure }
     }
 
-    /// Writes the recording with the log as MCAP. Error messages use `path` as the name of the file.
+    /// Writes the recording with the log as MCAP. Error messages use `path` as the name of the recording file.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`write_with_log`].
+    /// Returns the same errors as [`write_with_log`].
     pub fn write(&self, file: impl Write + Seek + Send, path: &Path) -> Result<(), RecordingError> {
         write_with_log(file, path, &self.info, &self.replayed.samples(), &self.log.to_bytes())
     }

@@ -13,25 +13,25 @@ use crate::recording::RecordingInfo;
 use crate::report::RunFailure;
 use crate::sample::{JointSample, Sample};
 
-/// An event in a log.
+/// Event in a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Number of ticks since the start of the device.
     pub tick: u64,
-    /// Time of `tick`, s.
+    /// Time from the start of the device to the event, s.
     pub time_s: f64,
-    /// Description.
+    /// Text that describes the event.
     pub text: String,
     /// `true` if an error begins with this event.
     pub error: bool,
-    /// Joints concerned.
+    /// Joints to which the event applies.
     pub joints: Vec<Joint>,
 }
 
 /// Events of a log in the order of time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Timeline {
-    /// Events in order.
+    /// Events of the log, ordered by time.
     pub events: Vec<Event>,
     /// Index of the first error in `events`. `None` if the log contains no error.
     pub first: Option<usize>,
@@ -59,7 +59,7 @@ impl Timeline {
         Self { events, first }
     }
 
-    /// Returns the first error and all errors in the same tick, for a report.
+    /// Returns the first error and all errors in the same tick, as the failure of a report.
     pub fn failure(&self, info: &RecordingInfo, samples: &[Sample]) -> Option<RunFailure> {
         let first = self.events.get(self.first?)?;
         let with = self.events.iter().filter(|event| event.error && event.tick == first.tick);
@@ -67,8 +67,9 @@ impl Timeline {
         Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joints.first().copied()))
     }
 
-    /// Returns the first error and the events after it, each with its delay after the error. The events before the error follow in the
-    /// list.
+    /// Returns the lines of a printed timeline. The first line is the first error. The next lines are the events after this error, each
+    /// with its delay after the error. The last lines are the events before the error. If the log contains no error, all events are listed
+    /// in order.
     pub fn lines(&self) -> Vec<String> {
         let Some(first) = self.first else {
             return self
@@ -82,7 +83,7 @@ impl Timeline {
         for event in &self.events[first + 1..] {
             lines.push(format!("{}: {}", after(event.tick - at.tick), event.text));
         }
-        // The event nearest to the error comes first. The number of listed events is limited.
+        // The event nearest to the error is listed first. The number of listed events is limited.
         let near = |event: &&Event| at.tick - event.tick <= BEFORE_MS;
         let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
         if !before.is_empty() {
@@ -95,7 +96,7 @@ impl Timeline {
     }
 }
 
-/// Time window before an error (ms), followed by the maximum number of events that are listed from this window.
+/// Time window before an error, ms. `BEFORE` is the maximum number of events that are listed from this time window.
 const BEFORE_MS: u64 = 3_000;
 const BEFORE: usize = 20;
 
@@ -121,13 +122,13 @@ fn names(joints: &[Joint]) -> String {
 
 /// Consecutive frames of the same type within this time (ms) are one event.
 const SAME_MS: u64 = 50;
-/// Number of ticks without an answer after which a silent joint becomes an event.
+/// Number of ticks without an answer of a joint after which the timeline contains an event.
 const SILENT: u32 = 3;
 
 struct Narrator<'a> {
     config: Option<&'a Config>,
     events: &'a mut Vec<Event>,
-    /// Number of ticks for which each joint has not answered.
+    /// Number of consecutive ticks in which each joint has not answered.
     silent: [u32; 6],
     /// Type of the last frame from a host, and the tick of that frame.
     sent: Option<(FrameType, u64)>,
@@ -139,7 +140,7 @@ impl Narrator<'_> {
         self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joints: Vec::new() });
     }
 
-    /// Adds an event of a joint. If several joints have the same event in one tick, the timeline contains one event for all of them.
+    /// Adds an event of a joint. If several joints have the same event in one tick, the timeline contains one event for all these joints.
     fn push_joint(&mut self, tick: &Tick, error: bool, joint: Joint, text: impl Into<String>) {
         let text = text.into();
         let same =
@@ -232,7 +233,7 @@ impl Narrator<'_> {
                     );
                 }
                 (RecordedKind::Noise(_), _) | (_, None) => {}
-                // A request that changes nothing is not an event.
+                // A request that only reads data from the controller is not an event.
                 (_, Some(kind)) if kind.is_extension() && kind < FrameType::SetSettings => {}
                 (_, Some(FrameType::GetArm | FrameType::GetLog | FrameType::GetPoints)) => {}
                 (_, Some(kind)) => self.host_sends(tick, kind),
@@ -279,7 +280,7 @@ impl Narrator<'_> {
                 self.push_joint(tick, false, joint, "safety line active");
             }
         }
-        // Errors that are not explained by an event of a joint, the bus or an input.
+        // Error bits of the controller are added only if the tick has no error event of a joint, the bus or an input.
         let begins = tick.sample.errors & !last.sample.errors;
         if begins != 0 && !self.events.iter().rev().any(|event| event.tick == tick.tick && event.error) {
             self.push(tick, true, labels::errors(begins).join(", "));
@@ -318,8 +319,8 @@ impl Narrator<'_> {
     fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
         let name = labels::joint_errors(bit).first().copied().unwrap_or("an unnamed error");
         let j = joint.index();
-        // In the tick of the error the controller removes the torque, and with it the commanded value. So the function also uses the
-        // previous tick.
+        // In the tick of the error, the controller switches off the torque and deletes the commanded value. Therefore the function also
+        // uses the previous tick.
         let larger = |value: fn(&JointSample) -> f64| {
             let values = [value(&last.sample.joints[j]), value(&tick.sample.joints[j])];
             if values[1].abs() > values[0].abs() { values[1] } else { values[0] }
@@ -353,7 +354,7 @@ impl Narrator<'_> {
     }
 }
 
-/// Returns the torque of the control law before the torque limit is applied.
+/// Returns the torque that the control law computed, before the torque limit is applied.
 fn computed(s: &JointSample) -> f64 {
     s.torque_model + s.torque_p + s.torque_i + s.torque_d + s.torque_friction
 }

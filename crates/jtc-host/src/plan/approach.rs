@@ -8,10 +8,10 @@ use crate::check::{CheckOptions, CheckedTrajectory};
 use crate::error::CheckError;
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Maximum speed of an approach, % of the limits. No user has checked this path for obstacles.
+/// Maximum speed of an approach, % of the limits. The speed is low because the user has not checked the path of the approach for obstacles.
 const FASTEST_PCT: f64 = 50.0;
 
-/// Reason why the arm cannot reach the first point. The trajectory itself may be valid.
+/// Reason why the arm cannot move to the first point of a trajectory. The trajectory itself may be valid.
 #[derive(Debug, thiserror::Error)]
 pub enum ApproachError {
     /// No motion to the first point can be planned.
@@ -22,8 +22,8 @@ pub enum ApproachError {
     Check(#[from] CheckError),
 }
 
-/// Plans a straight motion in joint space from `here` to the first point of `trajectory`, and checks it like any other motion. The speed is
-/// `speed_pct` % of the limits of `arm` on this controller, limited to 50 %.
+/// Plans a straight motion in joint space from the position `here` to the first point of `trajectory`, and checks this approach like any
+/// other motion. The speed is `speed_pct` % of the limits of `arm` on this controller, at most 50 %.
 ///
 /// # Errors
 ///
@@ -44,7 +44,7 @@ pub fn approach(
         ..Planner::new(&config)
     };
     let path = planner.to(here, &first)?.trajectory;
-    // The number of points per segment applies only to the trajectory, and not to this approach.
+    // The option for the number of points per segment applies only to the trajectory, and not to the approach.
     let upload = UploadOptions { points_per_segment: None, ..options.upload };
     Ok(CheckedTrajectory::check(&path, arm, here, &CheckOptions { upload, ..options.clone() })?)
 }

@@ -1,24 +1,24 @@
-//! Rounded corners: range of the blend, and notes about the distance between the motion and the waypoints.
+//! Rounded corners of a motion: valid range of the blend, and notes about the distances between the motion and the waypoints.
 
 use jtc_core::JOINTS;
 use jtc_plan::furthest_joint;
 
 use super::{PlanError, Planned};
 
-/// Largest blend, rad. A larger value is probably an angle in degrees.
+/// Largest valid blend, rad. A larger value is probably an angle in degrees.
 pub const BLEND_MAX: f64 = 0.5;
-/// Largest blend of corners between lines and arcs, m. A larger value is probably a length in mm.
+/// Largest valid blend of corners between lines and arcs, m. A larger value is probably a length in mm.
 pub const BLEND_M_MAX: f64 = 0.5;
 /// Distance (rad) above which a note reports that the motion misses a waypoint.
 const NOTED: f64 = 0.05;
 /// Maximum number of waypoints that one note lists.
 const NAMED: usize = 3;
 
-/// Rejects blends that are probably in a wrong unit. The planner rejects negative values and NaN.
+/// Rejects blends that are probably in a wrong unit. The planner itself rejects negative blends and NaN.
 ///
 /// # Errors
 ///
-/// [`PlanError::Blend`].
+/// Returns [`PlanError::Blend`] if a blend is too large.
 pub(super) fn within_reason(blend: f64, blend_m: f64) -> Result<(), PlanError> {
     match (blend, blend_m) {
         (value, _) if value > BLEND_MAX => Err(PlanError::Blend { value, most: BLEND_MAX, unit: "rad" }),
@@ -27,13 +27,13 @@ pub(super) fn within_reason(blend: f64, blend_m: f64) -> Result<(), PlanError> {
     }
 }
 
-/// Returns notes on the corners of a motion through `positions`. The notes list waypoints that the motion misses by more than 0.05 rad, and
-/// corners rounded by less than `blend` because a segment is too short.
+/// Returns notes about the corners of a motion through `positions`. The notes list the waypoints that the motion misses by more than 0.05
+/// rad. The notes also list the corners that are rounded by less than `blend` because a segment is too short.
 pub(super) fn notes(planned: &Planned, positions: &[[f64; JOINTS]], blend: f64) -> Vec<String> {
     [missed(planned, positions), cut(positions, blend)].into_iter().flatten().collect()
 }
 
-/// Returns a note with the waypoints that the motion misses, and the distances.
+/// Returns a note that lists the waypoints that the motion misses, each with the distance.
 fn missed(planned: &Planned, positions: &[[f64; JOINTS]]) -> Option<String> {
     let (trajectory, times) = (&planned.trajectory, &planned.waypoint_times);
     let step_s = f64::from(trajectory.step_ms) * 1e-3;
@@ -60,7 +60,7 @@ fn missed(planned: &Planned, positions: &[[f64; JOINTS]]) -> Option<String> {
     (!named.is_empty()).then(|| format!("rounded corners: {}", named.join(", ")))
 }
 
-/// Returns a note with the corners whose segments are shorter than twice the blend.
+/// Returns a note that lists the corners whose segments are shorter than twice the blend.
 fn cut(positions: &[[f64; JOINTS]], blend: f64) -> Option<String> {
     let leg = |a: &[f64; JOINTS], b: &[f64; JOINTS]| {
         let length = furthest_joint(a, b).1;
@@ -103,7 +103,7 @@ mod tests {
         Planner { blend, jerk: false, ..Planner::new(&config) }.through(&waypoints)
     }
 
-    /// Returns a corner between two segments of this length. Only one joint moves in each segment.
+    /// Returns a corner between two segments of the same length. In each segment, only one joint moves.
     fn corner(length: f64) -> [[f64; JOINTS]; 3] {
         [[0.0; JOINTS], [length, 0.0, 0.0, 0.0, 0.0, 0.0], [length, length, 0.0, 0.0, 0.0, 0.0]]
     }
@@ -166,7 +166,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(8))]
 
-        /// The notes contain the same distances as a search for the nearest position at each millisecond.
+        /// The distances in the notes equal the distances from a search for the nearest position at each millisecond.
         #[test]
         fn notes_name_the_waypoints_that_are_missed(
             positions in prop::collection::vec(prop::array::uniform6(-1.0..1.0f64), 3..6), blend in 0.0..0.5f64

@@ -1,4 +1,4 @@
-//! Default speed of a motion if the user does not set the speed.
+//! Default speed of a motion, which is used if the user does not set the speed.
 
 use jtc_wire::{Info, SIMULATOR};
 
@@ -21,16 +21,17 @@ pub struct MoveSpeed {
 }
 
 impl MoveSpeed {
-    /// Returns the speed that the user set, or otherwise the default speed for the controller with this identity. The default for a
-    /// simulator is 25 % of the limits. The default is 10 % for every other controller, including one that reports no identity.
+    /// Returns the speed that the user set. If the user did not set the speed, returns the default speed for the controller with this
+    /// identity. The default speed for a simulator is 25 % of the limits. For every other controller, also for a controller that does not
+    /// report its identity, the default speed is 10 % of the limits.
     pub fn of(named: Option<f64>, info: Option<&Info>) -> Self {
         let is_simulated = info.is_some_and(|info| info.board.as_str() == SIMULATOR);
         let default = if is_simulated { SIMULATED_PCT } else { DEFAULT_PCT };
         Self { percent: named.unwrap_or(default), is_default: named.is_none() }
     }
 
-    /// Returns a note for the user about the default speed, or `None` if the user set the speed. `option` is the option that sets the
-    /// speed, or an empty string.
+    /// Returns a note for the user about the default speed. Returns `None` if the user set the speed. `option` is the name of the option
+    /// that sets the speed, or an empty string.
     pub fn note(&self, option: &str) -> Option<String> {
         let sets = if option.is_empty() { String::new() } else { format!("; {option} sets it") };
         self.is_default.then(|| format!("at {} % of the limits{sets}", self.percent))
@@ -38,7 +39,7 @@ impl MoveSpeed {
 }
 
 impl<P: Port> Session<P> {
-    /// Returns the speed of a move or an approach on this controller. This is the speed that the user set, or the default speed.
+    /// Returns the speed of a move or an approach on this controller: the speed that the user set, or the default speed.
     ///
     /// # Errors
     ///
@@ -75,7 +76,7 @@ mod tests {
         };
         for (board, percent) in boards {
             assert_eq!(of(board, None), MoveSpeed { percent, is_default: true }, "{board}");
-            // The speed that the user sets is used for every controller.
+            // If the user sets the speed, this speed is used for every controller.
             for named in [1.0, 5.0, 60.0, 100.0] {
                 assert_eq!(of(board, Some(named)), MoveSpeed { percent: named, is_default: false });
             }

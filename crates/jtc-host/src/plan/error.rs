@@ -1,4 +1,4 @@
-//! Errors of planning.
+//! Errors of the planner.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, Next, next};
 use jtc_core::POINTS_MAX;
@@ -12,7 +12,7 @@ use crate::error::facts;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// The motion is not possible. The error contains the waypoint, joint, value and limit.
+    /// The motion is not possible. The error contains the waypoint, joint, value and limit, if they apply.
     #[error(transparent)]
     Plan(#[from] jtc_plan::PlanError),
     /// All waypoints are equal.
@@ -24,33 +24,33 @@ pub enum PlanError {
     /// The check rejects the motion at every speed.
     #[error("{0}")]
     Refused(Box<Verdict>),
-    /// The speed is out of range.
+    /// The requested speed is out of range.
     #[error("speed {percent} % is out of range, expected 1..{most} %")]
     Speed {
-        /// Requested value, %.
+        /// Requested speed, %.
         percent: f64,
-        /// Maximum, %.
+        /// Maximum speed, %.
         most: f64,
     },
-    /// The torque margin is out of range.
+    /// The requested torque margin is out of range.
     #[error(
         "torque margin {percent} % is out of range, expected 0 to {MARGIN_PCT_MAX} % of each limit, by default {MARGIN_PCT}"
     )]
     Margin {
-        /// Requested value, %.
+        /// Requested torque margin, % of each torque limit.
         percent: f64,
     },
-    /// The blend is too large. The value is probably in another unit.
+    /// The blend is too large, so it is probably in a wrong unit.
     #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
     Blend {
-        /// Requested value.
+        /// Requested blend.
         value: f64,
-        /// Maximum.
+        /// Maximum blend.
         most: f64,
         /// Unit of the blend: rad, or m for corners between lines and arcs.
         unit: &'static str,
     },
-    /// The waypoints have more corners than the points of a trajectory can represent.
+    /// The waypoints have too many corners for the maximum number of trajectory points.
     #[error(
         "too many sharp corners: {corners}, expected at most {most} for the {POINTS_MAX} points of a trajectory"
     )]
@@ -60,12 +60,12 @@ pub enum PlanError {
         /// Maximum number of corners.
         most: usize,
     },
-    /// The motion takes so long that the points of its trajectory are too far apart for its corners.
+    /// The motion is too long: the points of its trajectory are too far apart for its corners.
     #[error(
         "the motion is too long for its corners: in {seconds:.0} s, {POINTS_MAX} points are {step_ms} ms apart"
     )]
     TooFine {
-        /// Duration, s.
+        /// Duration of the motion, s.
         seconds: f64,
         /// Time step between the points, ms.
         step_ms: u16,
@@ -75,13 +75,13 @@ pub enum PlanError {
         "the motion is too long: it takes {seconds:.0} s or more, which {POINTS_MAX} points cannot cover"
     )]
     TooLong {
-        /// Minimum duration, s.
+        /// Minimum duration of the motion, s.
         seconds: f64,
     },
 }
 
 impl PlanError {
-    /// Returns the number of the waypoint in the error, counted from 1, if the message contains a waypoint.
+    /// Returns the number of the waypoint in the error, counted from 1. Returns `None` if the error is not about a waypoint.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::Plan(error) => error.waypoint(),
@@ -202,7 +202,7 @@ mod tests {
 
     use super::*;
 
-    /// The messages of a move name the current pose of the arm and the goal instead of waypoint numbers.
+    /// The error messages of a move contain the words for the current pose and the goal instead of waypoint numbers.
     #[test]
     fn a_move_is_refused_with_the_words_of_its_waypoint() {
         let joint = Joint::ALL[2];

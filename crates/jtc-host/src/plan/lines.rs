@@ -1,4 +1,5 @@
-//! Motions in which the flange follows lines and arcs, and the distance of the flange from the straight line in other motions.
+//! Motions in which the flange follows lines and arcs. For motions in joint space, this module computes the distance of the flange from the
+//! straight line.
 
 use jtc_core::{JOINTS, SetPoint, interpolate};
 use jtc_dynamics::ArmModel;
@@ -10,25 +11,25 @@ use crate::trajectory::Trajectory;
 
 /// Maximum deviation of the flange from its path between two points of a trajectory, m.
 const ASIDE_M: f64 = 1e-4;
-/// Number of positions checked between two points.
+/// Number of positions that are checked between two points of a trajectory.
 const PARTS: usize = 4;
 
-/// Deviation of the flange, during a joint-space segment, from the straight line between the ends of the segment.
+/// Deviation of the flange from the straight line between the ends of a joint-space segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aside {
     /// Waypoint at the end of the segment, counted from 1.
     pub waypoint: usize,
-    /// Largest distance of the flange from the line, m.
+    /// Largest distance of the flange from the straight line, m.
     pub distance_m: f64,
 }
 
 impl Planner<'_> {
-    /// Plans a motion through the waypoints of a route that starts and ends at rest. The motion is straight in joint space, or the flange
-    /// moves along lines and arcs. If waypoints have times, the motion passes the waypoints at these times.
+    /// Plans a motion through the waypoints of a route. The motion starts and ends at rest. In each segment, the motion is straight in
+    /// joint space, or the flange moves along a line or an arc. If a waypoint has a time, the motion passes the waypoint at this time.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Planner::through`].
+    /// Returns the same errors as [`Planner::through`].
     pub fn on_route(&self, route: &Route, times: &[Option<f64>]) -> Result<Planned, PlanError> {
         self.along_route(route, times, None)
     }
@@ -86,8 +87,8 @@ impl Planner<'_> {
     }
 }
 
-/// Returns the largest deviation of the flange from its path between two points, with the interpolation of the controller (J-32), m. Only
-/// the deviation perpendicular to the path is measured.
+/// Returns the largest deviation of the flange from its path between two points, with the interpolation of the controller (J-32), m. The
+/// function measures only the deviation perpendicular to the path.
 fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -> [f64; JOINTS]) -> f64 {
     const MOMENT: f64 = 1e-4;
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
@@ -107,8 +108,8 @@ fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -
     most
 }
 
-/// Returns the joint-space segment with the largest deviation of the flange from the straight line. `legs` are the waypoints at the ends of
-/// the compared segments.
+/// Returns the joint-space segment with the largest deviation of the flange from the straight line. `legs` contains the waypoint at the end
+/// of each compared segment.
 pub fn furthest_aside(planned: &Planned, model: &ArmModel, legs: &[usize]) -> Option<Aside> {
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
     let times = &planned.waypoint_times;
@@ -130,7 +131,8 @@ fn sub(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// Returns the distance of `p` from the line through `a` along `direction`, or from `a` if `direction` is zero.
+/// Returns the distance of the point `p` from the line through `a` along `direction`. If `direction` is zero, returns the distance from the
+/// point `a`.
 fn from_line(p: &[f64; 3], a: &[f64; 3], direction: &[f64; 3]) -> f64 {
     let (off, squared) = (sub(p, a), direction.iter().map(|d| d * d).sum::<f64>());
     let along: f64 = off.iter().zip(direction).map(|(o, d)| o * d).sum();

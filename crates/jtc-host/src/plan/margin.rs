@@ -1,10 +1,11 @@
-//! Torque margin of a plan: the part of each torque limit that stays unused as a reserve for effects that the model does not contain.
+//! Torque margin of a plan: the share of each torque limit that the motion does not use. This reserve is for masses and friction that the
+//! model does not contain.
 //!
-//! A plan keeps the model torque, including friction, below (100 % − margin) of each limit. This applies at the lowest bearing temperature
-//! of the plan and at the usual bearing temperature. If gravity and breakaway friction alone need nearly all of this reduced limit or more,
-//! another rule applies ([`ArmDynamics::usable_torque`]). The motion may then use a quarter of the torque that gravity and friction leave of the
-//! whole limit, and at least 2 % of the limit. So the arm can also reach and leave every pose that it can hold.
-//! [`Verdict::margin`](crate::check::Verdict::margin) reports the margin of a motion.
+//! A plan keeps the torque of the arm model, including friction, below (100 % − margin) of each torque limit. The plan respects this
+//! reduced limit at its lowest bearing temperature and at the usual bearing temperature. If gravity and breakaway friction alone need
+//! nearly the whole reduced limit, or more, another rule applies ([`ArmDynamics::usable_torque`]). In such a pose, the motion may use a
+//! quarter of the torque that gravity and friction leave of the whole limit, and at least 2 % of the whole limit. Therefore the arm can
+//! reach and leave every pose that it can hold. [`Verdict::margin`](crate::check::Verdict::margin) contains the torque margin of a motion.
 
 use jtc_core::JOINTS;
 use jtc_plan::{ArmDynamics, Limits, State};
@@ -14,20 +15,21 @@ use super::PlanError;
 use crate::check::Verdict;
 use crate::trajectory::Trajectory;
 
-/// Default torque margin, % of each limit.
+/// Default torque margin, % of each torque limit.
 pub const MARGIN_PCT: f64 = 15.0;
-/// Largest torque margin, % of each limit.
+/// Largest valid torque margin, % of each torque limit.
 pub const MARGIN_PCT_MAX: f64 = 100.0 * jtc_plan::MARGIN_MAX;
-/// Difference between requested and actual margin (% of the limit) above which a note reports the smaller margin.
+/// Difference between the requested and the actual torque margin, % of the limit. If the difference is larger, a note reports the actual
+/// margin.
 const SHORT_PCT: f64 = 0.1;
-/// Relative rounding error of a torque that is still accepted as within the limit.
+/// Relative rounding error up to which a torque counts as within the limit.
 const ROUNDING: f64 = 1e-9;
 
-/// Parses a torque margin, % of each limit.
+/// Parses a torque margin, % of each torque limit.
 ///
 /// # Errors
 ///
-/// Returns the reason as text if `text` is not a number or is outside 0 to [`MARGIN_PCT_MAX`].
+/// Returns an error text if `text` is not a number from 0 to [`MARGIN_PCT_MAX`].
 pub fn margin_of(text: &str) -> Result<f64, String> {
     let Ok(percent) = text.trim().parse::<f64>() else {
         return Err(format!(
@@ -37,7 +39,7 @@ pub fn margin_of(text: &str) -> Result<f64, String> {
     margin_in_range(percent).map(|()| percent).map_err(|error| error.to_string())
 }
 
-/// Checks that a torque margin, % of each limit, is within 0 to [`MARGIN_PCT_MAX`].
+/// Checks that a torque margin, % of each torque limit, is within 0 to [`MARGIN_PCT_MAX`].
 ///
 /// # Errors
 ///
@@ -46,15 +48,15 @@ pub fn margin_in_range(percent: f64) -> Result<(), PlanError> {
     if (0.0..=MARGIN_PCT_MAX).contains(&percent) { Ok(()) } else { Err(PlanError::Margin { percent }) }
 }
 
-/// Joint whose torque does not respect the margin of the plan.
+/// Excess of a joint torque over the limit that the torque margin allows.
 pub(super) struct Excess {
-    /// The joint.
+    /// Joint whose torque is too high.
     pub joint: Joint,
-    /// Factor for the duration of the motion at which the torque respects the margin.
+    /// Slow-down factor that the motion needs to respect the torque margin.
     pub stretch: f64,
 }
 
-/// Returns a note if the margin is smaller than requested because of gravity.
+/// Returns a note if the torque margin is smaller than requested because of gravity.
 pub(super) fn note(
     verdict: &Verdict,
     margin_pct: f64,
@@ -70,8 +72,8 @@ pub(super) fn note(
     ))
 }
 
-/// Checks the margin of `limits` at each millisecond of the trajectory, with the values that the controller computes. Returns the joint
-/// that needs the slowest motion to respect the margin, or `None` if all joints respect it.
+/// Checks the torque margin of `limits` at each millisecond of the trajectory, with the values that the controller computes. Returns the
+/// joint that needs the slowest motion, or `None` if all joints respect the torque margin.
 pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics) -> Option<Excess> {
     let mut worst = None::<Excess>;
     let end = (trajectory.duration_s() * 1e3).round() as u32;
@@ -90,7 +92,7 @@ pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics
             if torque[j].abs() <= usable * (1.0 + ROUNDING) {
                 continue;
             }
-            // Part of the torque that a slower motion does not reduce: gravity and nearly all of the friction.
+            // `still` is the torque that a slower motion does not reduce: the gravity torque and nearly all of the friction.
             let still = (slow[j] * torque[j].signum()).min(torque[j].abs());
             let (needed, left) = (torque[j].abs() - still, usable - still);
             let stretch = if left > 0.0 { (needed / left).sqrt() } else { f64::INFINITY };

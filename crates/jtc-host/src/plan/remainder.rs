@@ -1,4 +1,4 @@
-//! Remainder of an interrupted trajectory, on the same path, from rest to the end.
+//! Remainder of an interrupted trajectory: a motion on the same path from rest to the end of the trajectory.
 
 use jtc_core::{POINTS_MAX, SetPoint, interpolate};
 
@@ -6,17 +6,17 @@ use super::PlanError;
 use super::sampled::step_ms;
 use crate::trajectory::{Point, Trajectory};
 
-/// Returns the part of the path that begins at the time `from_ms`. The motion starts at rest, reaches full speed after `ramp_s` seconds,
-/// and then follows the original timing of the trajectory. The first point of the result is the position of the path at `from_ms`, and the
-/// last point is the last point of the trajectory.
+/// Returns the remainder of a trajectory after the path time `from_ms`. The motion starts at rest, reaches full speed after `ramp_s`
+/// seconds, and then follows the original timing of the trajectory. The first point of the result is the position of the path at `from_ms`.
+/// The last point of the result is the last point of the trajectory.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooLong`] if the remainder does not fit into the controller.
+/// Returns [`PlanError::TooLong`] if the remainder is too long for the controller.
 pub fn remainder(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<Trajectory, PlanError> {
     let from_s = f64::from(from_ms) * 1e-3;
     let left = (trajectory.duration_s() - from_s).max(0.0);
-    // During the ramp the path time advances by half of the ramp duration.
+    // During the ramp, the path time advances by half of the ramp duration.
     let ramp = ramp_s.min(2.0 * left).max(1e-3);
     let seconds = left + 0.5 * ramp;
     let step_ms = step_ms(seconds)?;
@@ -41,8 +41,8 @@ pub fn remainder(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<T
     Ok(Trajectory { step_ms, points })
 }
 
-/// Returns the path time after `t` seconds, the rate of the path time, and the derivative of this rate. The rate rises from 0 to 1 within
-/// `ramp` seconds.
+/// Returns the path time after `t` seconds, the rate of the path time, and the derivative of this rate. The rate of the path time rises
+/// from 0 to 1 within `ramp` seconds.
 fn ramped(t: f64, ramp: f64) -> (f64, f64, f64) {
     let u = t / ramp;
     if u >= 1.0 {
@@ -75,7 +75,7 @@ mod tests {
         (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max)
     }
 
-    /// From any position, the remainder begins at rest, stays on the path, ends at the end of the path, and passes the check.
+    /// From any position of the path, the remainder begins at rest, stays on the path, ends at the last point, and passes the check.
     #[test]
     fn the_rest_begins_at_rest_and_stays_on_the_path() {
         let (whole, config) = (demo_motion(), Config::avena());

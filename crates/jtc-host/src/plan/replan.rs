@@ -1,4 +1,4 @@
-//! Replanning: a new motion on the path of an existing trajectory, within the limits of an arm.
+//! Replanning: planning of a new motion on the path of an existing trajectory, within the limits of an arm.
 
 use jtc_plan::Waypoint;
 
@@ -7,7 +7,7 @@ use crate::plan::PlanError;
 use crate::trajectory::Trajectory;
 use crate::waypoints::thinned;
 
-/// Maximum distance of a dropped point from the segment between the neighbouring points, rad. The noise of encoders and of hand guidance is
+/// Maximum distance of a removed point from the segment between the remaining points, rad. The noise of encoders and of hand guidance is
 /// smaller than this distance.
 const THINNED: f64 = 0.005;
 /// Blend of the corners between segments, rad.
@@ -17,13 +17,15 @@ impl Planner<'_> {
     /// Maximum deviation of the new motion from the path, in the joint with the largest deviation, rad.
     pub const ASIDE: f64 = THINNED + BLEND;
 
-    /// Plans a motion on the path of a trajectory, independent of the timing of the trajectory. The motion is within the limits, begins and
-    /// ends at rest, deviates by at most [`Planner::ASIDE`], and is not faster than the original. The method is intended for measured
-    /// paths. Their splines contain encoder noise, and the arm may be moving at their ends.
+    /// Plans a new motion on the path of a trajectory, independent of the timing of this trajectory. The new motion is within the limits
+    /// and begins and ends at rest. The new motion deviates from the path by at most [`Planner::ASIDE`] and is not faster than the original
+    /// motion. This function is intended for measured paths. The spline of a measured path contains encoder noise, and the arm may be
+    /// moving at the ends of the path.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Planner::through`]. The waypoint numbers in these errors refer to the points that remain after thinning.
+    /// Returns the same errors as [`Planner::through`]. The waypoint numbers in these errors refer to the points that remain after
+    /// unnecessary points are removed.
     pub fn anew(&self, way: &Trajectory) -> Result<Planned, PlanError> {
         let positions: Vec<_> = way.points.iter().map(|point| point.position).collect();
         let place = |i: usize| positions.get(i).map(|q| Waypoint { position: *q, time: None });
@@ -33,7 +35,7 @@ impl Planner<'_> {
         if share < 1.0 {
             planned.trajectory = at_speed(&planned.trajectory, (100.0 * share).max(1.0))?;
             planned.waypoint_times.iter_mut().for_each(|t| *t /= share);
-            // The motion was slowed down to the duration of the original, so no limit determines its speed.
+            // The new motion was slowed down to the duration of the original motion, so no limit determines its speed.
             planned.binding.clear();
         }
         Ok(planned)
@@ -49,7 +51,8 @@ mod tests {
     use crate::check::Checker;
     use crate::trajectory::fit::Samples;
 
-    /// Replans two motions on their paths: a motion at twice the velocity limit that ends abruptly in the middle, and a slow motion.
+    /// The test replans two motions on their paths. The first motion has twice the velocity limit and ends abruptly in the middle of its
+    /// path. The second motion is slow.
     #[test]
     fn a_way_that_is_too_fast_is_gone_within_the_limits() {
         let arm = Arm::avena();
@@ -59,7 +62,7 @@ mod tests {
         for (seconds, too_fast) in [(0.6, true), (9.0, false)] {
             let shape = |u: f64| {
                 let q = 0.7 * (1.0 - (2.5 * u).cos());
-                // Adds encoder noise.
+                // Simulated encoder noise is added to the positions.
                 let noise = 2e-4 * (u * 1e4).sin();
                 [q + noise, 0.3 * q, -0.5 * q - noise, 0.2 * q, 0.4 * q, noise]
             };

@@ -1,4 +1,4 @@
-//! Sampling of a motion as a trajectory with points at a fixed time step.
+//! Conversion of a motion into a trajectory with points at a fixed time step.
 
 use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate};
 use jtc_plan::{Motion, State};
@@ -6,34 +6,34 @@ use jtc_plan::{Motion, State};
 use super::{PlanError, STEP_MS};
 use crate::trajectory::{Point, Trajectory};
 
-/// Minimum number of steps of a motion, unless the steps would be too short.
+/// Minimum number of steps of a trajectory, unless the steps would be too short.
 const STEPS_MIN: f64 = 20.0;
-/// Shortest step, ms. In a shorter step, a position would change by less than its rounding.
+/// Shortest step of a trajectory, ms. In a shorter step, a position would change by less than its rounding.
 const STEP_MIN_MS: f64 = 2.0;
 /// Longest step that a trajectory frame can contain, ms.
 const STEP_MAX_MS: f64 = 1000.0;
-/// Maximum deviation of a trajectory from the motion, between the points, rad.
+/// Maximum deviation of a trajectory from the motion between two points, rad.
 const ASIDE: f64 = 1e-3;
-/// Minimum number of points for each sharp corner. With fewer points the trajectory deviates more from the motion. A corner is sharp if the
-/// change of direction exceeds `CORNER_TURN` (a share of the path length), and its segments are longer than `CORNER_LEG` (rad).
+/// Minimum number of points for each sharp corner. With fewer points, the trajectory deviates more from the motion. A corner is sharp if
+/// its change of direction exceeds `CORNER_TURN` (a share of the path length) and its segments are longer than `CORNER_LEG` (rad).
 const CORNER_POINTS: usize = 3;
 const CORNER_TURN: f64 = 0.5;
 const CORNER_LEG: f64 = 0.05;
-/// Number of positions that are checked in each interval.
+/// Number of positions that are checked between two points.
 const PARTS: usize = 4;
 
-/// A motion in the form of a trajectory.
+/// Trajectory that was created from a motion.
 pub(super) struct Sampled {
     pub trajectory: Trajectory,
     /// Ratio of the times in the trajectory to the times in the motion.
     pub scale: f64,
 }
 
-/// Returns the step for a motion of this duration, in ms.
+/// Returns the time step for a motion of this duration, ms.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooLong`] if the controller cannot store a motion of this duration.
+/// Returns [`PlanError::TooLong`] if the controller cannot store a motion of this duration.
 pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     let fits = (seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil();
     let short = (seconds * 1e3 / STEPS_MIN).floor().clamp(STEP_MIN_MS, f64::from(STEP_MS));
@@ -41,13 +41,14 @@ pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     if step <= STEP_MAX_MS { Ok(step as u16) } else { Err(PlanError::TooLong { seconds }) }
 }
 
-/// Samples the motion after its time is stretched by the factor `stretch`. A trajectory has a whole number of steps, so the motion is
-/// stretched further to fill the last step. If `kept` is set, the motion is not stretched further, and the arm is at rest for the remainder
-/// of the last step. The first point is `first`, and the last point is exactly the end of the motion.
+/// Converts the motion into a trajectory after the duration of the motion is multiplied by `stretch`. A trajectory has a whole number of
+/// steps, so the motion is slowed down further to fill the last step. If `kept` is `true`, the motion is not slowed down further, and the
+/// arm is at rest until the end of the last step. The first point of the trajectory is `first`, and the last point is exactly the end of
+/// the motion.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooFine`] if the step is too long for the motion's corners.
+/// Returns [`PlanError::TooFine`] if the time step is too long for the corners of the motion.
 pub(super) fn sampled(
     motion: &Motion,
     first: &[f64; JOINTS],
@@ -63,8 +64,8 @@ pub(super) fn sampled(
     let rest = Point { position: end.position, ..Point::default() };
     let at = |t: f64| slowed(&motion.at(t / scale), scale);
     let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
-    // Both ends are exactly the requested positions. If the acceleration jumps at the start, the value before and the value after the jump
-    // are both correct.
+    // The first and the last point are exactly the requested positions. If the acceleration jumps at the start, the acceleration before the
+    // jump and the acceleration after the jump are both correct.
     if let Some(point) = points.first_mut() {
         (point.position, point.velocity) = (*first, [0.0; JOINTS]);
     }
@@ -80,7 +81,7 @@ pub(super) fn sampled(
 ///
 /// # Errors
 ///
-/// [`PlanError::TooManyCorners`].
+/// Returns [`PlanError::TooManyCorners`] if the waypoints have too many sharp corners.
 pub(super) fn fits_corners(positions: &[[f64; JOINTS]], blend: f64) -> Result<(), PlanError> {
     let most = (POINTS_MAX - 1) / CORNER_POINTS;
     let leg = |pair: &[[f64; JOINTS]]| {
@@ -96,8 +97,8 @@ pub(super) fn fits_corners(positions: &[[f64; JOINTS]], blend: f64) -> Result<()
     if corners > most { Err(PlanError::TooManyCorners { corners, most }) } else { Ok(()) }
 }
 
-/// Returns a lower bound for the duration of a motion through `positions` with at most `velocity` (rad/s), s. The motion
-/// passes each position within `blend` rad.
+/// Returns a lower bound for the duration (s) of a motion through `positions` with at most the joint velocities `velocity` (rad/s). The
+/// motion passes each position within `blend` rad.
 pub(super) fn least_s(positions: &[[f64; JOINTS]], blend: f64, velocity: &[f64; JOINTS]) -> f64 {
     let leg = |pair: &[[f64; JOINTS]]| {
         let way = |j: usize| (pair[1][j] - pair[0][j]).abs() - 2.0 * blend;
@@ -114,7 +115,7 @@ fn slowed(state: &State, scale: f64) -> Point {
     }
 }
 
-/// Returns the largest deviation between the curve of the controller and the motion, measured between the points, rad.
+/// Returns the largest deviation of the controller's interpolation from the motion between the points, rad.
 fn aside(points: &[Point], h: f64, at: impl Fn(f64) -> Point) -> f64 {
     let mut most = 0.0f64;
     for (i, pair) in points.windows(2).enumerate() {

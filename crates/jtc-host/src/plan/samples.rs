@@ -1,4 +1,4 @@
-//! Samples of a plan, like the samples that its execution would record, as far as they are known in advance.
+//! Samples of a planned trajectory. A sample contains the values of a recorded sample that are known before the execution.
 
 use jtc_core::JOINTS;
 use jtc_dynamics::Dynamics;
@@ -11,7 +11,7 @@ use crate::trajectory::{Point, Trajectory};
 
 impl Planner<'_> {
     /// Returns the commanded values at each point of a trajectory, with the torques of the model and the friction at the temperature of the
-    /// planner. Measured values are unknown.
+    /// planner. The samples do not contain measured values.
     pub fn samples(&self, trajectory: &Trajectory) -> Vec<Sample> {
         let dynamics =
             self.model.map(|model| Dynamics::with_payload(model, self.config.gravity, &self.config.payload));

@@ -1,4 +1,4 @@
-//! A path at another speed, and the set values of a trajectory at each millisecond.
+//! Trajectories at another speed, and the set values of a trajectory at each millisecond.
 
 use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate, position_speed};
 
@@ -10,8 +10,8 @@ use crate::trajectory::{Point, Trajectory};
 ///
 /// # Errors
 ///
-/// [`PlanError::Speed`] if the speed is outside 1 to 200 %; [`PlanError::TooLong`] if the slower trajectory is too long for the controller;
-/// [`PlanError::Plan`] if the trajectory has no points.
+/// Returns [`PlanError::Speed`] if the speed is outside 1 to 200 %. Returns [`PlanError::TooLong`] if the slower trajectory is too long for
+/// the controller. Returns [`PlanError::Plan`] if the trajectory has no points.
 pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, PlanError> {
     if trajectory.points.is_empty() {
         return Err(jtc_plan::PlanError::TooFew { count: 0 }.into());
@@ -30,7 +30,8 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     if (step - step.round()).abs() < 1e-9 && (1.0..=1000.0).contains(&step) {
         return Ok(Trajectory { step_ms: step.round() as u16, points: own.iter().map(slower).collect() });
     }
-    // The new step would not be a whole number of milliseconds. So each channel is resampled separately from its own samples (J-32).
+    // The new time step would not be a whole number of milliseconds. Therefore each channel (position, velocity, acceleration) is resampled
+    // from its own samples (J-32).
     let seconds = trajectory.duration_s() / s;
     let step_ms = f64::from(STEP_MS).max((seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil());
     if step_ms > 1000.0 {
@@ -50,11 +51,12 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     Ok(Trajectory { step_ms: step_ms as u16, points: points.collect() })
 }
 
-/// Returns the set values between two points, for resampling. In some files the velocities disagree with the positions by more than
-/// rounding, for example because they are all 0. In this case the derivative of the position replaces the velocities, so that the samples
-/// are consistent.
+/// Returns the set values between two points, for resampling. In some files the velocities differ from the speed of the positions by more
+/// than rounding, for example because all velocities are 0. If the velocities differ, the derivatives of the position replace the velocity
+/// and the acceleration.
 fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
-    // A distance of 0.0005 of the interval is precise enough for a polynomial, and the positions stay inside the interval.
+    // The acceleration is computed from the speeds at two times, 0.0005 of the interval before and after `u`. This distance is precise
+    // enough for a polynomial, and both times stay inside the interval.
     let (low, high) = ((u - 5e-4).max(0.0), (u + 5e-4).min(1.0));
     let mut at = interpolate(a, b, h, u);
     let (speed, before, after) =
@@ -70,8 +72,8 @@ fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
 }
 
 impl Trajectory {
-    /// Returns the set values at the 1 ms point `k`, with the controller's interpolation (J-31, J-32). After the end of the trajectory,
-    /// returns the values of the last point.
+    /// Returns the set values at the 1 ms point `k`, with the controller's interpolation (J-31, J-32). After the end of the trajectory, the
+    /// function returns the values of the last point.
     pub fn at_ms(&self, k: u32) -> Option<SetPoint> {
         let step = u32::from(self.step_ms.max(1));
         let (i, ms) = ((k / step) as usize, k % step);
@@ -111,7 +113,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// At another speed, the path contains the same positions at other times.
+        /// At another speed, the trajectory reaches the same positions at other times.
         #[test]
         fn another_speed_keeps_the_path(from in pose(), to in pose(), speed in 5.0..100.0f64) {
             let config = Config::avena();

@@ -1,4 +1,4 @@
-//! Tests that every plan passes the check, and that impossible motions are rejected with the reason.
+//! Tests that every plan passes the check, and that the planner rejects impossible motions with the reason.
 
 use host_kit::{Diagnose, ErrorKind};
 use jtc_core::{POINTS_MAX, SetPoint};
@@ -32,8 +32,8 @@ proptest! {
         prop_assert!(plan.points.len() <= POINTS_MAX);
     }
 
-    /// The plans consider torques, friction and stopping distance. If the arm cannot be held, or cannot be stopped at any speed, the
-    /// planner returns an error with this reason.
+    /// The planner considers torques, friction and the ability to stop. If the drives cannot hold the arm, or cannot stop the arm at any
+    /// speed, the planner returns an error with this reason.
     #[test]
     fn plans_of_an_arm_pass_its_check(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.3f64, jerk: bool) {
         let arm = Arm::avena();
@@ -116,7 +116,7 @@ fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     }
 }
 
-/// Like a move, an approach to a trajectory begins at the nearest position inside the limits.
+/// If the arm is outside its limits, an approach begins at the nearest position inside the limits, like a move.
 #[test]
 fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let arm = Arm::avena();
@@ -131,11 +131,11 @@ fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let points = &start.checked.trajectory().points;
     assert_eq!(points[0].position, [0.0, 1.57, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(points.last().unwrap().position, t.points[0].position);
-    // From a position outside the start tolerance, only a jog can move the arm back.
+    // If the arm is outside its limits by more than the start tolerance, only a jog can move the arm back.
     assert!(order.start(1, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0]).is_err());
 }
 
-/// A motion whose torque would be too high is planned at a lower speed.
+/// If the torque of a motion would be too high, the planner plans the motion at a lower speed.
 #[test]
 fn moves_slow_down_for_torque() {
     let arm = Arm::avena();
@@ -153,7 +153,7 @@ fn moves_slow_down_for_torque() {
     assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
 }
 
-/// Long and slow motions have longer time steps. The duration is limited by the memory of the controller.
+/// Long and slow motions have longer time steps. The memory of the controller limits the duration of a motion.
 #[test]
 fn any_length_fits_or_is_refused() {
     let config = Config::avena();
@@ -169,7 +169,7 @@ fn any_length_fits_or_is_refused() {
     assert!(matches!(error, PlanError::TooManyCorners { .. }), "{error}");
 }
 
-/// The planner respects the times of waypoints, or rejects them with the shortest possible time.
+/// The planner respects the times of waypoints, or returns an error with the shortest possible time.
 #[test]
 fn given_times_are_kept_or_refused() {
     let config = Config::avena();
@@ -196,8 +196,8 @@ fn lowered_with(mass: f64) -> Result<Planned, PlanError> {
     planner.through(&waypoints(&places))
 }
 
-/// The planner accepts a pose even if holding and leaving it needs the whole torque limit, although plans otherwise use a smaller part of
-/// the limit.
+/// The planner accepts a pose even if the arm needs the whole torque limit to hold and leave the pose. Other plans use a smaller share of
+/// the torque limit.
 #[test]
 fn a_pose_that_can_be_held_can_be_left() {
     let (arm, mut masses) = (Arm::avena(), 0);
@@ -219,7 +219,8 @@ fn a_pose_that_can_be_held_can_be_left() {
     assert!(masses > 0);
 }
 
-/// The error contains the waypoint that cannot be held, its torque, and the share of the limit that may be used to hold the arm.
+/// The error contains the waypoint at which the drives cannot hold the arm, and the necessary torque. The error also contains the share of
+/// the limit that may be used to hold the arm.
 #[test]
 fn too_much_payload_names_the_pose_that_cannot_be_held() {
     let error = lowered_with(8.0).unwrap_err();
@@ -234,7 +235,7 @@ fn too_much_payload_names_the_pose_that_cannot_be_held() {
     assert!(error.to_string().contains("97.0 % of its limit of 180.0 N·m"), "{error}");
 }
 
-/// If there are more corners than points, the motion is rejected before planning.
+/// If the waypoints have too many corners for the points of a trajectory, the motion is rejected before planning.
 #[test]
 fn too_many_corners_are_refused_at_once() {
     let places: Vec<[f64; JOINTS]> = (0..10_000)
@@ -248,8 +249,8 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
-/// A motion that is too long even at the highest speed is rejected before planning. So the planner rejects the motion before it checks that
-/// the arm can be held in the last pose. Waypoints that are probably in degrees are reported as waypoints in degrees.
+/// A motion that is too long even at the highest speed is rejected before planning. The planner has then not yet checked that the drives
+/// can hold the arm in the last pose. If the same waypoints are in degrees, the planner reports a position outside the limits.
 #[test]
 fn too_long_a_way_is_refused_at_once() {
     let arm = Arm::avena();

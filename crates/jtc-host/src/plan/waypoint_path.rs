@@ -1,26 +1,25 @@
-//! Path through the waypoints of a file. The path consists of joint positions, or of lines and arcs of the flange.
+//! Path through the waypoints of a file. The segments of the path are straight in joint space, or are lines and arcs of the flange.
 
 use super::kinematics::Route;
 use super::{Aside, PlanError, Planned, Planner, Waypoint, corners, furthest_aside};
 use crate::arm::Arm;
 use crate::waypoints::{WaypointError, WaypointFile};
 
-/// Deviation of the flange from a straight line (m) above which a note is written.
+/// Deviation of the flange from a straight line (m) above which the user gets a note.
 const ASIDE_M: f64 = 5e-4;
 
 /// Options for the path through waypoints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WayOptions {
-    /// If `true`, the flange moves on a straight line in each segment for which the file does not specify the motion.
+    /// `true` if the flange moves along a straight line in each segment for which the file does not specify the motion.
     pub line: bool,
-    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. If this value is 0, the arm stops at each
-    /// waypoint.
+    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. If `blend` is 0, the arm stops at each waypoint.
     pub blend: f64,
-    /// Rounding of the corner between two lines or arcs, m. If this value is 0, the arm stops at each of these corners.
+    /// Rounding of the corner between two lines or arcs, m. If `blend_m` is 0, the arm stops at each of these corners.
     pub blend_m: f64,
 }
 
-/// Path that is planned.
+/// Path through waypoints, for the planner.
 #[derive(Debug)]
 pub struct WaypointPath<'a> {
     file: &'a WaypointFile,
@@ -31,7 +30,7 @@ pub struct WaypointPath<'a> {
 #[derive(Debug)]
 enum Course {
     Joints(Vec<Waypoint>),
-    /// Alternative routes (the fastest is used), and the times of the waypoints.
+    /// Alternative routes and the times of the waypoints. The planner uses the fastest route.
     Lines(Vec<Route>, Vec<Option<f64>>),
 }
 
@@ -40,14 +39,14 @@ impl<'a> WaypointPath<'a> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`WaypointFile::positions`] and [`WaypointFile::route`], and [`PlanError::Blend`].
+    /// Returns the errors of [`WaypointFile::positions`] and [`WaypointFile::route`], and [`PlanError::Blend`] if a blend is too large.
     pub fn of(file: &'a WaypointFile, arm: &Arm, options: WayOptions) -> Result<Self, WaypointError> {
         let WayOptions { line, blend, blend_m } = options;
         corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
-            // A stop at a waypoint satisfies every blend. At a sharp corner, a stop may be faster than a small blend, so both routes are
-            // planned.
+            // A stop at a waypoint is allowed with every blend. At a sharp corner, a stop may be faster than a motion around a small blend.
+            // Therefore a route with rounded corners and a route with stops are planned.
             let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
             Course::Lines([rounded].into_iter().chain(sharp).collect(), times)
         } else {
@@ -84,10 +83,10 @@ impl<'a> WaypointPath<'a> {
         fastest.unwrap_or(Err(PlanError::Nowhere { count: 0 }))
     }
 
-    /// Returns the largest deviation of the flange from the straight line between two poses of the flange, if the deviation is above 0.5
-    /// mm.
+    /// Returns the largest deviation of the flange from the straight line between two poses of the flange. Returns `None` if the deviation
+    /// is smaller than 0.5 mm.
     pub fn off_the_line(&self, planned: &Planned, arm: &Arm) -> Option<Aside> {
-        // If the option `line` is set, the user has explicitly selected joint space for each remaining segment.
+        // If the option `line` is `true`, the user has explicitly selected joint space for each segment that is not a line.
         let legs = if self.options.line { Vec::new() } else { self.file.legs_between_flange_poses() };
         furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)
     }

@@ -1,4 +1,4 @@
-//! Checks that a controller accepts the gains (J-71), and that the gains damp the arm.
+//! Checks that a controller accepts the gains (J-71), and that the gains damp each joint.
 
 use host_kit::Severity;
 use jtc_core::{JOINTS, PidGains, inertia_needed, least_felt_inertia};
@@ -11,14 +11,14 @@ use crate::arm::statics::{POSES, pose};
 
 /// Heaviest payload for the check of the damping, kg.
 const PAYLOAD_MAX: f64 = 5.0;
-/// Delay of the position gain in addition to the controller's setting, s: each torque stays constant for one tick, so the average delay is
-/// half a tick. `TICK` is the length of a tick, s.
+/// Average delay of a torque that stays constant for one tick, s. The check adds this delay to the delay in the controller's settings.
+/// `TICK` is the duration of one controller tick, s.
 const HALF_A_TICK: f64 = 0.5e-3;
 const TICK: f64 = 1e-3;
 
 impl Arm {
-    /// Finds joints that are too light for their gains, so that a controller refuses the gains, and joints that the gains
-    /// do not damp.
+    /// Finds joints that are too light for their gains, and joints that the gains do not damp. A controller refuses the gains of a joint
+    /// that is too light.
     pub(super) fn find_borne(&self, findings: &mut Vec<ArmFinding>) {
         let Some(pid) = &self.pid else { return };
         let (config, delay) = (self.config(), self.config().delay_ticks);
@@ -26,7 +26,7 @@ impl Arm {
         let (payload, moved) = self.heaviest_moved();
         for (joint, gains) in Joint::ALL.into_iter().zip(pid) {
             let j = joint.index();
-            // If the joint already has a stability finding, that finding is more precise.
+            // If the joint already has a stability finding, no second finding is added, because the stability finding is more precise.
             if findings.iter().any(|found| found.code == "gains" && found.joint == Some(joint)) {
                 continue;
             }
@@ -73,7 +73,7 @@ impl Arm {
             "{}: Kd {kd} N·m·s/rad does not damp the joint{with}, expected at least {needed:.1}",
             self.titled(joint)
         );
-        // The delay of Kp reduces the effective Kd. The integral gain can use the remaining damping.
+        // The delay of Kp reduces the effective Kd. The advised integral gain is small enough for the remaining damping.
         let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
         ArmFinding::new(Severity::Warning, "damping", what)
             .because(
@@ -88,8 +88,8 @@ impl Arm {
             .measured(*kd, needed, "N·m·s/rad")
     }
 
-    /// Returns the heaviest payload (kg, up to [`PAYLOAD_MAX`]) that the torque limits can hold in every pose. Also
-    /// returns, for each joint, the greatest inertia with this payload while the other joints are held, kg·m².
+    /// Returns the heaviest payload (kg, up to [`PAYLOAD_MAX`]) that the torque limits can hold in every pose. Also returns the greatest
+    /// inertia of each joint with this payload, kg·m², while the other joints are held in position.
     fn heaviest_moved(&self) -> (f64, JointVec) {
         let ranges = self.ranges();
         let bare = Dynamics::new(&self.model, self.config().gravity);

@@ -5,7 +5,7 @@ use jtc_wire::Joint;
 
 use crate::arm::Arm;
 
-/// Fault of a joint limit.
+/// Reason why a joint limit is invalid.
 pub(in crate::arm) struct LimitFault {
     pub key: &'static str,
     pub value: f64,

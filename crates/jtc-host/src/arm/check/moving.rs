@@ -1,4 +1,4 @@
-//! Checks that the drives hold an arm in every pose, and that its torque limits are in the right unit.
+//! Checks that the drives hold an arm in every pose, and that the torque limits of the arm are in the right unit.
 
 use host_kit::Severity;
 use jtc_core::JOINTS;
@@ -8,7 +8,7 @@ use super::{ArmFinding, Holding};
 use crate::arm::Arm;
 use crate::arm::statics::{Worst, worst_gravity};
 
-/// Share of the torque limit above which gravity leaves little torque for motion.
+/// Share of the torque limit that gravity may use. Above this share, the remaining torque is low for motions.
 const LITTLE_LEFT: f64 = 0.8;
 /// If the greatest torque limit exceeds the greatest gravity torque by this factor, the unit of the limits is probably
 /// wrong.

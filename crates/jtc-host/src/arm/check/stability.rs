@@ -1,4 +1,4 @@
-//! Check of the gains for stability, and the tolerated range of the rotor inertias.
+//! Check of the gains for stability, and computation of the rotor inertias for which the gains stay stable.
 
 use host_kit::{Finding, Severity};
 use jtc_core::{JOINTS, PidGains};
@@ -11,22 +11,22 @@ use crate::arm::statics::{Inertia, inertia};
 use crate::arm::{Arm, RotorMargin, Source};
 use crate::error::ParametersError;
 
-/// Tolerated factors of the rotor inertias, relative to the file.
+/// Ranges of the rotor inertias in which the gains are stable, as factors of the values in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RotorMargins {
-    /// Factors if all rotor inertias change together.
+    /// Allowed factors if all rotor inertias change by the same factor.
     pub all: RotorMargin,
-    /// Factors if the inertia of one rotor changes alone, base to wrist.
+    /// Allowed factors of each rotor if only the inertia of this rotor changes, base to wrist.
     pub joints: [RotorMargin; JOINTS],
 }
 
 impl Arm {
-    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71), by the same rules as [`Arm::check`]. An arm without
-    /// gains passes.
+    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71). The rules are the same as in [`Arm::check`]. An arm
+    /// without gains is accepted.
     ///
     /// # Errors
     ///
-    /// [`ParametersError::Unstable`] with the first finding about the gains that is a problem.
+    /// Returns [`ParametersError::Unstable`] with the first finding about the gains that has the severity `Problem`.
     pub fn check_gains(&self) -> Result<(), ParametersError> {
         let mut findings = Vec::new();
         if self.is_physical().is_ok() {
@@ -42,7 +42,7 @@ impl Arm {
         }
     }
 
-    /// Finds unstable gains, of each joint and of all joints together. If the gains are stable, returns the tolerated factors of the rotor
+    /// Finds unstable gains of single joints and of all joints together. If the gains are stable, returns the allowed factors of the rotor
     /// inertias. Returns `None` if gains are unstable, or if the file does not contain the gains and all rotor inertias.
     pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) -> Option<RotorMargins> {
         let pid = self.pid.as_ref().filter(|_| self.rotors_given == [true; JOINTS])?;
@@ -117,7 +117,8 @@ impl Arm {
         Some(found.of(joint, "pid"))
     }
 
-    /// Finds gains that are not stable for all rotor inertias within the uncertainty of a proposed value, which was not measured.
+    /// Finds gains that may be unstable because a rotor inertia is only proposed. The gains must be stable for the whole range of inertias
+    /// that the real rotor may have.
     fn proposed_rotors(&self, margin: impl Fn([bool; JOINTS]) -> Option<RotorMargin>) -> Option<ArmFinding> {
         let name = "rotor_inertia_kg_m2";
         let is_proposed = |joint: &Joint| self.sources.of((Some(*joint), name)) == Source::Proposed;
@@ -161,9 +162,9 @@ fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
     ArmFinding::new(Severity::Good, "gains", what)
 }
 
-/// Formats a range such as `0.08..12`, with two digits, rounded to the safe side.
+/// Formats a range such as `0.08..12` with two digits. The lower limit is rounded up and the upper limit is rounded down.
 fn range(down: f64, up: f64) -> String {
-    // Tolerance that prevents further rounding of a value that already has two digits.
+    // Tolerance for rounding errors. With this tolerance, a value that already has two digits stays the same.
     const ROUNDING: f64 = 1e-9;
     format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
 }

@@ -1,4 +1,4 @@
-//! Tests that each fault of an arm causes exactly its own finding.
+//! Tests that each fault of an arm causes exactly the finding about this fault.
 
 use proptest::prelude::*;
 
@@ -11,7 +11,7 @@ fn of(from: &str, to: &str) -> Arm {
     toml_form::read(&AVENA_TOML.replacen(from, to, 1)).unwrap()
 }
 
-/// Returns the findings of a severity other than good, as code, severity and joint.
+/// Returns the code, severity and joint of each finding that is a warning or a problem.
 fn found(arm: &Arm) -> Vec<(&'static str, Severity, Option<u8>)> {
     let bad = arm.check().findings.into_iter().filter(|f| f.finding.severity != Severity::Good);
     bad.map(|f| (f.code, f.finding.severity, f.joint.map(Joint::number))).collect()
@@ -74,7 +74,7 @@ fn what_is_missing_is_said_and_only_what_no_controller_starts_without_is_refused
     assert_eq!(lacking("gravity"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("rotor"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("velocity_max"), (vec![("default", Warning, None)], false));
-    // The file still has a friction table, so the check does not report missing friction.
+    // Without the polynomial the file still has a friction table, so the check does not report missing friction.
     assert_eq!(lacking("friction_polynomial"), (vec![], false));
 }
 
@@ -109,7 +109,7 @@ fn torque_limits_in_another_unit_are_suspected() {
     assert!(found(&arm).contains(&("unit", Severity::Warning, None)));
 }
 
-/// The check always reports unstable gains as refused.
+/// The check reports unstable gains as a problem.
 #[test]
 fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     use Severity::Problem;
@@ -133,7 +133,7 @@ fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 1.2)), of(&[]));
 }
 
-/// Within the margins of the rotor inertias the gains are stable; slightly outside the margins the gains are unstable.
+/// The gains are stable within the allowed factors of the rotor inertias, and unstable slightly outside these factors.
 #[test]
 fn j71_the_rotor_margin_is_where_the_check_changes() {
     let arm = Arm::avena();
@@ -190,7 +190,7 @@ fn proposals_are_found_with_their_joints() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// The check does not panic for any number, and it refuses an arm with a number that is not finite.
+    /// The check does not panic for any number. The check refuses an arm if one of its numbers is not finite.
     #[test]
     fn no_number_is_too_odd_for_the_check(place in 0..11usize, joint in 0..JOINTS, value in prop::num::f64::ANY) {
         let mut arm = Arm::avena();
@@ -216,7 +216,7 @@ proptest! {
     }
 }
 
-/// Gains that a controller would refuse are refused here, in an error with the joint and the allowed inertia.
+/// The check refuses gains that a controller would refuse. The error contains the joint and the allowed inertia.
 #[test]
 fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let mut arm = Arm::avena();
@@ -224,10 +224,10 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let findings = arm.check().findings;
     let light = findings.iter().find(|f| f.code == "too-light").expect("too light");
     assert_eq!((light.finding.severity, light.joint.map(Joint::number)), (Severity::Problem, Some(1)));
-    // The gains are barely stable, so the stability check finds no problem.
+    // The gains in this test are barely stable, so the stability check finds no problem.
     assert!(!findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem));
     assert!(arm.check_gains().unwrap_err().to_string().contains("kg·m²"));
-    // The check also works if the file does not contain the rotor inertias, so that stability is unknown.
+    // If the rotor inertias are missing in the file, the stability is unknown, but the check still refuses gains that are too high.
     let mut arm = Arm { rotors_given: [false; JOINTS], ..Arm::avena() };
     arm.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 0.0);
     assert!(arm.check_gains().is_ok());
@@ -235,7 +235,8 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     assert!(arm.check_gains().is_err());
 }
 
-/// An integral gain that is too strong for a heavy load causes a warning. With the gain that the warning advises, the warning disappears.
+/// An integral gain that is too high for a heavy load causes a warning. With the gain that the warning recommends, the check no longer
+/// reports this warning.
 #[test]
 fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
     let warned = |ki: f64| {

@@ -12,25 +12,25 @@ use crate::file::FileError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// The name cannot be used in a waypoint file or an option.
+    /// The name is not valid, so it cannot be used in a waypoint file or in an option.
     #[error(
         "\"{name}\" is not a valid name of a pose: a name begins with a letter, has only letters, digits, _, - and ., at most {NAME_MAX}, and is \
          not a number (nan, inf)"
     )]
     Name {
-        /// The name.
+        /// Name of the pose.
         name: String,
     },
     /// The arm does not have a pose of this name.
     #[error("the arm {arm} has no pose \"{name}\"{}", known_words(known))]
     Unknown {
-        /// The name.
+        /// Name of the pose.
         name: String,
         /// Name of the arm.
         arm: String,
         /// Names of the existing poses.
         known: Vec<String>,
-        /// Most similar name of an existing pose.
+        /// Name of the existing pose that is most similar to the unknown name.
         like: Option<String>,
     },
     /// The pose is outside the arm's limits.
@@ -38,19 +38,19 @@ pub enum PoseError {
     Outside {
         /// Name of the pose.
         name: String,
-        /// Joint outside its limits.
+        /// Joint that is outside its limits in this pose.
         joint: Joint,
         /// Position of the joint in the pose, rad.
         value: f64,
-        /// Lower limit, rad.
+        /// Lower position limit of the joint, rad.
         min: f64,
-        /// Upper limit, rad.
+        /// Upper position limit of the joint, rad.
         max: f64,
     },
     /// A pose of this name exists already.
     #[error("{}: pose \"{name}\" exists already", path.display())]
     Exists {
-        /// The arm file.
+        /// Path of the arm file.
         path: PathBuf,
         /// Name of the pose.
         name: String,
@@ -58,7 +58,7 @@ pub enum PoseError {
     /// The file is a robot description, which cannot contain poses.
     #[error("{} is a robot description, which cannot store poses", path.display())]
     Description {
-        /// The file.
+        /// Path of the robot description.
         path: PathBuf,
     },
     /// The arm file cannot be read or written.

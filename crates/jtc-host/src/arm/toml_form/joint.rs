@@ -1,4 +1,4 @@
-//! Joint in the TOML format of an arm file.
+//! Table of one joint in the TOML format of an arm file.
 
 use jtc_core::{JointConfig, PidGains};
 use jtc_wire::Joint;
@@ -8,12 +8,13 @@ use super::exactly;
 use crate::arm::{Change, Sources, Warning};
 use crate::file::{FileError, Place};
 
-/// Defaults for limits that are missing in a file, in rad/s, rad/s² and rad.
+/// Velocity limit that is used if a file does not contain one, rad/s. The next two constants are the default acceleration limit, rad/s²,
+/// and the default position error limit, rad.
 pub(in crate::arm) const VELOCITY_DEFAULT: f64 = 1.5;
 pub(in crate::arm) const ACCELERATION_DEFAULT: f64 = 12.56637;
 pub(in crate::arm) const POSITION_ERROR_DEFAULT: f64 = 0.09;
-/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s this damping torque is 30 % of the torque limit, which is
-/// also the greatest torque that the controller recognises as a load.
+/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s the damping torque is 30 % of the torque limit. The
+/// controller recognises a torque up to 30 % of the torque limit as a load.
 pub(in crate::arm) const TEACH_DAMPING_DEFAULT: f64 = 0.5;
 
 #[derive(Serialize, Deserialize)]
@@ -51,7 +52,7 @@ pub(super) struct PidForm {
 }
 
 impl JointForm {
-    /// Returns `true` if the file contains the value of `key` for the joint, or if a default exists.
+    /// Returns `true` if the file contains the value of `key` for the joint, or if this key has a default.
     pub(super) fn has(&self, key: &str) -> bool {
         match key {
             "rotor_inertia_kg_m2" => self.rotor_inertia_kg_m2.is_some(),

@@ -1,7 +1,8 @@
 //! Selection of the arm's six joints in a robot description.
 //!
-//! Terms: a *rotary* joint is a revolute or a continuous joint. A joint that is not fixed and is not one of the six is *held* at zero, as
-//! if it were fixed. Examples are the finger of a gripper, the wheel of a cart, and the seventh joint of a redundant arm.
+//! Terms: a *rotary* joint is a revolute or a continuous joint. A *held* joint can move but is not one of the six joints of the arm. The
+//! importer treats a held joint as fixed at position 0. Examples of held joints are the finger of a gripper, the wheel of a cart, and the
+//! seventh joint of a redundant arm.
 
 use std::path::PathBuf;
 
@@ -11,7 +12,7 @@ use urdf_rs::{Joint, JointType, Robot};
 use crate::arm::ArmChoice;
 use crate::file::{FileError, Place};
 
-/// Returns the six joints, base to wrist. Each of these joints is attached to the previous one.
+/// Returns the six joints of the arm, base to wrist. Each joint is attached to the previous joint.
 pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Joint; JOINTS], FileError> {
     no_loops(robot)?;
     let candidates: Vec<&Joint> = match (&choice.joints, &choice.tip) {
@@ -37,7 +38,7 @@ pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Jo
     Ok(six)
 }
 
-/// Returns an error about a joint.
+/// Returns an error about a joint of the description.
 pub(super) fn about(joint: &Joint, problem: impl Into<String>) -> FileError {
     FileError::at(Place::name(format!("joint {}", joint.name)), problem)
 }
@@ -59,12 +60,12 @@ fn above<'a>(robot: &'a Robot, link: &str) -> Option<&'a Joint> {
     robot.joints.iter().find(|j| j.child.link == link)
 }
 
-/// Returns the joints between `link` and the root, beginning at `link`. The description must have no loops.
+/// Returns the joints between `link` and the root, beginning at `link`. The description must not contain loops.
 fn way_down<'a>(robot: &'a Robot, link: &str) -> impl Iterator<Item = &'a Joint> {
     std::iter::successors(above(robot, link), |j| above(robot, &j.parent.link))
 }
 
-/// Checks that the description does not contain a loop: each chain of parent links must end at a root.
+/// Checks that the description does not contain a loop. Without loops, each chain of parent links ends at a root.
 fn no_loops(robot: &Robot) -> Result<(), FileError> {
     for joint in &robot.joints {
         let mut at = joint;
@@ -90,7 +91,8 @@ fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError>
     Ok(way)
 }
 
-/// Returns the joints that are not fixed and do not mimic another joint, beginning at the root.
+/// Returns the joints that can move independently, beginning at the root. Fixed joints and joints that mimic another joint are not
+/// included.
 fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
     let driven = |j: &&Joint| j.joint_type != JointType::Fixed && j.mimic.is_none();
     let mut joints: Vec<&Joint> = joints.into_iter().filter(driven).collect();
@@ -98,7 +100,7 @@ fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
     joints
 }
 
-/// Returns the joints that the user selected.
+/// Returns the joints with the names that the user has selected.
 fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, FileError> {
     let find = |name: &String| -> Result<&'a Joint, FileError> {
         let joint = robot.joints.iter().find(|j| &j.name == name).ok_or_else(|| {
@@ -137,7 +139,7 @@ fn kind(joint: &Joint) -> String {
 
 /// Returns an error that explains why the joints are not a six-axis arm and names the option that selects the joints.
 fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileError {
-    // Finds the longest chain of rotary joints.
+    // The message names the longest chain of rotary joints.
     let chain_to = |end: &Joint| -> Vec<&Joint> {
         let way = way_to(robot, &end.child.link).unwrap_or_default();
         way.into_iter().filter(|j| rotary(j) && candidates.iter().any(|c| c.name == j.name)).collect()

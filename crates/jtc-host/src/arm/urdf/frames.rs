@@ -1,4 +1,4 @@
-//! Rigid frames and bodies, for merging links.
+//! Frames and rigid bodies, which are used to merge links.
 
 use jtc_dynamics::{Link, Origin};
 
@@ -6,7 +6,7 @@ type Matrix = [[f64; 3]; 3];
 
 const UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Frame relative to its parent.
+/// Frame relative to its parent frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Frame {
     rotation: Matrix,
@@ -90,7 +90,7 @@ impl Frame {
         } else if z < -1.0 + 1e-12 {
             [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
         } else {
-            // Rotation about z × axis (Rodrigues).
+            // Rotation about the vector z × axis, by Rodrigues' formula.
             let k = 1.0 / (1.0 + z);
             [[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]]
         };
@@ -98,7 +98,7 @@ impl Frame {
     }
 }
 
-/// Mass, centre of mass, and inertia about the centre of mass, relative to a frame.
+/// Rigid body: mass, centre of mass, and inertia about the centre of mass, relative to a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     mass: f64,
@@ -128,7 +128,7 @@ impl Body {
         }
     }
 
-    /// Returns the inertia about `point` (parallel-axis theorem).
+    /// Returns the inertia of the body about `point`, by the parallel-axis theorem.
     fn about(&self, point: &[f64; 3]) -> Matrix {
         let d: [f64; 3] = std::array::from_fn(|i| self.centre[i] - point[i]);
         let square: f64 = d.iter().map(|v| v * v).sum();
@@ -156,7 +156,7 @@ impl Body {
         };
     }
 
-    /// Returns a link whose inertia frame has the same orientation as the link's frame.
+    /// Returns the body as a link. The inertia frame of this link has the same orientation as the frame of the link.
     pub(super) fn link(&self) -> Link {
         let i = &self.inertia;
         Link {

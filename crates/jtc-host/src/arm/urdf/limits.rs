@@ -11,15 +11,15 @@ use super::choice::about;
 use crate::arm::{Arm, Change};
 use crate::file::FileError;
 
-/// Largest position limit of a multi-turn joint in either direction, rad. Larger numbers are probably degrees.
+/// Largest position limit of a multi-turn joint in either direction, rad. A larger position limit is probably in degrees.
 const TWO_TURNS: f64 = 4.0 * PI;
-/// Largest angle that counts as one full turn, rad; typical descriptions round 2π up to this value.
+/// Largest angle that counts as one full turn, rad. Many descriptions round 2π up to this value.
 const TURN: f64 = 6.3;
-/// Largest credible velocity limit of a joint, rad/s. The fastest wrists reach 900 °/s. Larger numbers are degrees per
-/// second or placeholders.
+/// Largest credible velocity limit of a joint, rad/s. The fastest wrist joints reach 900 °/s, which is 15.7 rad/s. A larger velocity limit
+/// is in degrees per second, or is a placeholder.
 const BELIEVABLE_SPEED: f64 = 16.0;
 
-/// Rounds to four decimals.
+/// Rounds a number to four decimals.
 pub(super) fn short(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
@@ -28,14 +28,15 @@ fn is_limit(value: f64) -> bool {
     value > 0.0 && value.is_finite()
 }
 
-/// Returns the highest velocity limit that these drives accept, rad/s.
+/// Returns the highest velocity limit that the drives accept, rad/s.
 fn fastest() -> f64 {
     let drives = Config::avena();
     drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor
 }
 
 /// Rejects position limits that are not a valid range in rad. The reader does not replace invalid limits by the widest range of the drives,
-/// because the arm could then hit its end stops. Returns `true` if both limits are beyond one full turn, as in some wrists.
+/// because the arm could then hit its end stops. Returns `true` if the joint can turn more than one full turn in each direction, like some
+/// wrists.
 fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
     if let Some(limit) = [lower, upper].into_iter().find(|limit| limit.is_nan()) {
@@ -76,8 +77,8 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
 }
 
 impl Chain<'_> {
-    /// Returns the limits of all six joints. A missing limit is replaced by the limit of the default arm or of the drives, and the new
-    /// value is marked as a default.
+    /// Returns the limits of all six joints. If a limit is missing, the limit of the default arm or of the drives is used, and the value is
+    /// marked as a default.
     pub(super) fn limits(&mut self) -> Result<[JointConfig; JOINTS], FileError> {
         let mut all = Arm::avena().joints;
         for (number, joint) in Number::ALL.into_iter().zip(self.rotary) {
@@ -108,8 +109,7 @@ impl Chain<'_> {
                 self.sources.fill_in((Some(number), key));
             }
         }
-        // A missing limit is replaced by the range of the drives. The description does not say if the joint has an end
-        // stop.
+        // If a position limit is missing, the limit of the drives is used. The description does not contain the end stops of the joint.
         let mut assumed = Vec::new();
         for (key, limit, end) in [
             ("position_min_rad", &mut to.position_min, -WORKING_AREA),
@@ -141,8 +141,8 @@ impl Chain<'_> {
         if is_limit(limit.velocity) && limit.velocity <= BELIEVABLE_SPEED {
             to.velocity_max = limit.velocity;
         } else if is_limit(limit.velocity) {
-            // The number may be in rad/s or in °/s. The reader uses the lower speed of both meanings, limited to the speed of the drives,
-            // and marks it as not given.
+            // The velocity limit may be in rad/s or in °/s. The reader assumes °/s, because this speed is lower, and limits the speed to
+            // the speed of the drives. The reader marks the value as a default.
             let in_degrees = limit.velocity.to_radians();
             to.velocity_max = in_degrees.min(fastest());
             self.sources.fill_in((Some(number), "velocity_max_rad_s"));
@@ -172,7 +172,7 @@ impl Chain<'_> {
         }
     }
 
-    /// Narrows the joint limits to the limits of the drives. A description gives the limits of the mechanism, but the controller refuses
+    /// Narrows the joint limits to the limits of the drives. A description contains the limits of the mechanism. The controller refuses
     /// limits beyond the limits of the drives (J-35, J-43).
     fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) -> Result<(), FileError> {
         let drives = Config::avena();

@@ -1,4 +1,4 @@
-//! Typical robot descriptions: arbitrary axes, fixed joints, gripper fingers, and numbers that are missing, duplicated or wrong.
+//! Tests with robot descriptions that have arbitrary axes, fixed joints, gripper fingers, and missing, duplicated or wrong numbers.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::arm::{Arm, ArmChoice, Change, Source};
 use host_kit::Diagnose;
 
-/// Joint of a robot description with origin, axis, and mass and centre of mass of the link.
+/// Joint of a robot description: origin and axis of the joint, mass and centre of mass of its link.
 #[derive(Clone, Debug)]
 struct Part {
     xyz: [f64; 3],
@@ -39,8 +39,8 @@ fn joint(name: &str, kind: &str, (parent, child): (&str, &str), inside: &str) ->
 
 const LIMIT: &str = "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"50\" velocity=\"1.2\"/>\n";
 
-/// Returns a description with six joints a1..a6 and links b1..b6 on link b0, followed by the text `more`; the mesh files named in it do not
-/// exist.
+/// Returns a description with six joints a1..a6 and links b1..b6 on link b0, followed by the text `more`. The description names mesh files
+/// that do not exist.
 fn robot(parts: &[Part], more: &str) -> String {
     let mut text = format!("<?xml version=\"1.0\"?>\n<robot name=\"arm\">\n{}", body("b0", 2.0, &[0.0; 3]));
     for (i, p) in parts.iter().enumerate() {
@@ -89,7 +89,7 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| (0..3).map(|k| a[i][k] * v[k]).sum())
 }
 
-/// Returns the rotation about an axis (Rodrigues). This function does not use code of the importer.
+/// Returns the rotation matrix for an angle about an axis, by Rodrigues' formula. This function does not use code of the importer.
 fn turn(axis: [f64; 3], angle: f64) -> Matrix {
     let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
     let [x, y, z] = axis.map(|v| v / norm);
@@ -150,7 +150,7 @@ proptest! {
     ) {
         let gravity = [0.7, -1.3, -9.6];
         let arm = Arm::from_urdf(&robot(&parts, "")).unwrap();
-        // If an angle is within 2 µrad of a multiple of π/2, the dynamics use the multiple.
+        // If an angle is within 2 µrad of a multiple of π/2, the arm dynamics use the multiple of π/2.
         let off = |angle: f64| (angle - FRAC_PI_2 * (angle / FRAC_PI_2).round()).abs();
         let angles = arm.model.joints.iter().flat_map(|origin| origin.rpy);
         prop_assume!(angles.map(off).all(|off| !(1e-9..3e-6).contains(&off)));
@@ -167,8 +167,8 @@ proptest! {
     }
 }
 
-/// A plate between two joints and a tool on two fixed joints result in the same masses as links that already contain the plate and the
-/// tool.
+/// A plate between two joints and a tool on two fixed joints become parts of links. The masses equal the masses of links that already
+/// contain the plate and the tool.
 #[test]
 fn fixed_joints_are_merged_into_the_link_that_carries_them() {
     let flange =
@@ -201,7 +201,8 @@ fn j40_fingers_and_what_follows_them_are_left_out() {
     let finger = joint("left", "prismatic", ("b6", "l"), LIMIT) + &body("l", 0.1, &[0.0; 3]);
     let mimic = joint("right", "prismatic", ("b6", "r"), &format!("<mimic joint=\"left\"/>{LIMIT}"))
         + &body("r", 0.1, &[0.0; 3]);
-    // A joint that mimics another joint needs no option. A joint that moves independently needs an option.
+    // For a joint that mimics another joint, the user does not need to select the joints. For an additional joint that moves independently,
+    // the user must select the joints.
     let follower = mimic.replace("\"left\"", "\"a1\"");
     let arm = Arm::from_urdf(&robot(&parts(), &follower)).unwrap();
     assert_eq!(
@@ -265,7 +266,7 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
             "{limit}: {assumed:?}"
         );
     }
-    // The proposed torque limit is computed from this arm, never copied from another arm.
+    // If the torque limit is missing, the importer computes a limit from this arm and does not copy the limit of another arm.
     let text = robot(&parts(), "").replace("effort=\"50\"", "");
     let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
     assert!(arm.joints.iter().all(|j| j.torque_max < 60.0 && j.torque_max > 0.5), "{:?}", arm.joints);
@@ -319,14 +320,14 @@ fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
             let error = error.to_string();
             assert!(error.starts_with(", joint a2: ") && error.contains(words), "{limits}: {error}");
         }
-        // A joint without end stops is still accepted.
+        // A continuous joint does not have end stops, so the reader accepts the joint with any limits.
         let endless = text.replacen("\"a2\" type=\"revolute\"", "\"a2\" type=\"continuous\"", 1);
         assert!(Arm::from_urdf(&endless).is_ok(), "{limits}");
     }
 }
 
-/// The reader keeps a limit that is narrower than the limit of the drives. A direction without a limit is marked. A wrist limit of more
-/// than one turn is reduced and marked.
+/// The reader keeps a position limit that is narrower than the limit of the drives. The reader marks a missing position limit. The reader
+/// reduces and marks a position limit of more than one turn.
 #[test]
 fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
     let second = |limits: &str| {
@@ -361,8 +362,8 @@ fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
     }
 }
 
-/// A velocity above the speed of any arm is probably in degrees per second, or is a placeholder. The reader uses the lower speed of both
-/// meanings, and marks the value for the check.
+/// A velocity above the speed of any arm is probably in degrees per second, or is a placeholder. The reader assumes degrees per second,
+/// because this speed is lower, and marks the value for the check.
 #[test]
 fn a_velocity_that_is_not_believed_is_marked_and_never_the_fastest_in_silence() {
     for (velocity, used, marked) in [
@@ -480,7 +481,7 @@ fn j06_masses_that_are_none_are_named_by_their_link() {
     assert!(text.contains("link b0: link 0: largest principal moment"), "{text}");
 }
 
-/// For an arm mounted upside down or on a wall, gravity still points down.
+/// If an arm is mounted upside down or on a wall, the proposed gravity still points down.
 #[test]
 fn gravity_is_proposed_as_the_description_mounts_the_arm() {
     let mount = |rpy: &str| {
@@ -499,7 +500,7 @@ fn gravity_is_proposed_as_the_description_mounts_the_arm() {
     assert_eq!(mount("0 1.5707963267948966 0"), [9.81, 0.0, 0.0]);
 }
 
-/// The file that `jtc arm import` writes is read again with all marks, and the check finds no problem in this file.
+/// The arm file that `jtc arm import` writes keeps the marks of the proposed values, and the check finds no problem in this file.
 #[test]
 fn proposals_are_marked_in_the_file_and_found_again() {
     let text = robot(&parts(), "").replacen(

@@ -1,14 +1,14 @@
-//! Text of a robot description before it is parsed: nesting depth, positions of the elements, and faults for which the XML reader gives no
-//! position.
+//! Checks of the text of a robot description before the XML reader parses it. The module also finds the positions of errors for which the
+//! XML reader does not report a position.
 
 use std::borrow::Cow;
 
 use crate::file::{FileError, Place, short};
 
-/// Maximum nesting depth of elements; descriptions of arms are less deep.
+/// Maximum nesting depth of elements. Descriptions of arms have a lower depth.
 const DEPTH_MAX: usize = 32;
 
-/// Tag in the text with its begin, its end, and the nesting depth of its element. The outermost element has depth 0.
+/// Tag in the text: beginning, end, and nesting depth of its element. The outermost element has depth 0.
 struct Tag<'a> {
     text: &'a str,
     begin: usize,
@@ -18,7 +18,7 @@ struct Tag<'a> {
     empty: bool,
 }
 
-/// Returns the tags of a text, without comments and declarations.
+/// Returns the tags of a text. Comments and declarations are not included.
 fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
     let (mut at, mut depth) = (0, 0usize);
     std::iter::from_fn(move || {
@@ -66,7 +66,7 @@ fn end_of_tag(rest: &str) -> Option<usize> {
     })
 }
 
-/// Rejects a text whose elements are nested too deep, because the XML reader is recursive.
+/// Rejects a text whose elements are nested too deeply, because the XML reader is recursive.
 pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
     if deepest > DEPTH_MAX {
@@ -77,7 +77,7 @@ pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Adds the velocity limit 0 to each limit without a velocity, because the XML reader requires a velocity. The value 0 means that the
+/// Adds the velocity 0 to each `limit` element without a velocity, because the XML reader requires a velocity. Velocity 0 means that the
 /// velocity is not limited.
 pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !tag.text.contains("velocity");
@@ -95,7 +95,8 @@ pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     Cow::Owned(out + &text[from..])
 }
 
-/// Returns the names of the joints whose limits have neither a lower nor an upper position. The XML reader would set both limits to 0.
+/// Returns the names of the joints that have neither a lower nor an upper position limit. The XML reader would set both missing limits to
+/// 0.
 pub(super) fn without_ranges(text: &str) -> Vec<String> {
     let mut joints: Vec<(String, bool)> = Vec::new();
     for tag in tags(text).filter(|tag| !tag.closes) {
@@ -117,7 +118,8 @@ fn has_attribute(tag: &Tag, keys: &[&str]) -> bool {
     tag.text.split('=').any(|head| keys.iter().any(|key| head.trim_end().ends_with(key)))
 }
 
-/// Adds the element that causes the error to an error of the XML reader, which does not report the position.
+/// Finds the element that causes an error of the XML reader, because the XML reader does not report the position. Returns an error that
+/// names this element.
 pub(super) fn locate(text: &str, what: &str) -> FileError {
     let what = what.trim_start_matches("custom: ").replace("float literal", "number");
     let mut open = None;
@@ -139,7 +141,7 @@ pub(super) fn locate(text: &str, what: &str) -> FileError {
     FileError::form(format!("not a valid URDF: {whole}"))
 }
 
-/// Returns the first attribute of an element that must be a number but is not.
+/// Returns a message about the first attribute of an element that must be a number but is not a number.
 fn no_number(element: &str) -> Option<String> {
     const NUMBERS: [&str; 16] = [
         "value",

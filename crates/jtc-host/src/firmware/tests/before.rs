@@ -1,4 +1,4 @@
-//! Decision to flash a board, depending on the report of its controller, the line, and the image.
+//! Tests of the decision to flash a board. The decision depends on the report of the controller, the serial line and the image.
 
 use jtc_wire::{ControllerState, NodeState, can_flag};
 
@@ -24,8 +24,8 @@ fn an_arm_with_torque_is_not_dropped() {
             asked => assert!(asked.is_ok() && idle, "{state}: {asked:?}"),
         }
     }
-    // One drive that may hold the arm is sufficient to refuse flashing. A drive may also hold the arm during a transition, a reaction to a
-    // fault and a calibration.
+    // If one drive may hold the arm, flashing is refused. A drive may also hold the arm during a transition, a reaction to a fault or a
+    // calibration.
     board.set_status(|status| status.state = ControllerState::Error.into());
     for code in 0..=255 {
         board.set_status(|status| status.joints[5].state = NodeState::new(code));
@@ -43,8 +43,8 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     for before in [asked(&board, Some(false)), asked(&board, None), Preflight::default()] {
         assert!(before.to_confirm(&new).unwrap().contains("supported"), "{before:?}");
     }
-    // A report on the line of another board is not treated as a report of this board. If the board's own line is also queried, a report on
-    // another line has no effect.
+    // A report on the line of another board does not count as a report of the drive's board. If the line of the drive's board is also
+    // queried, a report on another line has no effect.
     board.hold(true);
     let silent = asked(&board, Some(true));
     assert_eq!(silent.lines[0].answers, Answers::Nothing { bytes: 0 });
@@ -72,7 +72,7 @@ fn what_a_status_leaves_open_has_to_be_answered_for() {
     board.set_status(|status| status.can_current = can_flag::no_answer(2));
     assert!(question().unwrap().contains("no answer from joint 3"));
     reset();
-    // The joint has not answered since the controller started.
+    // A joint in the state Start has not answered since the controller started.
     board.set_status(|status| status.joints[2].state = NodeState::START);
     assert!(question().unwrap().contains("no answer from joint 3"));
     reset();
@@ -112,7 +112,7 @@ fn a_second_look_sees_what_is_then() {
     let board = Board::running(H745, None);
     let mut session = Session::new(Keeps { port: board.port(), kept: Vec::new() });
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: false, .. }));
-    // Status frames of two minutes, all without torque, are buffered. After these frames, a drive is enabled.
+    // Status frames of two minutes, all without torque, are buffered. After these buffered frames, a drive is enabled.
     session.port_mut().keep(Duration::from_secs(120));
     board.set_status(|status| status.joints[0].state = NodeState::ENABLED);
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: true, .. }));
@@ -128,7 +128,7 @@ struct Keeps {
 }
 
 impl Keeps {
-    /// Buffers data for `time`, as if the program did not read.
+    /// Buffers the data that the board sends during `time`, as if the program did not read.
     fn keep(&mut self, time: Duration) {
         let (end, mut buffer) = (self.port.now() + time, [0; 4096]);
         while self.port.now() < end {
@@ -185,7 +185,8 @@ fn an_image_goes_onto_its_own_board_only() {
     let all = Permissions { assume_board: true, accept_supply: true };
     assert_eq!(ask(H745, &h745, Some(H745), none), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &h745, None, all), Err("other-board"));
-    // The label is truncated. The running controller or the operator must identify the board.
+    // The label of the drive is truncated, so it does not identify the board. The running controller or the operator must identify the
+    // board.
     assert_eq!(ask("nucleo-h743zi2", &cut, None, none), Err("unnamed-board"));
     assert_eq!(ask("nucleo-h743zi2", &cut, None, Permissions { assume_board: true, ..none }), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), none), Ok(()));
@@ -193,7 +194,8 @@ fn an_image_goes_onto_its_own_board_only() {
         ask_over("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), Some(false), none),
         Err("unnamed-board")
     );
-    // If the controller on the line runs on a board that does not match the image, flashing is refused, even if the operator confirms it.
+    // If the controller on the serial line runs on a board that does not match the image, flashing is refused, even if the operator
+    // confirms it.
     assert_eq!(ask(H745, &h745, Some("simulator"), all), Err("other-controller"));
     // Software cannot detect the core supply of the board. A program that already runs on this board matches the core supply.
     let ldo = "nucleo-h745zi-q-ldo";
@@ -209,7 +211,8 @@ fn an_image_goes_onto_its_own_board_only() {
     }
 }
 
-/// A report that the program cannot read may come from any board. Such a controller is not treated like a device without reports.
+/// A controller with an unreadable report may run on any board, so its core supply is unknown. A device that never sends reports is a
+/// different case.
 #[test]
 fn a_controller_that_does_not_report_its_board_has_an_unknown_supply() {
     let link = StLink::new("NOD_H745ZIQ", &Board::running(H745, None), Behaviour::Ignores);

@@ -1,4 +1,4 @@
-//! Selection of the serial lines. The line of the drive's own board is always queried.
+//! Tests of the selection of the serial lines. The line of the drive's board is always queried.
 
 use std::os::unix::fs::symlink;
 
@@ -70,7 +70,7 @@ fn the_board_of_the_drive_is_asked_whatever_port_is_named() {
         let asked = may_flash(&image(H745, 2), &usb.drive, &before, all);
         assert!(matches!(&asked, Err(FirmwareError::HasTorque { port, .. }) if port == OWN), "{asked:?}");
     }
-    // An arm on the line that the user selected also prevents flashing.
+    // If an arm is under torque on the line that the user selected, flashing is also refused.
     let mut lines =
         usb.open(Some(OTHER), |port| Ok(if port == OWN { idle.port() } else { holds.port() })).unwrap();
     let asked = may_flash(&image(H745, 2), &usb.drive, &lines.look().unwrap(), Permissions::default());
@@ -95,7 +95,7 @@ fn a_board_that_another_program_has_open_is_not_flashed() {
         assert!(matches!(&error, FirmwareError::NotAsked { port, .. } if port == at), "{error}");
         assert_eq!(error.kind(), ErrorKind::Refused);
     }
-    // The board's own port must be queried, but the port that the user selected may be missing.
+    // The port of the drive's board must be available, but the port that the user selected may be missing.
     let permission = |port: &str| Err(PortError::Permission { path: port.into() });
     assert!(matches!(usb.open(None, permission), Err(FirmwareError::NotAsked { .. })));
     let gone = |port: &str| match port {
